@@ -301,7 +301,7 @@ def fit(
         stimulus = Stimulus(vary="level", level=kind, levels=levels, spacing=spacing)
     except ValidationError as error:
         raise AnalysisError(f"levels {levels} with spacing {spacing!r}: {error.errors()[0]['msg']}") from error
-    return pd.DataFrame([asdict(one) for one in thresholds_of(trials, stimulus, default_design(design))])
+    return pd.DataFrame([asdict(estimate) for estimate in thresholds_of(trials, stimulus, default_design(design))])
 
 
 @_checked(results=_PATH)
@@ -607,7 +607,7 @@ def open_force(
         workspace_m=WORKSPACE_M,
         force_limit_n=first.force_limit_n if force_limit_n is None else force_limit_n,
         rate_hz=first.rate_hz,
-        elements=max(elements_needed(one) for one in scenes.values()),
+        elements=max(elements_needed(scene) for scene in scenes.values()),
         random=stream(1, "force/tremor"),
         options=options or {},
     )

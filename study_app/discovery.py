@@ -35,7 +35,7 @@ REGISTRIES: Final = {
 
 def modules_of(package: ModuleType) -> Iterator[ModuleType]:
     """Yield the modules of a package, imported, by name."""
-    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda found: found.name):
+    for module in sorted(pkgutil.iter_modules(package.__path__), key=lambda module: module.name):
         yield importlib.import_module(f"{package.__name__}.{module.name}")
 
 
@@ -69,8 +69,8 @@ class PlugIn:
 @cache
 def _points() -> tuple[EntryPoint, ...]:
     """Return the entry points of all groups, read once: that takes 10 to 30 ms."""
-    found = entry_points()
-    return tuple(point for kind in REGISTRIES for point in found.select(group=f"liquid_study.{kind}s"))
+    groups = entry_points()
+    return tuple(point for kind in REGISTRIES for point in groups.select(group=f"liquid_study.{kind}s"))
 
 
 def _of_kind(kind: str) -> Iterator[tuple[EntryPoint, PlugIn]]:
@@ -146,16 +146,18 @@ class Registry(Mapping[str, T], Generic[T]):
     def plug_in(self, name: str) -> PlugIn | None:
         """Return the plug-in that has a name; None if it is the program's own, or none has it."""
         found = () if name in self.own else self.plug_ins
-        return next((one for one in found if one.name == name and not one.fault), None)
+        return next((plug_in for plug_in in found if plug_in.name == name and not plug_in.fault), None)
 
     def missing(self, name: str) -> tuple[str, str]:
         """Return why the name of a plug-in is not here, and what to do."""
         package = name.partition(":")[0]
-        versions = [one.dist.version for one in _points() if one.dist and _canonical(one.dist.name) == package]
+        versions = [point.dist.version for point in _points() if point.dist and _canonical(point.dist.name) == package]
         if not versions:
             words = f'"{name}" is a {self.kind} of the plug-in {package}, which is not installed'
             return words, f"pip install {package}"
-        faults = [one.fault for one in self.plug_ins if one.fault and _canonical(one.package) == package]
+        faults = [
+            plug_in.fault for plug_in in self.plug_ins if plug_in.fault and _canonical(plug_in.package) == package
+        ]
         words = f'"{name}" is a {self.kind} that the plug-in {package} {versions[0]} does not provide'
         return ": ".join([words, *faults]), UPDATE
 
@@ -174,14 +176,14 @@ class Registry(Mapping[str, T], Generic[T]):
             plug_ins, others = [], dict[str, T]()
             for point, plug_in in _of_kind(self.kind):
                 try:
-                    found = point.load()
-                    name = self._name_of(found, point.value, plug_in.package, others)
-                    found = self._checked(found, replace(plug_in, name=name))
+                    loaded = point.load()
+                    name = self._name_of(loaded, point.value, plug_in.package, others)
+                    loaded = self._checked(loaded, replace(plug_in, name=name))
                 except (Exception, SystemExit, KeyboardInterrupt) as error:  # noqa: BLE001 - code of another package
                     plug_ins.append(replace(plug_in, fault=_line(error)))
                 else:
                     plug_ins.append(replace(plug_in, name=name))
-                    others[name] = found
+                    others[name] = loaded
             self._found = tuple(plug_ins), others
         return self._found
 
@@ -316,7 +318,7 @@ def explained(error: BaseException) -> BaseException:
         modules.append(str(trace.tb_frame.f_globals.get("__name__", "")).partition(".")[0])
         trace = trace.tb_next
     packages = {re.split(r"\W", point.value)[0]: point.dist for point in _points()}
-    dist = next((packages[one] for one in reversed(modules) if packages.get(one) is not None), None)
+    dist = next((packages[module] for module in reversed(modules) if packages.get(module) is not None), None)
     if dist is None:
         return error
     return _failure(dist.name, dist.version, _line(error))

@@ -55,8 +55,8 @@ def folder() -> Path:
 def names() -> tuple[str, ...]:
     """Return the name of every page, its path in the folder without the ending, sorted."""
     top = folder()
-    found = (path.relative_to(top) for path in top.rglob("*.md"))
-    return tuple(sorted(path.with_suffix("").as_posix() for path in found if path.parts[0] != "examples"))
+    paths = (path.relative_to(top) for path in top.rglob("*.md"))
+    return tuple(sorted(path.with_suffix("").as_posix() for path in paths if path.parts[0] != "examples"))
 
 
 def source(name: str) -> str:
@@ -76,8 +76,8 @@ def with_generated_parts(text: str) -> str:
 
 def title(name: str) -> str:
     """Return the heading of a page."""
-    found = _TITLE.search(source(name))
-    return found[1] if found else name
+    match = _TITLE.search(source(name))
+    return match[1] if match else name
 
 
 @cache
@@ -87,7 +87,7 @@ def sections() -> dict[str, tuple[str, ...]]:
     listed = {section: _LISTED.findall(source(section)) for section in _LISTED.findall(source(INDEX))}
     placed = {INDEX, *listed}
     for section, pages in listed.items():
-        listed[section] = [one for one in dict.fromkeys(pages) if one in known and one not in placed]
+        listed[section] = [key for key in dict.fromkeys(pages) if key in known and key not in placed]
         placed.update(listed[section])
     for name in known:
         if name not in placed:
@@ -122,11 +122,13 @@ def search(words: str) -> tuple[Section, ...]:
     score = dict.fromkeys(_sections(), 0.0)
     for stem in dict.fromkeys(stems):
         begins = re.compile(rf"(?<![^\W_]){re.escape(stem)}" + r"(?!\w)" * (len(stem) == 1))
-        weights = {one: 3 * _has(one.names, stem, begins) or _has(one.text, stem, begins) for one in score}
-        pages = {one.page for one, weight in weights.items() if weight}
+        weights = {
+            section: 3 * _has(section.names, stem, begins) or _has(section.text, stem, begins) for section in score
+        }
+        pages = {section.page for section, weight in weights.items() if weight}
         rarity = math.log(1 + len(names()) / max(1, len(pages)))
-        for one, weight in weights.items():
-            score[one] += rarity * (weight or 0.25 * (one.page in pages))
+        for section, weight in weights.items():
+            score[section] += rarity * (weight or 0.25 * (section.page in pages))
     typed = frozenset(stems)
     for one in score:
         score[one] *= 2 if any(it == typed or (len(it) > 1 and it <= typed) for it in one.phrases) else 1
@@ -172,9 +174,9 @@ def index_markdown() -> str:
 
 def _heading(name: str, anchor: str) -> str:
     for read in (source, page):
-        for found in _FENCED_OR_HEADING.finditer(read(name)):
-            if found[1] and (not anchor or anchor_of(plain(found[1])) == anchor):
-                return plain(found[1])
+        for match in _FENCED_OR_HEADING.finditer(read(name)):
+            if match[1] and (not anchor or anchor_of(plain(match[1])) == anchor):
+                return plain(match[1])
     raise KeyError(f"{name}#{anchor}")
 
 
@@ -184,15 +186,15 @@ def _sections() -> tuple[Section, ...]:
     made: list[Section] = []
     for name in (*(page for pages in sections().values() for page in pages), *sections(), INDEX):
         text, title_of_page = source(name) if name == _GLOSSARY else page(name), plain(title(name))
-        headings = [found for found in _FENCED_OR_HEADING.finditer(text) if found[1]]
-        for found, ends in zip(headings, [*(one.start() for one in headings[1:]), len(text)], strict=True):
-            heading = plain(found[1])
+        headings = [match for match in _FENCED_OR_HEADING.finditer(text) if match[1]]
+        for match, ends in zip(headings, [*(heading.start() for heading in headings[1:]), len(text)], strict=True):
+            heading = plain(match[1])
             anchor = "" if heading == title_of_page else anchor_of(heading)
             also = [said for page_, anchor_, said in synonyms() if (page_, anchor_) == (name, anchor)]
             shown = " ".join([title_of_page, heading, *also]).casefold()
             said = ", ".join(also if anchor else [*also, title_of_page]).split(", ")
             phrases = frozenset(frozenset(_stems(phrase)) for phrase in said if phrase)
-            below = text[found.end() : ends]
+            below = text[match.end() : ends]
             made.append(
                 Section(
                     page=name, heading=heading, names=shown, phrases=phrases, source=below, text=plain(below).casefold()

@@ -102,7 +102,7 @@ def fonts() -> tuple[str, ...]:
     if not all(file.is_file() for file in files):
         return FALLBACK_FONTS
     manager = font_manager.fontManager
-    manager.ttflist = [one for one in manager.ttflist if one.name != "Inter"]
+    manager.ttflist = [entry for entry in manager.ttflist if entry.name != "Inter"]
     for file in files:
         manager.addfont(file)
     return ("Inter", *FALLBACK_FONTS)

@@ -83,7 +83,7 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
     if not words:
         raise ValueError("Enter at least one number")
     commas = len(words) == 1 or any("," in apart for apart in _APART.findall(text.strip(" ,;\n")))
-    found: list[tuple[str, int | float]] = []
+    numbers: list[tuple[str, int | float]] = []
     for before, word in zip(["", *words], words, strict=False):
         if _THOUSANDS.fullmatch(both := f"{before} {word}"):
             raise ValueError(f"“{both}” may be one number or two: write {before}{word} or {before} {int(word)}")
@@ -91,8 +91,8 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
             raise ValueError(f"“{word}” may be one number or several: separate numbers by spaces or semicolons")
         if (value := number_of(word)) is None:
             raise ValueError(unclear_number(word))
-        found.append((word, value))
-    return found
+        numbers.append((word, value))
+    return numbers
 
 
 def exact_text(value: float) -> str:

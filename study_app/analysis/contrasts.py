@@ -101,7 +101,7 @@ class Compared:
     @property
     def values(self) -> tuple[Array, ...]:
         """The values of each sample."""
-        return tuple(np.array([one.value for one in sample]) for sample in self.samples)
+        return tuple(np.array([measured.value for measured in sample]) for sample in self.samples)
 
     @property
     def smallest(self) -> int:
@@ -112,12 +112,12 @@ class Compared:
         """Return the mean, or the difference of the groups' means; None where a sample has fewer than two numbers."""
         if self.smallest < 2:
             return None
-        found = []
+        compared = []
         for group, (sample, values) in enumerate(zip(self.samples, self.values, strict=True)):
-            variances = np.array([one.variance for one in sample])
+            variances = np.array([measured.variance for measured in sample])
             weights = random_effects_weights(values, variances)[0] if variances.all() else None
-            found.append(means_of(values[None], weights, group=group, resamples=resamples_for(alpha)))
-        means = found[0] if len(found) == 1 else found[0] - found[1]
+            compared.append(means_of(values[None], weights, group=group, resamples=resamples_for(alpha)))
+        means = compared[0] if len(compared) == 1 else compared[0] - compared[1]
         return means.widened(self.shared) if self.shared else means
 
 
@@ -127,11 +127,12 @@ def contrast_results(
     """Test the contrasts of a study, differences and equivalence by Holm each; none while the key is sealed."""
     alpha = study.decided.alpha
     tests = [_tested(study, contrast, answers, levels, alpha / len(study.contrasts)) for contrast in study.contrasts]
-    adjusted = holm([None if one.p is None else max(one.p, one.p_bootstrap or 0.0) for one in tests])
-    with_bound = [place for place, one in enumerate(tests) if one.contrast.bound is not None]
+    adjusted = holm([None if test.p is None else max(test.p, test.p_bootstrap or 0.0) for test in tests])
+    with_bound = [place for place, test in enumerate(tests) if test.contrast.bound is not None]
     of_equal = dict(zip(with_bound, holm([tests[place].p_equivalent for place in with_bound]), strict=True))
     return tuple(
-        _judged(study, one, p, of_equal.get(place)) for place, (one, p) in enumerate(zip(tests, adjusted, strict=True))
+        _judged(study, result, p, of_equal.get(place))
+        for place, (result, p) in enumerate(zip(tests, adjusted, strict=True))
     )
 
 
@@ -210,11 +211,11 @@ def _side(name: str, held: Mapping[str, Measured], *, ratio: bool) -> ContrastSi
     low, high = (None, None) if means is None else (scale(float(end[0])) for end in means.interval(0.95))
     return ContrastSide(
         name=name,
-        values={person: scale(one.value) for person, one in held.items()},
+        values={person: scale(measured.value) for person, measured in held.items()},
         mean=None if means is None else scale(float(means.mean[0])),
         low=low,
         high=high,
-        sd=_sd([one.value for one in held.values()]),
+        sd=_sd([measured.value for measured in held.values()]),
     )
 
 
@@ -244,10 +245,10 @@ def _standardised(compared: Compared, *, is_ordinal: bool) -> _Standardised:
 
 def _thresholds_of_two(study: Study, contrast: Contrast, per_u: float) -> tuple[list[Mapping[str, Measured]], float]:
     """Return the thresholds in two blocks, in units of which u has so many, and the variance that widths add."""
-    first, second = (next(one for one in study.levels if one.id == block) for block in contrast.blocks)
+    first, second = (next(level for level in study.levels if level.id == block) for block in contrast.blocks)
     sides, shared = thresholds_compared(first, second, tracks(study)[list(READ)])
     return [
-        {person: Measured(value=per_u * one.value, variance=per_u**2 * one.variance) for person, one in side.items()}
+        {person: Measured(value=per_u * u.value, variance=per_u**2 * u.variance) for person, u in side.items()}
         for side in sides
     ], per_u**2 * shared
 
@@ -261,7 +262,7 @@ def _values(
 ) -> Mapping[str, Measured]:
     """Return each participant's number in a block: the mean over standards, or over the conditions of statements."""
     if contrast.measure not in _STATISTICS:
-        asked = next(found for found in answers if found.block.id == block)
+        asked = next(answered for answered in answers if answered.block.id == block)
         codes = [setting.code for setting in asked.block.settings if condition in (None, setting.condition)]
         rows = asked.values[contrast.measure][:, sorted({asked.block.columns[code] for code in codes})].mean(axis=1)
         return {
@@ -269,33 +270,35 @@ def _values(
             for person, row in zip(asked.people, rows, strict=True)
             if not math.isnan(row)
         }
-    found = next(level for level in levels if level.block == block)
+    result = next(level for level in levels if level.block == block)
     statistic, attribute = _STATISTICS[contrast.measure]
     ratio = _is_ratio(contrast, levels)
     numbers: dict[str, list[Measured]] = {}
-    for row in statistic.own(found):
+    for row in statistic.own(result):
         if (value := getattr(row, attribute)) is not None:
-            measured = Measured(value=math.log(value) if ratio else value, variance=_variance(row, found, ratio=ratio))
+            measured = Measured(value=math.log(value) if ratio else value, variance=_variance(row, result, ratio=ratio))
             numbers.setdefault(str(row.participant), []).append(measured)
     return {
         person: Measured(
-            value=float(np.mean([one.value for one in each])),
-            variance=sum(one.variance for one in each) / len(each) ** 2,
+            value=float(np.mean([measured.value for measured in each])),
+            variance=sum(measured.variance for measured in each) / len(each) ** 2,
         )
         for person, each in numbers.items()
     }
 
 
-def _variance(row: Any, found: LevelsResult, *, ratio: bool) -> float:
+def _variance(row: Any, result: LevelsResult, *, ratio: bool) -> float:
     """Return the variance of an estimate on the scale of the test; 0 where it is not known."""
     if not isinstance(row, ThresholdEstimate) or row.variance is None:
         return 0.0
-    per_u = math.log(10) * (1.0 if ratio else row.threshold) if found.spacing == "log" else 1.0
+    per_u = math.log(10) * (1.0 if ratio else row.threshold) if result.spacing == "log" else 1.0
     return row.variance * per_u**2
 
 
-def _is_ratio(one: Contrast, levels: Sequence[LevelsResult]) -> bool:
-    return one.measure in RATIOS and all(level.spacing == "log" for level in levels if level.block in one.blocks)
+def _is_ratio(contrast: Contrast, levels: Sequence[LevelsResult]) -> bool:
+    return contrast.measure in RATIOS and all(
+        level.spacing == "log" for level in levels if level.block in contrast.blocks
+    )
 
 
 def _tested(
@@ -378,59 +381,63 @@ def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> flo
     return people_beyond(compared.values[0], reach).interval.high
 
 
-def question(one: ContrastResult) -> str:
+def question(contrast: ContrastResult) -> str:
     """Return the hypothesis in words."""
-    words = one.contrast.described(one.compared)
+    words = contrast.contrast.described(contrast.compared)
     return f"{words[:1].upper()}{words[1:]}"
 
 
-def answer(one: ContrastResult) -> str:
+def answer(contrast: ContrastResult) -> str:
     """Return what is found, in sentences."""
-    sentences = [f"Not tested: {one.note}." if one.p_adjusted is None else _difference_words(one)]
-    if one.contrast.bound is not None and _lies_beyond(one, one.contrast.bound):
-        what = "All differences lie" if one.interval is None else "The whole interval lies"
+    sentences = [f"Not tested: {contrast.note}." if contrast.p_adjusted is None else _difference_words(contrast)]
+    if contrast.contrast.bound is not None and _lies_beyond(contrast, contrast.contrast.bound):
+        what = "All differences lie" if contrast.interval is None else "The whole interval lies"
         sentences.append(f"{what} beyond the bound (not equivalent).")
-    elif one.equivalent:
-        people = "of people differ by more" if one.contrast.groups is None else "of a group are not in the sample"
+    elif contrast.equivalent:
+        people = "of people differ by more" if contrast.contrast.groups is None else "of a group are not in the sample"
         sentences.append(
             "The mean lies within the bound (equivalent); the data do not exclude that up to "
-            f"{100 * (one.not_excluded or 0.0):.0f} % {people}."
+            f"{100 * (contrast.not_excluded or 0.0):.0f} % {people}."
         )
-    elif one.equivalent is not None:
+    elif contrast.equivalent is not None:
         sentences.append("The mean is not shown to lie within the bound.")
-    if one.left_out:
-        sentences.append(f"Excluded: {_left_out_words(one)}.")
+    if contrast.left_out:
+        sentences.append(f"Excluded: {_left_out_words(contrast)}.")
     return " ".join(sentences)
 
 
-def _lies_beyond(one: ContrastResult, bound: float) -> bool:
+def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
     """Return whether the whole 95 % interval, or the difference that all participants have, lies beyond the bound."""
-    reach, _ = equality_limits(one.contrast, bound, ratio=one.ratio)
-    if one.ratio and one.effect is not None:
-        ends = one.interval
+    reach, _ = equality_limits(contrast.contrast, bound, ratio=contrast.ratio)
+    if contrast.ratio and contrast.effect is not None:
+        ends = contrast.interval
         logarithms = None if ends is None else replace(ends, low=math.log(ends.low), high=math.log(ends.high))
-        return is_beyond(replace(one, effect=math.log(one.effect), interval=logarithms), reach, 0.05)
-    return is_beyond(one, reach, 0.05)
+        return is_beyond(replace(contrast, effect=math.log(contrast.effect), interval=logarithms), reach, 0.05)
+    return is_beyond(contrast, reach, 0.05)
 
 
-def _difference_words(one: ContrastResult) -> str:
+def _difference_words(contrast: ContrastResult) -> str:
     """Return what was found of a difference that was tested, in sentences."""
-    first, second = one.compared
-    what, expected = number_text.capitalised(one.contrast.measure_words), one.contrast.expected
-    if one.verdict in FOUND:
-        side = "higher" if (one.effect or 0.0) > (1.0 if one.ratio else 0.0) else "lower"
+    first, second = contrast.compared
+    what, expected = number_text.capitalised(contrast.contrast.measure_words), contrast.contrast.expected
+    if contrast.verdict in FOUND:
+        side = "higher" if (contrast.effect or 0.0) > (1.0 if contrast.ratio else 0.0) else "lower"
         said = f"{what} was {side} in {first} than in {second}"
     elif expected is None:
         said = f"{what} was not shown to differ between {first} and {second}"
     else:
         said = f"{what} was not shown to be {expected} in {first} than in {second}"
-    means = listed([number(side.mean) for side in one.sides if side.mean is not None])
-    higher = "" if one.higher is None else f" It was higher in {first} for {one.higher} of {one.n} participants."
-    effect = f"mean {'ratio' if one.ratio else 'difference'} {number(one.effect)}"
-    size = "" if one.standardised is None else f", {_size_words(one.standardised)}"
+    means = listed([number(side.mean) for side in contrast.sides if side.mean is not None])
+    higher = (
+        ""
+        if contrast.higher is None
+        else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants."
+    )
+    effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect)}"
+    size = "" if contrast.standardised is None else f", {_size_words(contrast.standardised)}"
     return (
-        f"{said} (means {means}; {effect}, 95 % interval {interval(one.interval)}{size}, "
-        f"{p_equals(one.p_adjusted or 0.0)}, n = {one.n}).{higher}{_bayes_words(one)}"
+        f"{said} (means {means}; {effect}, 95 % interval {interval(contrast.interval)}{size}, "
+        f"{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n}).{higher}{_bayes_words(contrast)}"
     )
 
 
@@ -439,12 +446,12 @@ def _size_words(size: EffectSize | None) -> str:
     return "–" if size is None else f"{size.name} {number(size.value)} {interval(size)}"
 
 
-def _bayes_words(one: ContrastResult) -> str:
+def _bayes_words(contrast: ContrastResult) -> str:
     """Return the Bayes factor of a difference that was not shown, in a sentence after a space; else nothing."""
-    if one.bayes_factor is None or one.verdict in FOUND:
+    if contrast.bayes_factor is None or contrast.verdict in FOUND:
         return ""
-    more, less = ("with", "without") if one.bayes_factor > 1 else ("without", "with")
-    factor = significant(max(one.bayes_factor, 1 / one.bayes_factor))
+    more, less = ("with", "without") if contrast.bayes_factor > 1 else ("without", "with")
+    factor = significant(max(contrast.bayes_factor, 1 / contrast.bayes_factor))
     return (
         f" The data are {factor} times as likely {more} a difference as {less} one (JZS Bayes factor, Cauchy prior "
         f"with scale {number(PRIOR_SCALE, 3)})."
@@ -456,39 +463,41 @@ def contrast_methods(results: Results) -> Iterator[str]:
     contrasts = results.contrasts
     if not contrasts:
         return
-    for place, one in enumerate(contrasts, start=1):
-        of = " of logarithms" if one.ratio else ""
+    for place, contrast in enumerate(contrasts, start=1):
+        of = " of logarithms" if contrast.ratio else ""
         groups = f"a t test{of} of two groups with unequal variances"
-        test = groups if one.contrast.groups else f"a paired t test{of}"
-        sides = "two-sided" if one.contrast.expected is None else "one-sided"
+        test = groups if contrast.contrast.groups else f"a paired t test{of}"
+        sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
         label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
-        yield f"{label} ({one.contrast.described(one.compared)}) was tested by {test}, {sides}."
-    if any(one.contrast.groups for one in contrasts):
+        yield f"{label} ({contrast.contrast.described(contrast.compared)}) was tested by {test}, {sides}."
+    if any(contrast.contrast.groups for contrast in contrasts):
         yield "Between groups, t has the degrees of freedom of the smaller group (Hsu 1938)."
     holm_words = f", adjusted by Holm over {len(contrasts)} hypotheses"
     yield (
         "Each participant had one number in each comparison. A bootstrap that adds a participant like the most extreme "
         f"one (Gaffke 2005) had to agree: p is the larger of both{holm_words * (len(contrasts) > 1)}."
     )
-    if any(one.contrast.measure == "threshold" for one in contrasts):
+    if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
-    if any(one.standardised is not None for one in contrasts):
+    if any(contrast.standardised is not None for contrast in contrasts):
         yield _SIZES
-    if bounds := [one for one in contrasts if one.contrast.bound is not None]:
+    if bounds := [contrast for contrast in contrasts if contrast.contrast.bound is not None]:
         adjusted = f", adjusted by Holm over {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
             "Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree"
             f"{adjusted}, and requires that the sample is large enough to contain a member of a minority that shifts "
             "the mean by the bound."
         )
-    if gone := {f"{question(one)}: {_left_out_words(one)}": None for one in contrasts if one.left_out}:
+    if gone := {
+        f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out
+    }:
         yield f"Some participants were excluded from a hypothesis because a number is missing ({'; '.join(gone)})."
 
 
-def _left_out_words(one: ContrastResult) -> str:
+def _left_out_words(contrast: ContrastResult) -> str:
     """Return who is left out of a contrast and why."""
     by_reason: dict[str, list[str]] = {}
-    for person, reason in one.left_out.items():
+    for person, reason in contrast.left_out.items():
         by_reason.setdefault(reason, []).append(person)
     return "; ".join(
         f"{', '.join(people[:_MOST_NAMED])}{f' and {len(people) - _MOST_NAMED} more' * (len(people) > _MOST_NAMED)} "
@@ -505,20 +514,22 @@ def contrast_section(results: Results) -> Iterator[str]:
     yield table_of(
         results.contrasts,
         ("Hypothesis", question),
-        ("n", lambda one: str(one.n)),
-        ("effect", lambda one: f"{one.effect_name} {number(one.effect)}"),
-        ("95 % interval", lambda one: interval(one.interval)),
-        ("standardised", lambda one: _size_words(one.standardised)),
-        ("ordinal", lambda one: _size_words(one.ordinal)) if any(one.ordinal for one in results.contrasts) else None,
+        ("n", lambda result: str(result.n)),
+        ("effect", lambda result: f"{result.effect_name} {number(result.effect)}"),
+        ("95 % interval", lambda result: interval(result.interval)),
+        ("standardised", lambda result: _size_words(result.standardised)),
+        ("ordinal", lambda result: _size_words(result.ordinal))
+        if any(contrast.ordinal for contrast in results.contrasts)
+        else None,
         ("SD", _sd_words),
-        ("Bayes factor BF₁₀", lambda one: "–" if one.bayes_factor is None else significant(one.bayes_factor)),
-        ("p", lambda one: p_value(one.p)),
-        ("adjusted p", lambda one: p_value(one.p_adjusted)),
-        ("Verdict", lambda one: one.verdict),
+        ("Bayes factor BF₁₀", lambda row: "–" if row.bayes_factor is None else significant(row.bayes_factor)),
+        ("p", lambda result: p_value(result.p)),
+        ("adjusted p", lambda result: p_value(result.p_adjusted)),
+        ("Verdict", lambda result: result.verdict),
         words=1,
         last=1,
     )
-    weighted = any(one.contrast.measure == "threshold" for one in results.contrasts)
+    weighted = any(contrast.contrast.measure == "threshold" for contrast in results.contrasts)
     yield paragraph(
         "The study file states these hypotheses. Each was tested on one number per participant by a t test "
         "together with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger "
@@ -528,36 +539,36 @@ def contrast_section(results: Results) -> Iterator[str]:
         "soft",
     )
     yield paragraph(f"{_SIZES} SD: between participants, of the two compared and of their difference.", "soft")
-    if rows := [one for one in results.contrasts if one.left_out]:
-        yield bullets([f"{question(one)}: left out {_left_out_words(one)}." for one in rows])
+    if rows := [contrast for contrast in results.contrasts if contrast.left_out]:
+        yield bullets([f"{question(row)}: left out {_left_out_words(row)}." for row in rows])
 
 
-def _sd_words(one: ContrastResult) -> str:
+def _sd_words(contrast: ContrastResult) -> str:
     """Return the standard deviations between participants."""
-    of_sides = listed([number(side.sd) for side in one.sides if side.sd is not None])
-    return (of_sides or "–") + ("" if one.sd is None else f"; {number(one.sd)}") + " (ln)" * one.ratio
+    of_sides = listed([number(side.sd) for side in contrast.sides if side.sd is not None])
+    return (of_sides or "–") + ("" if contrast.sd is None else f"; {number(contrast.sd)}") + " (ln)" * contrast.ratio
 
 
 def contrast_rows(results: Results) -> Iterator[dict[str, Any]]:
     """Yield the rows of tests.csv."""
-    for one in results.contrasts:
-        ends = one.interval
+    for contrast in results.contrasts:
+        ends = contrast.interval
         yield dict.fromkeys(column.name for column in TESTS) | {
-            **{name: getattr(one, name) for name in ("test", "n", "dropped", "statistic_name")},
-            **{name: getattr(one, name) for name in ("statistic", "p", "effect_name", "effect", "method")},
-            "block": one.contrast.blocks[0],
-            "question": question(one),
-            "item": None if one.contrast.measure in _STATISTICS else one.contrast.measure,
-            "p_adjusted": one.p_adjusted,
+            **{name: getattr(contrast, name) for name in ("test", "n", "dropped", "statistic_name")},
+            **{name: getattr(contrast, name) for name in ("statistic", "p", "effect_name", "effect", "method")},
+            "block": contrast.contrast.blocks[0],
+            "question": question(contrast),
+            "item": None if contrast.contrast.measure in _STATISTICS else contrast.contrast.measure,
+            "p_adjusted": contrast.p_adjusted,
             "low": None if ends is None else ends.low,
             "high": None if ends is None else ends.high,
             "level": None if ends is None else ends.level,
-            "interval": one.no_interval or (None if ends is None else ends.method),
+            "interval": contrast.no_interval or (None if ends is None else ends.method),
             "family": "hypotheses",
-            "members": one.members,
+            "members": contrast.members,
             "correction": HOLM,
             "primary": results.decided.binding,
-            "verdict": one.verdict,
-            "note": one.note or None,
+            "verdict": contrast.verdict,
+            "note": contrast.note or None,
             "codes": "",
         }

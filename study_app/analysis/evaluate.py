@@ -83,7 +83,9 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
             return failures.attempt("all tests", partial(evaluate_block, study, answers, tell), block=block.id)
 
         lost = collected[number]
-        found = lost if isinstance(lost, Failure) else test(next(one for one in asked if one.block is block))
+        found = (
+            lost if isinstance(lost, Failure) else test(next(answers for answers in asked if answers.block is block))
+        )
         return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
 
     def moved() -> Performance | None:
@@ -118,21 +120,21 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
     ``tell`` receives the name of each finding that is begun.
     """
     block, own = answers.block, study is not None and study.own_codes
-    found = summarize_block(study, answers)
+    result = summarize_block(study, answers)
     for finding in all_findings():
         if not finding.what:
             continue
         if block.kind not in (finding.kinds if block.revealed else () if own else finding.sealed):
             if not block.revealed and block.kind in (*finding.waits, *(finding.sealed if own else ())):
-                found = replace(found, absent=(*found.absent, NotTested(finding.what, SEALED)))
+                result = replace(result, absent=(*result.absent, NotTested(finding.what, SEALED)))
             continue
         tell(finding.what)
-        tested = answers.failures.attempt(finding.what, partial(finding.test, answers, found), block=block.id)
+        tested = answers.failures.attempt(finding.what, partial(finding.test, answers, result), block=block.id)
         if isinstance(tested, Failure):
             tested = finding.empty, (NotTested(finding.what, tested.why),)
         value, absent = tested
-        found = replace(finding.add_to(found, value), absent=(*found.absent, *absent))
-    return found
+        result = replace(finding.add_to(result, value), absent=(*result.absent, *absent))
+    return result
 
 
 def delivered(study: Study) -> tuple[Delivered, ...]:
@@ -141,17 +143,17 @@ def delivered(study: Study) -> tuple[Delivered, ...]:
     Errors by code would tell little, and delays nothing may tell before the key is opened.
     """
     counted = study.trials[study.trials["counted"]]
-    found = []
+    delivery = []
     for block in study.blocks:
         rows = counted[counted["block"] == block.id]
         if not block.revealed:
-            found.append(_measured(block, None, None, rows))
+            delivery.append(_measured(block, None, None, rows))
             continue
-        found += [
+        delivery += [
             _measured(block, setting.code, setting.delay_ms, rows[rows["code"] == setting.code])
             for setting in block.settings
         ]
-    return tuple(found)
+    return tuple(delivery)
 
 
 def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.DataFrame) -> Delivered:

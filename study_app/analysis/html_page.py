@@ -79,8 +79,8 @@ def attempted(
     failures: Failures, what: str, title: Markup, make: Callable[[], Iterable[str]], *, block: str | None = None
 ) -> list[str]:
     """Return a part of the page; where it fails its title and why it is missing, and the failure is kept."""
-    found = failures.attempt(what, lambda: list(make()), block=block)
-    return [title, box([paragraph(f"Not there: {found.why}.")], "care")] if isinstance(found, Failure) else found
+    made = failures.attempt(what, lambda: list(make()), block=block)
+    return [title, box([paragraph(f"Not there: {made.why}.")], "care")] if isinstance(made, Failure) else made
 
 
 def chunks(parts: Sequence[str]) -> list[list[str]]:
@@ -150,8 +150,8 @@ def _inline_svg(svg: str, words: str) -> Markup:
         _COLOUR.sub(lambda match: f"var(--{_VARIABLES[match[0].lower()]})", part) if "#ffffff" not in part else part
         for part in parts[1::2]
     ]
-    width = round(_PX_PER_PT * float(found[1])) if (found := _SIZE.search(svg)) else 600
-    view = found[0] if found else ""
+    width = round(_PX_PER_PT * float(size[1])) if (size := _SIZE.search(svg)) else 600
+    view = size[0] if size else ""
     root = re.sub(r' (?:width|height)="[^"]*"', "", view, count=2)
     label = Markup.escape(words)
     shown = root.replace("<svg ", f'<svg role="img" aria-label="{label}" style="width: {width}px" ', 1)

@@ -48,15 +48,15 @@ class PlannedExclusions:
 
 def planned_exclusions(study: Study, results: Results) -> PlannedExclusions | None:
     """Return the sessions that meet a rule and the conclusions both ways; None if no session does."""
-    found = proposals(study, results)
-    if not found:
+    proposed = proposals(study, results)
+    if not proposed:
         return None
-    excluded = any(one.decision == "excluded" for one in found)
+    excluded = any(proposal.decision == "excluded" for proposal in proposed)
     whole = replace(load_study(study.folder, planned=False) if excluded else study, with_below_chance=True)
     return PlannedExclusions(
-        proposals=found,
+        proposals=proposed,
         included=evaluate(whole, recordings=False),
-        left_out=evaluate(_without(whole, {one.what for one in found}), recordings=False),
+        left_out=evaluate(_without(whole, {proposal.what for proposal in proposed}), recordings=False),
     )
 
 
@@ -68,17 +68,21 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
     planned = {rule["rule"]: rule.get("limit") for rule in (study.protocol.get("analysis") or {}).get("exclusions", ())}
     excluded = (
         Proposal(
-            participant=one.participant,
-            session=one.session,
-            rule=one.rule_or_person,
-            why=one.reason,
+            participant=exclusion.participant,
+            session=exclusion.session,
+            rule=exclusion.rule_or_person,
+            why=exclusion.reason,
             decision="excluded",
-            by=one.excluded_at,
+            by=exclusion.excluded_at,
         )
-        for one in study.exclusions
-        if one.rule_or_person in RULES and one.trial is None
+        for exclusion in study.exclusions
+        if exclusion.rule_or_person in RULES and exclusion.trial is None
     )
-    kept = {(*one.what[:2], one.rule_or_person): one for one in study.kept if one.trial is None}
+    kept = {
+        (*exclusion.what[:2], exclusion.rule_or_person): exclusion
+        for exclusion in study.kept
+        if exclusion.trial is None
+    }
     met = (
         Proposal(participant=str(who), session=int(session), rule=rule, why=why)
         for rule, rows in (
@@ -91,10 +95,10 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
         for (who, session), why in rows
     )
     decided = (
-        replace(one, decision="kept", by=f"{kept[key].excluded_at}: {kept[key].reason}")
-        if (key := (*one.what, one.rule)) in kept
-        else one
-        for one in met
+        replace(proposal, decision="kept", by=f"{kept[key].excluded_at}: {kept[key].reason}")
+        if (key := (*proposal.what, proposal.rule)) in kept
+        else proposal
+        for proposal in met
     )
     return tuple(sorted((*excluded, *decided), key=lambda one: (*one.what, one.rule)))
 
@@ -142,15 +146,15 @@ def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:
     """Return the exclusions that are proposed and wait for a person; they have no time yet."""
     return tuple(
         Exclusion(
-            participant=one.participant,
-            session=one.session,
+            participant=proposal.participant,
+            session=proposal.session,
             trial=None,
-            rule_or_person=one.rule,
-            reason=one.why,
+            rule_or_person=proposal.rule,
+            reason=proposal.why,
             excluded_at="",
         )
-        for one in proposals(study, results)
-        if one.decision == "undecided"
+        for proposal in proposals(study, results)
+        if proposal.decision == "undecided"
     )
 
 

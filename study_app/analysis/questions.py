@@ -134,7 +134,7 @@ def _texts(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
 _TEXTS: Final = Measure("texts", _texts, None)
 
 
-MEASURES: Final = {one.id: one for one in (_POINT_COUNTS, _OPTION_COUNTS, _DISTRIBUTION, _TEXTS)}
+MEASURES: Final = {measure.id: measure for measure in (_POINT_COUNTS, _OPTION_COUNTS, _DISTRIBUTION, _TEXTS)}
 """Every measure by the id that a kind of question names it by."""
 
 _ONE: Final = ["participant", "session", "trial"]
@@ -179,9 +179,9 @@ def _groups(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str |
 
 def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
     """Return a row for every time that a questionnaire was answered: ``participant``, ``code`` and ``score``."""
-    rows = pd.concat([study.answers_to(one) for one in asked.questions])
-    bounds = {one.id: one.bounds for one in asked.questions}
-    found: list[dict[str, Any]] = []
+    rows = pd.concat([study.answers_to(question) for question in asked.questions])
+    bounds = {question.id: question.bounds for question in asked.questions}
+    scores: list[dict[str, Any]] = []
     one = _ONE if not asked.where.is_form else [*_ONE, "code"]
     for (participant, *_), answers in rows.groupby(one, dropna=False, sort=True):
         answered = {
@@ -190,8 +190,8 @@ def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
             if not pd.isna(response)
         }
         code = str(answers["code"].iloc[0]) if asked.where.settings else None
-        found.append({"participant": participant, "code": code, "score": score(asked.score, answered, bounds)})
-    return pd.DataFrame(found, columns=["participant", "code", "score"])
+        scores.append({"participant": participant, "code": code, "score": score(asked.score, answered, bounds)})
+    return pd.DataFrame(scores, columns=["participant", "code", "score"])
 
 
 def _score(study: Study, asked: PlacedScore) -> ScoreResult:

@@ -107,8 +107,8 @@ class Failures:
 
     def value(self, what: str, compute: Callable[[], T], empty: U) -> T | U:
         """Return what ``compute`` returns, or ``empty`` where it fails."""
-        found = self.attempt(what, compute)
-        return empty if isinstance(found, Failure) else found
+        computed = self.attempt(what, compute)
+        return empty if isinstance(computed, Failure) else computed
 
 
 Verdict: TypeAlias = Literal["shown", "suggested", "not shown", "out of reach", "not tested"]
@@ -344,22 +344,22 @@ def settings_noun(found: BlockResult | Block) -> str:
     return found.kind.removesuffix("s") if found.revealed else "setting"
 
 
-def short(found: BlockResult, item: str) -> str:
+def short(result: BlockResult, item: str) -> str:
     """Return the few words for a statement."""
-    return next(one.short for one in found.items if one.id == item)
+    return next(one.short for one in result.items if one.id == item)
 
 
-def name(found: BlockResult, code: str) -> str:
+def name(result: BlockResult, code: str) -> str:
     """Return what a setting is called: a delay by its milliseconds alone, since its block has one liquid."""
-    for setting, text in zip(found.settings, found.names, strict=True):
+    for setting, text in zip(result.settings, result.names, strict=True):
         if setting.code == code:
-            return ms(setting.delay_ms or 0.0) if found.delays_ms else text
+            return ms(setting.delay_ms or 0.0) if result.delays_ms else text
     raise KeyError(code)
 
 
-def lead(found: BlockResult) -> str:
+def lead(result: BlockResult) -> str:
     """Return how sentences about a block begin."""
-    return f"{found.title} ({settings_noun(found)}s)" if found.revealed else found.title
+    return f"{result.title} ({settings_noun(result)}s)" if result.revealed else result.title
 
 
 def statistic(outcome: Outcome) -> str:
@@ -368,25 +368,25 @@ def statistic(outcome: Outcome) -> str:
     return f"{text} {number(outcome.statistic)}"
 
 
-def said_of_presentations(found: BlockResult) -> tuple[str, ...]:
+def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
     """Return how many presentations an answer stands for, and what became of sessions; empty for one of each."""
-    fewest, most = found.presentations
+    fewest, most = result.presentations
     lines = []
-    if found.replicated_ms:
-        delays = listed([ms(delay) for delay in found.replicated_ms])
+    if result.replicated_ms:
+        delays = listed([ms(delay) for delay in result.replicated_ms])
         lines.append(
             f"Several conditions have a delay of {delays}; they are treated as repeated presentations of one delay."
         )
     if most > 1:
         often = f"{most}" if fewest == most else f"{fewest} to {most}"
-        single = "; the detection threshold uses each single answer" if found.delays_ms else ""
+        single = "; the detection threshold uses each single answer" if result.delays_ms else ""
         lines.append(
-            f"Each participant rated each {settings_noun(found)} {often} times; the tests use the median of these "
+            f"Each participant rated each {settings_noun(result)} {often} times; the tests use the median of these "
             f"answers{single}."
         )
-    if len(found.sessions) > 1:
+    if len(result.sessions) > 1:
         lines.append(
-            f"The answers of sessions {listed(list(map(str, found.sessions)))} are compared with each other, and "
+            f"The answers of sessions {listed(list(map(str, result.sessions)))} are compared with each other, and "
             "pooled in all other tests."
         )
     return tuple(lines)
@@ -417,25 +417,25 @@ def test_name(outcome: Outcome) -> str:
     }.get(outcome.test, outcome.test)
 
 
-def incomplete_words(found: BlockResult) -> str:
+def incomplete_words(result: BlockResult) -> str:
     """Return which participants tests over all settings leave out, in a sentence."""
     statements: dict[str, list[str]] = {}
-    for item, people in found.incomplete.items():
+    for item, people in result.incomplete.items():
         for person in people:
-            statements.setdefault(person, []).append(f"“{short(found, item)}”")
-    every = len(found.items)
+            statements.setdefault(person, []).append(f"“{short(result, item)}”")
+    every = len(result.items)
     who = [
         f"{person} ({'all statements' if len(items) == every else listed(items)})"
         for person, items in sorted(statements.items())
     ]
-    return f"Excluded from tests over all {settings_noun(found)}s, because an answer is missing: {listed(who)}."
+    return f"Excluded from tests over all {settings_noun(result)}s, because an answer is missing: {listed(who)}."
 
 
-def missing(found: BlockResult) -> tuple[str, ...]:
+def missing(result: BlockResult) -> tuple[str, ...]:
     """Return what was not computed, and why, a sentence for each reason."""
     reasons: dict[str, list[str]] = {}
-    for one in found.absent:
-        reasons.setdefault(one.why, []).append(one.what)
+    for not_tested in result.absent:
+        reasons.setdefault(not_tested.why, []).append(not_tested.what)
     return tuple(
         f"{listed([f'the {one}' for one in what])} {'was' if len(what) == 1 else 'were'} not computed: {why}."
         if why != SEALED

@@ -156,7 +156,10 @@ def _study_found(study: Study) -> StudyFound:
 
     trials: dict[tuple[str, int], dict[int, str]] = {}
     main = study.trials[study.trials["phase"] == "main"]
-    titles = {block.id: (block.title, {one.code: block.name(one) for one in block.settings}) for block in study.blocks}
+    titles = {
+        block.id: (block.title, {setting.code: block.name(setting) for setting in block.settings})
+        for block in study.blocks
+    }
     for participant, session, trial, block, code in main[
         ["participant", "session", "trial", "block", "code"]
     ].itertuples(index=False):

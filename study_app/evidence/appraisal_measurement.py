@@ -37,19 +37,19 @@ FINE_M: Final = 10e-6
 
 def costs(scene: Scene, *, batches: int = _BATCHES) -> Costs:
     """Measure the computation time of a scene with one liquid."""
-    found = measure(scene, batches=batches)
+    cost = measure(scene, batches=batches)
     liquid = resolve(scene).liquids[0]
     asked = scene.liquids[0].effects != "auto"
     bounds_n = {verdict.effect: verdict.bound_n for verdict in effect_verdicts(scene)}
     rows = []
     for effect in NAMED:
-        ns = found.effects_ns.get((liquid.id, effect))
+        ns = cost.effects_ns.get((liquid.id, effect))
         if effect in liquid.effects and ns is not None:
             rows.append(EffectCost(effect, max(ns, 0.0)))
         else:
             out = f"out, {bounds_n[effect]:.2f} N" if effect in bounds_n else "not used"
             rows.append(EffectCost(effect, None, "not used" if asked else out))
-    return Costs(found.scene_ns, found.rest_ns, tuple(rows))
+    return Costs(cost.scene_ns, cost.rest_ns, tuple(rows))
 
 
 def errors(scene: Scene) -> Errors:
@@ -62,9 +62,11 @@ def errors(scene: Scene) -> Errors:
     wake: float | None = None
     force_n: float | None = None
     if kept:
-        found = [_difference(compared, programmed_motion(name, rate_hz=scene.rate_hz, **how)) for name, how in _MOTIONS]
-        force_n = max(newtons for _, newtons in found)
-        wake = max(share for share, _ in found) if "wake" in kept else None
+        differences = [
+            _difference(compared, programmed_motion(name, rate_hz=scene.rate_hz, **how)) for name, how in _MOTIONS
+        ]
+        force_n = max(newtons for _, newtons in differences)
+        wake = max(share for share, _ in differences) if "wake" in kept else None
     left_out = tuple(effect for effect in liquid.effects if effect not in kept)
     return Errors(wake=wake, force_n=force_n, lag_s=_lag_s(scene), left_out=left_out)
 

@@ -65,7 +65,7 @@ def busy_cores(count: int | None = None) -> Iterator[None]:
     try:
         yield
     finally:
-        for one in busy:
-            one.terminate()
+        for process in busy:
+            process.terminate()
         for one in busy:
             one.wait()

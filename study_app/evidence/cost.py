@@ -103,12 +103,12 @@ def _take(model: Any, safety: Record, sample: Record, positions_m: Any, start: i
 
 def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
     """Return for each effect a scene with and one without it."""
-    found: dict[tuple[str, Effect], tuple[Scene, Scene]] = {}
+    pairs: dict[tuple[str, Effect], tuple[Scene, Scene]] = {}
     for liquid in scene.liquids:
         for effect in bounds(scene, liquid):
             others: tuple[Effect, ...] = NAMED[effect].through[:1]
-            found[liquid.id, effect] = _with(scene, liquid, (*others, effect)), _with(scene, liquid, others)
-    return found
+            pairs[liquid.id, effect] = _with(scene, liquid, (*others, effect)), _with(scene, liquid, others)
+    return pairs
 
 
 def _with(scene: Scene, liquid: Liquid, effects: tuple[Effect, ...]) -> Scene:

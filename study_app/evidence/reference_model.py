@@ -339,7 +339,7 @@ def late_mps(
     w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats, diameter_m: float, nu_m2ps: float, of: Constants
 ) -> Floats:
     """Return y + h (n, d) [m/s]: the excess drag and the history over Stokes drag per speed, in d dimensions."""
-    found = np.empty_like(w_mps)
+    result = np.empty_like(w_mps)
     z, s = w_mps[0].copy(), w_mps[0].copy()
     y = (over_stokes(math.sqrt((z**2).sum()) * diameter_m / nu_m2ps) - 1) * z
     m = np.zeros((len(_RATES_PER_S), len(z)))
@@ -361,8 +361,8 @@ def late_mps(
             gained_s = -math.expm1(-decay_per_s * dt) / decay_per_s
             m[i] = math.exp(-decay_per_s * dt) * m[i] + gained_s * dw
             remembered = remembered + _WEIGHTS_RPS[i] * (m[i] - gained_s * dw)
-        found[k] = y + diameter_m / (2 * math.sqrt(math.pi * nu_m2ps)) * remembered
-    return found
+        result[k] = y + diameter_m / (2 * math.sqrt(math.pi * nu_m2ps)) * remembered
+    return result
 
 
 _STEPS: Final = 50

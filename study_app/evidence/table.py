@@ -105,11 +105,11 @@ def run(
 
     ``progress`` is called with the number of finished cases.
     """
-    found: list[Found] = []
-    for one in (map if executor is None else executor.map)(measure, *zip(*cases, strict=True)):
-        found.append(one)
-        progress(len(found))
-    return tuple(found)
+    rows: list[Found] = []
+    for row in (map if executor is None else executor.map)(measure, *zip(*cases, strict=True)):
+        rows.append(row)
+        progress(len(rows))
+    return tuple(rows)
 
 
 def check_seconds(seconds: float, what: str) -> None:
@@ -136,15 +136,15 @@ def take_turns(
 
     An arm is called with the number of the round; ``alternating``: every second round is in reverse order.
     """
-    found: dict[Arm, list[Found]] = {arm: [] for arm in arms}
+    rows: dict[Arm, list[Found]] = {arm: [] for arm in arms}
     for number in range(rounds):
         for arm in reversed(tuple(arms)) if alternating and number % 2 else arms:
             if ending.is_set():
                 raise KeyboardInterrupt
-            found[arm].append(arms[arm](number))
+            rows[arm].append(arms[arm](number))
         if number * 10 // rounds < (number + 1) * 10 // rounds:
             progress(f"{100 * (number + 1) // rounds:3} %")
-    return found
+    return rows
 
 
 def paced(

@@ -330,7 +330,7 @@ class Comparison:
             return sensed
         threshold = self.observer.delay_jnd_s if self.delays else self.observer.weber_fraction * abs(least)
         shares = [(one - least) / threshold for one in sensed]
-        return [least + threshold * math.copysign(person.sensed(abs(one), course.done), one) for one in shares]
+        return [least + threshold * math.copysign(person.sensed(abs(share), course.done), share) for share in shares]
 
     def _preferring(self, design: Design, taken: Sequence[float], course: Course) -> Sequence[float]:
         """Return what intervals are taken for by who prefers the first one, and the one of the last answer."""
@@ -449,7 +449,7 @@ def simulate_study(
             answered, before = heard.setdefault(block.id, []), sensed_in.setdefault(block.id, [])
             if (due := next_level(protocol, key, schedule, trial, answered)) is None:
                 continue
-            design, sensed = design_of(protocol, block), [sense(one) for one in due.intervals]
+            design, sensed = design_of(protocol, block), [sense(interval) for interval in due.intervals]
             draw = stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial.number}").random
             course = Course(courses[trial.number], said.get(block.id))
             given = Comparison.of(protocol, block, observer).answer(protocol, design, sensed, before, draw, course)

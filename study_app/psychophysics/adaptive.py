@@ -74,12 +74,12 @@ class Staircase:
 
     def reversals_at(self, answers: Sequence[_Answer]) -> list[int]:
         """Return the indices of the trials at which the direction changed."""
-        found, before = [], 0.0
+        places, before = [], 0.0
         for place, move in enumerate(self._moves(answers)):
             if move * before < 0.0:
-                found.append(place)
+                places.append(place)
             before = move or before
-        return found
+        return places
 
     def reversals(self, answers: Sequence[_Answer]) -> list[float]:
         """Return the levels of the trials at which the direction changed."""

@@ -109,10 +109,14 @@ def two_intervals(first_of_first: float, firsts: float, first_of_second: float, 
     first_of_second, seconds : float
         The same with the comparison second.
     """
-    found = yes_no(first_of_first, firsts, first_of_second, seconds)
-    if found is None or found.variance is None:
+    sensitivity = yes_no(first_of_first, firsts, first_of_second, seconds)
+    if sensitivity is None or sensitivity.variance is None:
         return None
-    return Sensitivity(d_prime=found.d_prime / math.sqrt(2.0), criterion=found.criterion, variance=found.variance / 2.0)
+    return Sensitivity(
+        d_prime=sensitivity.d_prime / math.sqrt(2.0),
+        criterion=sensitivity.criterion,
+        variance=sensitivity.variance / 2.0,
+    )
 
 
 def from_correct(task: str, correct: float, n: float) -> Sensitivity | None:
@@ -124,9 +128,9 @@ def abx(correct: float, n: float, model: Model) -> Sensitivity | None:
     """Return d′ of ABX from the number of correct answers; None without answers."""
     if not n:
         return None
-    found = {name: d_prime_at(f"abx {name}", rate(correct, n)) for name in ("differencing", "independent")}
-    other = found["independent" if model == "differencing" else "differencing"]
-    return Sensitivity(d_prime=found[model], model=model, other=other)
+    estimates = {name: d_prime_at(f"abx {name}", rate(correct, n)) for name in ("differencing", "independent")}
+    other = estimates["independent" if model == "differencing" else "differencing"]
+    return Sensitivity(d_prime=estimates[model], model=model, other=other)
 
 
 def same_different(hits: float, differents: float, false_alarms: float, sames: float, model: Model) -> (

@@ -210,8 +210,8 @@ def log_likelihood(
     successes: ArrayLike, failures: ArrayLike, log_success: NDArray[np.float64], log_failure: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return that of each cell from counts of answers, shape (k,), and log ψ and log(1 − ψ) in each cell, (k, …)."""
-    found = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
-    return np.asarray(found + np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure), float)
+    logarithms = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
+    return np.asarray(logarithms + np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure), float)
 
 
 def posterior(grid: Grid, log_likelihood: NDArray[np.float64]) -> Posterior:

@@ -78,7 +78,7 @@ KINDS: Final = {
     "fatigue": Person(change=1.5),
 }
 """People who differ in one respect each."""
-ALONE: Final = {name: one for name, one in KINDS.items() if not one.criterion and not one.repeats}
+ALONE: Final = {name: person for name, person in KINDS.items() if not person.criterion and not person.repeats}
 """Those without a preference: where there are not two intervals, one of them correct."""
 MIXED: Final = "all of these"
 """Of a group of people drawn at random."""
@@ -172,7 +172,7 @@ class Expected:
     @property
     def worst(self) -> tuple[str, float]:
         """The kind of people with the widest interval, and the median of half of it."""
-        return max(((kind, float(np.median(one))) for kind, one in self.halves.items()), key=lambda one: one[1])
+        return max(((kind, float(np.median(halve))) for kind, halve in self.halves.items()), key=lambda one: one[1])
 
     def of_group(self, participants: int, trials: float | None = None) -> float:
         """Return half the 95 % interval of a group's mean over all standards, as a share of the mean: median of kinds.

@@ -122,10 +122,10 @@ class PersonFit:
     named: bool
     flat: Posterior
 
-    def expected(self, found: Posterior) -> Floats:
+    def expected(self, fitted: Posterior) -> Floats:
         """Return the share of successes that the function through all medians expects in each trial, (n,)."""
-        psi = found.success(self.given.levels)
-        return preferred(psi[self.given.places], found.others.lapse, self.shifts)
+        psi = fitted.success(self.given.levels)
+        return preferred(psi[self.given.places], fitted.others.lapse, self.shifts)
 
     def after(self, n: int) -> Posterior:
         """Return what the first n answers say, where preferences and change are those of all, as ``flat``."""
@@ -172,15 +172,15 @@ def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
     return np.asarray(values[low] * (1.0 - share) + values[low + 1] * share, float)
 
 
-def _time_score(given: Given, found: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
+def _time_score(given: Given, fitted: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
     """Return score and information, at none, of a threshold that changes as ``course`` (n,) does [1/u, 1/u²].
 
     ``found`` is of these answers, as if the threshold were constant, ``shifts`` (n,) are of the decisions [SD].
     """
-    y, u, others = given.successes.astype(float), given.levels, found.others
+    y, u, others = given.successes.astype(float), given.levels, fitted.others
     below, above, psi = (
-        preferred(success(found.grid.family, u, at, **others._asdict())[given.places], others.lapse, shifts)
-        for at in (found.threshold - _STEP * others.width, found.threshold + _STEP * others.width, found.threshold)
+        preferred(success(fitted.grid.family, u, at, **others._asdict())[given.places], others.lapse, shifts)
+        for at in (fitted.threshold - _STEP * others.width, fitted.threshold + _STEP * others.width, fitted.threshold)
     )
     psi, slope = np.clip(psi, CLIP, 1.0 - CLIP), (above - below) / (2 * _STEP * others.width)
     information = slope**2 / (psi * (1.0 - psi))
@@ -218,15 +218,15 @@ def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
     return np.asarray(np.interp(deviates + np.asarray(shift, float), z, of_z), float)
 
 
-def preferences(given: Given, found: Posterior) -> Floats:
+def preferences(given: Given, fitted: Posterior) -> Floats:
     """Return how far preferences move each decision between two intervals towards the correct one (n,) [SD].
 
     A probit regression of the answers, with what the levels contribute fixed, has the preference for the first interval
     and that for the answer before as coefficients, with a normal prior: removing preferences that are chance would make
     thresholds too low. ``found`` is the posterior of these answers.
     """
-    (z, of_z), first, lapse = _normal_table(), given.towards, found.others.lapse
-    unbiased = ((found.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
+    (z, of_z), first, lapse = _normal_table(), given.towards, fitted.others.lapse
+    unbiased = ((fitted.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
     sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(given.successes, first, -first)
     both = np.abs(first) if np.ptp(first) else np.zeros(len(first))  # one order alone does not show which is preferred
     causes, weights = np.column_stack([both, given.before]), np.zeros(2)

@@ -226,20 +226,22 @@ def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tu
         return tuple(sorted(settings, key=lambda setting: setting.delay_ms or 0.0)), "delays"
     order = list(key.tables["conditions"])
     if any(setting.condition not in order for setting in settings):  # tracks, by their standards
-        return tuple(sorted(settings, key=lambda one: float((one.condition or "").partition("/")[0] or 0))), "liquids"
+        return tuple(
+            sorted(settings, key=lambda setting: float((setting.condition or "").partition("/")[0] or 0))
+        ), "liquids"
     return tuple(sorted(settings, key=lambda setting: order.index(setting.condition))), kind
 
 
-def published_words(one: Published) -> str:
+def published_words(published: Published) -> str:
     """Return a published value with what is known of it."""
     known = [
-        *([] if one.standard is None else [f"standard {one.standard:g}"]),
-        *([] if one.low is None or one.high is None else [f"{one.low:g} to {one.high:g}"]),
-        *([] if one.percent is None else [f"at {one.percent:g} % correct"]),
-        *([] if one.n is None else [f"n = {one.n}"]),
+        *([] if published.standard is None else [f"standard {published.standard:g}"]),
+        *([] if published.low is None or published.high is None else [f"{published.low:g} to {published.high:g}"]),
+        *([] if published.percent is None else [f"at {published.percent:g} % correct"]),
+        *([] if published.n is None else [f"n = {published.n}"]),
     ]
-    source = f"{one.source}: " if one.source else ""
-    return f"{source}{one.measure} {one.value:g}" + (f" ({', '.join(known)})" if known else "")
+    source = f"{published.source}: " if published.source else ""
+    return f"{source}{published.measure} {published.value:g}" + (f" ({', '.join(known)})" if known else "")
 
 
 def compared_percent(published: Iterable[Published]) -> float | None:
@@ -294,7 +296,7 @@ class LevelBlock:
     @property
     def standards_rove(self) -> bool:
         """Whether trials of several standards alternate."""
-        standards = {one.standard for one in self.settings}
+        standards = {setting.standard for setting in self.settings}
         return len(standards) > 1 and self.method is not None and self.method.order == "interleaved"
 
     @property
@@ -330,7 +332,7 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
         if block.stimulus is not None:
             stimulus, method = stimulus_of(whole, block), method_of(whole, block)
         if whole.analysis is not None:
-            published = tuple(one for one in whole.analysis.published if one.block == step)
+            published = tuple(published for published in whole.analysis.published if published.block == step)
     elif (written := protocol.get("designs", {}).get(table["design"])) is not None:
         design = DESIGN_KINDS[written["kind"]].model_validate(written)
     else:
@@ -576,10 +578,10 @@ def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuesti
     scales = {name: Scale.model_validate(table) for name, table in protocol["scales"].items()}
     for where, table in _questionnaires(protocol, key):
         context = Context(scales, table.get("scale"), spoken(protocol))
-        found = tuple(PlacedQuestion(where, _question(item, where), context) for item in table["items"])
-        questions += [one for one in found if where.is_form or not isinstance(one.question, Statement)]
+        placed = tuple(PlacedQuestion(where, _question(item, where), context) for item in table["items"])
+        questions += [question for question in placed if where.is_form or not isinstance(question.question, Statement)]
         scores += [
-            PlacedScore(where, name, table.get("instrument"), Score.model_validate(score), found)
+            PlacedScore(where, name, table.get("instrument"), Score.model_validate(score), placed)
             for name, score in table.get("scores", {}).items()
         ]
     return OtherQuestions(tuple(questions), tuple(scores))

@@ -134,10 +134,10 @@ def medians(values: Array) -> Array:
     if values.shape[2] == 1:
         return values[..., 0]
     there = ~np.isnan(values)
-    found = np.full(values.shape[:2], np.nan)
+    result = np.full(values.shape[:2], np.nan)
     some = there.any(axis=2)
-    found[some] = np.nanmedian(values[some], axis=1)
-    return found
+    result[some] = np.nanmedian(values[some], axis=1)
+    return result
 
 
 def by_participant(answers: pd.DataFrame, participants: Sequence[str], columns: Mapping[str, int], item: str) -> Array:

@@ -68,12 +68,12 @@ class Reach:
 def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> tuple[Reach, ...]:
     """Return the completed reaches of a trial from times (n,) and places of the hand (n, 3), first sample to last."""
     seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
-    found = []
+    movements = []
     for number, held in enumerate(_held(times_ns, positions_m, targets)):
         lit, entered, reached = held.lit, held.entered, held.reached
         target = number % len(targets.centres_m)
         way = positions_m[lit : entered + 1]
-        found.append(
+        movements.append(
             Reach(
                 target=target,
                 lit_s=round(float(seconds[lit]), 9),
@@ -84,7 +84,7 @@ def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -
                 submovements=submovements(seconds[lit : reached + 1], positions_m[lit : reached + 1]),
             )
         )
-    return tuple(found)
+    return tuple(movements)
 
 
 class _Held(NamedTuple):
@@ -219,23 +219,26 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
     for number, row in enumerate(reaching.to_dict("records")):
         each(number, len(reaching))
         targets = tasks[str(row["block"])]
-        one = _why_not(study.folder, row) if targets is None else _reached(study.folder, row, targets)
-        if isinstance(one, str):
-            unread[one] = unread.get(one, 0) + 1
+        reached = _why_not(study.folder, row) if targets is None else _reached(study.folder, row, targets)
+        if isinstance(reached, str):
+            unread[reached] = unread.get(reached, 0) + 1
         else:
-            found.append(one)
+            found.append(reached)
     of_trials = rows.assign(
         path_m=rows["path_length_m"],
         at_limit_percent=100 * rows["limiter_norm"].astype("Float64") / rows["ticks"].replace(0, pd.NA),
     )
-    moved = [one for block in study.blocks for one in _quartiles(block, of_trials, OF_TRIALS)]
+    moved = [quartile for block in study.blocks for quartile in _quartiles(block, of_trials, OF_TRIALS)]
     if found:
         of_reaches = pd.DataFrame(
             [{**asdict(trial), **asdict(reach)} for trial in found for reach in trial.found],
             columns=["participant", "block", "code", *OF_REACHES],
         )
         moved += [
-            one for block in study.blocks if block.id in where for one in _quartiles(block, of_reaches, OF_REACHES)
+            quartile
+            for block in study.blocks
+            if block.id in where
+            for quartile in _quartiles(block, of_reaches, OF_REACHES)
         ]
     return Performance(
         moved=tuple(moved),

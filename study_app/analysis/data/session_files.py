@@ -99,14 +99,14 @@ def _again(path: Path) -> str:
 def document(path: Path) -> dict[str, Any]:
     """Read a JSON object."""
     try:
-        found = parse_json(read_regular(path))
+        parsed = parse_json(read_regular(path))
     except OSError as error:
         raise unreadable(path, error) from error
     except ValueError as error:
         raise AnalysisError(f"{path} is damaged ({error}): restore it from a copy") from error
-    if not isinstance(found, dict):
+    if not isinstance(parsed, dict):
         raise AnalysisError(f"{path} is damaged (it does not contain a JSON object): restore it from a copy")
-    return found
+    return parsed
 
 
 def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy") -> AnalysisError:
@@ -148,7 +148,9 @@ class Session:
     def questionnaire(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
         """Block, codes and items, and forms with their items: what must be alike in sessions that are pooled."""
         blocks = ((block.id, block.codes_as_dealt, tuple(item.id for item in block.items)) for block in self.blocks)
-        others = ((one.where.id, (one.id,), (one.question.kind_id,)) for one in self.others.questions)
+        others = (
+            (question.where.id, (question.id,), (question.question.kind_id,)) for question in self.others.questions
+        )
         return (*blocks, *others)
 
     @property
@@ -229,14 +231,14 @@ def _own_dynamics(bench: Mapping[str, Any] | None) -> Bench | None:
 def estimators_of(records: Sequence[Session]) -> str | None:
     """Return the names of the velocity estimators of all sessions: "kalman", "device" or "kalman or device"."""
     own = records[0].protocol.get("scene", {}).get("velocity", {}).get("kind")
-    measured = [one.device_velocity for one in records]
+    measured = [record.device_velocity for record in records]
     names = [*([] if all(measured) or own is None else [str(own)]), *(["device"] if any(measured) else [])]
     return " or ".join(names) or None
 
 
 def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
     """Return the mean of what sessions know of the device's own dynamics; None where none knows them."""
-    known = [one.own_dynamics for one in records if one.own_dynamics is not None]
+    known = [record.own_dynamics for record in records if record.own_dynamics is not None]
     if not known:
         return None
     means = Bench._make(np.mean(known, axis=0).tolist())
@@ -293,7 +295,9 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
     blocks = sessions[0].blocks
     asked = {(block.id, code, item.id) for block in blocks for code in block.codes for item in block.items}
     asked |= {
-        (one.where.id, setting.code, one.id) for one in sessions[0].others.questions for setting in one.where.settings
+        (question.where.id, setting.code, question.id)
+        for question in sessions[0].others.questions
+        for setting in question.where.settings
     }
     main = np.flatnonzero(table["phase"].eq("main").fillna(False).to_numpy(dtype=bool))
     answered = zip(*(table[name].to_numpy()[main] for name in ("block", "code", "item")), strict=True)
@@ -334,20 +338,20 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
     if not listed:
         return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))
     by_what: dict[tuple[str, int, int | None], list[Exclusion]] = {}
-    for one in listed:
-        by_what.setdefault(one.what, []).append(one)
+    for exclusion in listed:
+        by_what.setdefault(exclusion.what, []).append(exclusion)
     trials = table["trial"] if "trial" in table.columns else [None] * len(table)
-    found = [
+    matching = [
         [
-            one
+            exclusion
             for which in dict.fromkeys((None, None if pd.isna(trial) else trial))  # the session's before the trial's
-            for one in by_what.get((participant, session, which), ())
+            for exclusion in by_what.get((participant, session, which), ())
         ]
         for participant, session, trial in zip(table["participant"], table["session"], trials, strict=True)
     ]
-    reasons = ["; ".join(one.reason for one in of_row if one.reason) or None for of_row in found]
+    reasons = ["; ".join(exclusion.reason for exclusion in of_row if exclusion.reason) or None for of_row in matching]
     return table.assign(
-        excluded=pd.Series([bool(of_row) for of_row in found], index=table.index, dtype=bool),
+        excluded=pd.Series([bool(of_row) for of_row in matching], index=table.index, dtype=bool),
         exclusion_reason=pd.Series(reasons, index=table.index, dtype="string"),
     )
 
@@ -356,9 +360,11 @@ def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclu
     """Refuse a list that leaves out what is not there, such as a mistyped id: what was meant would count."""
     sessions = {(session.participant, session.number) for session in study.sessions()}
     presented = set(zip(trials["participant"], trials["session"], trials["trial"], strict=True))
-    for one in listed:
-        if (one.participant, one.session) not in sessions or (one.trial is not None and one.what not in presented):
+    for exclusion in listed:
+        if (exclusion.participant, exclusion.session) not in sessions or (
+            exclusion.trial is not None and exclusion.what not in presented
+        ):
             raise AnalysisError(
-                f"{study.exclusions} excludes {describe_exclusion(one)}, which does not exist: correct or remove the "
-                "row, so that the intended data are excluded"
+                f"{study.exclusions} excludes {describe_exclusion(exclusion)}, which does not exist: correct or remove "
+                "the row, so that the intended data are excluded"
             )

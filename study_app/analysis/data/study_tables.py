@@ -81,7 +81,7 @@ def renamed(site: str, setting: Setting) -> Setting:
 
 def _all(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
     """Return the settings of all sites, each once, in the order of the first site that has it."""
-    return tuple(dict.fromkeys(renamed(site, one) for site, settings in each.items() for one in settings))
+    return tuple(dict.fromkeys(renamed(site, setting) for site, settings in each.items() for setting in settings))
 
 
 def _pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
@@ -97,13 +97,13 @@ def _pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
     """Return the other questions, which all sites were asked, with the settings of all sites."""
 
     def where(wheres: Mapping[str, QuestionPlace]) -> QuestionPlace:
-        settings = _all({site: one.settings for site, one in wheres.items()})
+        settings = _all({site: where.settings for site, where in wheres.items()})
         return replace(next(iter(wheres.values())), settings=settings)
 
     def questions(asked: Mapping[str, Sequence[PlacedQuestion]]) -> tuple[PlacedQuestion, ...]:
         return tuple(
-            replace(one, where=where({site: those[place].where for site, those in asked.items()}))
-            for place, one in enumerate(next(iter(asked.values())))
+            replace(question, where=where({site: those[place].where for site, those in asked.items()}))
+            for place, question in enumerate(next(iter(asked.values())))
         )
 
     scores: tuple[PlacedScore, ...] = tuple(
@@ -133,12 +133,12 @@ def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame
 
 def _pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDynamics | None:
     """Return the mean of what the sessions of all sites know of their devices' own dynamics; None of nothing."""
-    known = [one for one in sites if one is not None]
+    known = [site for site in sites if site is not None]
     if not known:
         return None
-    weights = [one.sessions for one in known]
+    weights = [dynamics.sessions for dynamics in known]
     damping_nspm, friction_n, mass_kg = (
-        float(np.average([getattr(one, name) for one in known], weights=weights))
+        float(np.average([getattr(dynamics, name) for dynamics in known], weights=weights))
         for name in ("damping_nspm", "friction_n", "mass_kg")
     )
     return OwnDynamics(
@@ -337,8 +337,8 @@ def load_study(folder: Path, *, planned: bool = True) -> Study:
     1        P001   L2     immersive         5
     """
     merged = read_merged(Path(folder))
-    found = _load(Path(folder), planned=planned) if merged is None else _load_sites(merged, planned=planned)
-    return replace(found, decided=found.decided.at(found.n))
+    study = _load(Path(folder), planned=planned) if merged is None else _load_sites(merged, planned=planned)
+    return replace(study, decided=study.decided.at(study.n))
 
 
 def _load_sites(merged: Merged, *, planned: bool) -> Study:
@@ -357,27 +357,27 @@ def _load_sites(merged: Merged, *, planned: bool) -> Study:
 def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
     """Return a merged study from those of its sites, by their names; all of them are revealed, or none."""
     studies = list(sites.values())
-    estimators = [one.estimator.split(" or ") for one in studies if one.estimator is not None]
+    estimators = [study.estimator.split(" or ") for study in studies if study.estimator is not None]
 
     def table(name: str) -> pd.DataFrame:
-        tables = [_of_site(site, one.settings, getattr(one, name)) for site, one in sites.items()]
+        tables = [_of_site(site, study.settings, getattr(study, name)) for site, study in sites.items()]
         return pd.concat(tables, ignore_index=True)
 
     def rows(name: str) -> tuple[Exclusion, ...]:
-        named = ((f"{site}{DASH}", row) for site, one in sites.items() for row in getattr(one, name))
+        named = ((f"{site}{DASH}", row) for site, study in sites.items() for row in getattr(study, name))
         return tuple(replace(row, participant=f"{prefix}{row.participant}") for prefix, row in named)
 
     return replace(
         studies[0],
         folder=folder,
         sites=tuple(sites),
-        blocks=_pooled_blocks({site: one.blocks for site, one in sites.items()}),
-        levels=_pooled_blocks({site: one.levels for site, one in sites.items()}),
-        others=_pooled_questions({site: one.others for site, one in sites.items()}),
+        blocks=_pooled_blocks({site: study.blocks for site, study in sites.items()}),
+        levels=_pooled_blocks({site: study.levels for site, study in sites.items()}),
+        others=_pooled_questions({site: study.others for site, study in sites.items()}),
         settings={
             (block, own.code): own
-            for site, one in sites.items()
-            for (block, _), setting in one.settings.items()
+            for site, study in sites.items()
+            for (block, _), setting in study.settings.items()
             for own in [renamed(site, setting)]
         },
         responses=table("responses"),
@@ -388,10 +388,10 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
         exclusions=rows("exclusions"),
         late=rows("late"),
         kept=rows("kept"),
-        doubts=tuple(doubt for one in studies for doubt in one.doubts),
-        decided=replace(studies[0].decided, changed=any(one.decided.changed for one in studies)),
+        doubts=tuple(doubt for study in studies for doubt in study.doubts),
+        decided=replace(studies[0].decided, changed=any(study.decided.changed for study in studies)),
         own_dynamics=_pooled_dynamics(
-            (one.own_dynamics for one in studies), sum(len(one.participants) for one in studies)
+            (study.own_dynamics for study in studies), sum(len(study.participants) for study in studies)
         ),
         estimator=" or ".join(dict.fromkeys(part for parts in estimators for part in parts)) or None,
         withdrawn=withdrawn,
@@ -440,7 +440,9 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
         exclusions=listed,
         late=late_exclusions(place.path, listed),
         kept=reversals(place.path),
-        doubts=tuple(doubt for one in records for doubt in session_discrepancies(Place(place, one.folder, one.study))),
+        doubts=tuple(
+            doubt for record in records for doubt in session_discrepancies(Place(place, record.folder, record.study))
+        ),
         others=records[0].others,
         decided=read_decided([session.protocol.get("analysis") for session in records]),
         contrasts=() if key is None else contrasts_of(key),
@@ -454,17 +456,17 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
 
 def _undecided(place: StudyFolder, records: Sequence[Session], listed: Sequence[Exclusion]) -> Iterator[Exclusion]:
     """Yield the exclusion of each incomplete session that the list lacks: the program ended before it wrote it."""
-    decided = {one.what for one in (*listed, *reversals(place.path))}
-    for one in records:
-        what = (one.folder.participant, one.folder.number, None)
-        if one.visit["status"] == INCOMPLETE and what not in decided:
+    decided = {exclusion.what for exclusion in (*listed, *reversals(place.path))}
+    for record in records:
+        what = (record.folder.participant, record.folder.number, None)
+        if record.visit["status"] == INCOMPLETE and what not in decided:
             yield Exclusion(
-                participant=one.folder.participant,
-                session=one.folder.number,
+                participant=record.folder.participant,
+                session=record.folder.number,
                 trial=None,
                 rule_or_person=MISSING_RULE,
-                reason=str(one.visit["missing"]),
-                excluded_at=str(one.visit["ended_at"]),
+                reason=str(record.visit["missing"]),
+                excluded_at=str(record.visit["ended_at"]),
             )
 
 
@@ -597,18 +599,20 @@ def group_means(study: Study, by: By = "group") -> list[Any]:
     rows = rows.assign(response=rows["response"].astype(float))
     of = ["block", "item", "code", by]
     each = rows.groupby([*of, "participant"])["response"].mean().groupby(of).agg(["size", "mean", "std"])
-    found = each.reset_index().set_axis(["block", "item", "code", "group", "n", "mean", "sd"], axis="columns")
+    frame = each.reset_index().set_axis(["block", "item", "code", "group", "n", "mean", "sd"], axis="columns")
     order = [(block.id, item.id, code) for block in study.blocks for item in block.items for code in block.codes]
-    places = [order.index(which) for which in zip(found["block"], found["item"], found["code"], strict=True)]
-    found = found.assign(place=places).sort_values(["place", "group"])
-    return list(found.itertuples(index=False))
+    places = [order.index(which) for which in zip(frame["block"], frame["item"], frame["code"], strict=True)]
+    frame = frame.assign(place=places).sort_values(["place", "group"])
+    return list(frame.itertuples(index=False))
 
 
 def _members(study: Study, by: By) -> pd.DataFrame:
     """Return participant and group, or site, of everybody who counts."""
     if by == "site":
         people = study.people if study.sites and study.revealed else ()
-        return pd.DataFrame({"participant": people, "site": [study.site_of(one) for one in people]}, dtype="string")
+        return pd.DataFrame(
+            {"participant": people, "site": [study.site_of(person) for person in people]}, dtype="string"
+        )
     rows = study.participants[study.participants["counted"] & study.participants["group"].notna()]
     if len(rows):  # pre-existing groups, from the receipts
         return rows[["participant", "group"]].drop_duplicates()

@@ -66,7 +66,13 @@ def _footage(study: Study) -> dict[str, str]:
     merged = read_merged(study.folder)
     key = revealed_key(study.folder if merged is None else merged.folder(merged.names[0]))
     conditions = () if key is None else key.tables["conditions"].values()
-    return dict(sorted((one["view"], one["footage_sha256"]) for one in conditions if one.get("footage_sha256")))
+    return dict(
+        sorted(
+            (condition["view"], condition["footage_sha256"])
+            for condition in conditions
+            if condition.get("footage_sha256")
+        )
+    )
 
 
 def _study_file(study: str, hashes: set[str], footage: dict[str, str]) -> tuple[Path, bytes, dict[str, str]] | None:
@@ -181,7 +187,7 @@ def _in_all(described: Mapping[str, dict[str, Any]]) -> dict[str, Any]:
     tables: dict[str, list[str]] = {}
     for table, one in described.items():
         tables.setdefault(one["description"], []).append(table)
-    same = {name: value for name, value in first.items() if all(one.get(name) == value for one in others)}
+    same = {name: value for name, value in first.items() if all(other.get(name) == value for other in others)}
     if len(tables) > 1:
         same["description"] = " ".join(f"In {', '.join(named)}: {words}" for words, named in tables.items())
     for name, widest in (("minValue", min), ("maxValue", max)):

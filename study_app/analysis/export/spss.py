@@ -54,16 +54,16 @@ def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | Questio
     by_cell = dict(iter(answers.groupby(["block", "code", "item"])))
     frame = table.frame.copy()
     coded = {}
-    for name, one in cells.items():
-        if isinstance(one, QuestionCells):
-            frame[name], coded[name] = _question(study, one, frame[name], frame["participant"])
+    for name, cell in cells.items():
+        if isinstance(cell, QuestionCells):
+            frame[name], coded[name] = _question(study, cell, frame[name], frame["participant"])
             continue
-        rows = by_cell.get((one.block.id, one.setting.code, one.item.id), answers.head(0))
+        rows = by_cell.get((cell.block.id, cell.setting.code, cell.item.id), answers.head(0))
         frame[name] = _with_codes(frame[name], frame["participant"], rows)
-        coded[name] = _levels(dict(zip(LEVELS, one.block.labels, strict=True)), one.block.cannot_judge or "")
+        coded[name] = _levels(dict(zip(LEVELS, cell.block.labels, strict=True)), cell.block.cannot_judge or "")
     numbered = {name for name, found in coded.items() if found}
-    columns = tuple(replace(one, kind="number") if one.name in numbered else one for one in table.columns)
-    options = {name for name, one in cells.items() if isinstance(one, QuestionCells) and _names_options(one.asked)}
+    columns = tuple(replace(column, kind="number") if column.name in numbered else column for column in table.columns)
+    options = {name for name, cell in cells.items() if isinstance(cell, QuestionCells) and _names_options(cell.asked)}
     return sav(study, Delivered(table.name, columns, frame), {name: coded[name] for name in numbered}, options)
 
 
@@ -131,7 +131,7 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], opt
                 name: {value: _cut(label, _LABEL_BYTES // 2) for value, label in found.items()}
                 for name, found in (levels | flags).items()
             },
-            missing_ranges={name: [*sorted(_CODES & found.keys())] for name, found in levels.items()},
+            missing_ranges={name: [*sorted(_CODES & level.keys())] for name, level in levels.items()},
             variable_measure={
                 name: "ordinal" if name in ordered else "nominal" if name in levels else _measure(column)
                 for name, column in columns.items()

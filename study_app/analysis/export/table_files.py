@@ -42,10 +42,12 @@ def table_files(
     if "parquet" in extras:
         files |= {file_name(study, table, "parquet"): _parquet_bytes(table) for table in written}
     if "sav" in extras:
-        opened = {"tracks", *(one.table for one in statistics())}
+        opened = {"tracks", *(statistic.table for statistic in statistics())}
         files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
         files[file_name(study, tables[-1], "sav")] = spss.wide_sav(study, tables[-1], cells)
-        files |= {file_name(study, one, "sav"): spss.sav(study, one, {}) for one in tables if one.name in opened}
+        files |= {
+            file_name(study, table, "sav"): spss.sav(study, table, {}) for table in tables if table.name in opened
+        }
     return files
 
 
@@ -69,7 +71,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         "doubts": [
             {"file": doubt.path.relative_to(study.folder).as_posix(), "what": doubt.what} for doubt in study.doubts
         ],
-        "exclusions": [asdict(one) for one in study.exclusions],
+        "exclusions": [asdict(exclusion) for exclusion in study.exclusions],
         "blocks": [
             {
                 "id": block.id,
@@ -150,29 +152,29 @@ def _questions(study: Study) -> list[dict[str, Any]]:
     """Return the questions that no block of statements holds."""
     return [
         {
-            "form" if one.where.is_form else "block": one.where.id,
-            "id": one.id,
-            "kind": one.question.kind_id,
-            "text": one.text,
-            "short": one.short,
-            **({"levels": one.levels} if one.levels else {}),
-            **({"cannot_judge": one.cannot_judge} if one.cannot_judge else {}),
-            **({"range": list(one.bounds)} if one.bounds else {}),
-            **({"show_if": one.question.show_if.model_dump(mode="json")} if one.question.show_if else {}),
+            "form" if question.where.is_form else "block": question.where.id,
+            "id": question.id,
+            "kind": question.question.kind_id,
+            "text": question.text,
+            "short": question.short,
+            **({"levels": question.levels} if question.levels else {}),
+            **({"cannot_judge": question.cannot_judge} if question.cannot_judge else {}),
+            **({"range": list(question.bounds)} if question.bounds else {}),
+            **({"show_if": question.question.show_if.model_dump(mode="json")} if question.question.show_if else {}),
         }
-        for one in study.others.questions
+        for question in study.others.questions
     ]
 
 
 def _scores(study: Study) -> list[dict[str, Any]]:
     return [
         {
-            "form" if one.where.is_form else "block": one.where.id,
-            "name": one.name,
-            "instrument": one.instrument,
-            **one.score.model_dump(mode="json", exclude_defaults=True),
+            "form" if score.where.is_form else "block": score.where.id,
+            "name": score.name,
+            "instrument": score.instrument,
+            **score.score.model_dump(mode="json", exclude_defaults=True),
         }
-        for one in study.others.scores
+        for score in study.others.scores
     ]
 
 
@@ -228,11 +230,13 @@ def _parquet_bytes(table: Delivered) -> bytes:
     types = {"integer": pa.int64(), "number": pa.float64(), "flag": pa.bool_()}
     fields = [
         pa.field(
-            one.name,
-            pa.int8() if one.kind == "integer" and (one.maximum or 128) < 128 else types.get(one.kind, pa.string()),
-            metadata={name: text for name in ("description", "unit") if (text := getattr(one, name))},
+            column.name,
+            pa.int8()
+            if column.kind == "integer" and (column.maximum or 128) < 128
+            else types.get(column.kind, pa.string()),
+            metadata={name: text for name in ("description", "unit") if (text := getattr(column, name))},
         )
-        for one in table.columns
+        for column in table.columns
     ]
     target = io.BytesIO()
     frame = pa.Table.from_pandas(table.frame, schema=pa.schema(fields), preserve_index=False, safe=True)

@@ -74,15 +74,21 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
     # of an interval that no trial reached, the frame has no column
     of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
     yield delivered("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
-    found = level_results(study, frame.rename(columns={"level_asked": "level"}))
+    results = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     groups = dict(zip(frame["participant"], frame["group"], strict=True))
-    for one in statistics():
-        if one.exported_in(study):
-            columns = (*_OF_PERSON, *RESULTS[one.table].columns)
-            rows = [{**row, **about, "group": groups[row["participant"]]} for of in found for row in one(of).exported()]
+    for statistic in statistics():
+        if statistic.exported_in(study):
+            columns = (*_OF_PERSON, *RESULTS[statistic.table].columns)
+            rows = [
+                {**row, **about, "group": groups[row["participant"]]}
+                for of in results
+                for row in statistic(of).exported()
+            ]
             table = pd.DataFrame(rows, columns=list(header(columns)))
-            yield delivered(one.table, columns, table.astype({column.name: _TYPES[column.kind] for column in columns}))
+            yield delivered(
+                statistic.table, columns, table.astype({column.name: _TYPES[column.kind] for column in columns})
+            )
 
 
 def _of_intervals(study: Study) -> tuple[Column, ...]:
@@ -166,11 +172,11 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
 def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
     """Add what each code stood for: nothing of an answer in a form, and while the key is sealed."""
     pairs = zip(table["block"], table["code"], strict=True)
-    settings = [one.of or one for one in (study.settings.get(pair, _OF_A_FORM) for pair in pairs)]
-    delay_ms = np.array([np.nan if one.delay_ms is None else one.delay_ms for one in settings], np.float64)
+    settings = [setting.of or setting for setting in (study.settings.get(pair, _OF_A_FORM) for pair in pairs)]
+    delay_ms = np.array([np.nan if setting.delay_ms is None else setting.delay_ms for setting in settings], np.float64)
     named = table.assign(
-        condition=pd.array([one.condition for one in settings], dtype="string"),
-        liquid=pd.array([one.liquid for one in settings], dtype="string"),
+        condition=pd.array([setting.condition for setting in settings], dtype="string"),
+        liquid=pd.array([setting.liquid for setting in settings], dtype="string"),
         delay_ms=delay_ms,
     )
     if "delay_error_mean_ms" in table:
@@ -193,14 +199,14 @@ def _aggregate_head() -> tuple[Column, ...]:
 def _aggregate(study: Study) -> pd.DataFrame:
     frames = []
     for block in study.blocks:
-        found = study.aggregate(block)
-        shorts = found["item"].map({item.id: item.short for item in block.items})
-        frames.append(found.assign(block=block.id, short=shorts))
+        frame = study.aggregate(block)
+        shorts = frame["item"].map({item.id: item.short for item in block.items})
+        frames.append(frame.assign(block=block.id, short=shorts))
     if not frames:
         names = [*header(_aggregate_head()), *header(OPENED), *header(_MEASURED)]
         return pd.DataFrame({name: pd.Series(dtype=object) for name in names})
-    found = pd.concat(frames, ignore_index=True)
-    return _named(study, found.assign(study=study.name, simulated=study.simulated, pilot=study.pilot))
+    frame = pd.concat(frames, ignore_index=True)
+    return _named(study, frame.assign(study=study.name, simulated=study.simulated, pilot=study.pilot))
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,8 +241,8 @@ def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
         "simulated": pd.array([bool(simulated[person]) for person in people], dtype="boolean"),
     }
     columns = [_BY_NAME["participant"], _BY_NAME["simulated"]]
-    for name, one in cells.items():
-        found = _statement(study, one, people) if isinstance(one, Cells) else _question(study, one, people)
+    for name, cell in cells.items():
+        found = _statement(study, cell, people) if isinstance(cell, Cells) else _question(study, cell, people)
         held[name], description, (least, most) = found
         kind = next(kind for kind, dtype in _TYPES.items() if dtype == held[name].dtype.name)
         columns.append(optional(name, kind, description, minimum=least, maximum=most))
@@ -260,7 +266,7 @@ def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
             ending = "" if about is None else f"__{about.condition or about.code}"
             found[f"{other.where.id}__{called}{ending}"] = QuestionCells(other, about)
     often = Counter((*found, *(name for name, _ in statements)))
-    return {name if often[name] == 1 else f"{one.block.id}__{name}": one for name, one in statements} | found
+    return {name if often[name] == 1 else f"{cells.block.id}__{name}": cells for name, cells in statements} | found
 
 
 Answers: TypeAlias = tuple[pd.api.extensions.ExtensionArray, str, tuple[float | None, float | None]]

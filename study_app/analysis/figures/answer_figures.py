@@ -188,7 +188,7 @@ _RIGHT_PT: Final = 26.0
 
 @style.own_settings()
 def draw_threshold(
-    found: Threshold, shares_of: Mapping[str, Mapping[float, float]], lowest_ms: float | None, look: Look
+    threshold: Threshold, shares_of: Mapping[str, Mapping[float, float]], lowest_ms: float | None, look: Look
 ) -> Sheet:
     """Draw shares as circles, the curve, its threshold with the interval, and dashed the lowest delay with a trend.
 
@@ -197,7 +197,7 @@ def draw_threshold(
     sheet = look.sheet(_HEIGHT_PT, WIDTH_PT)
     room = (sheet.width_pt - _CURVE_LEFT_PT - _RIGHT_PT, sheet.height_pt - _CURVE_TOP_PT - _CURVE_FOOT_PT)
     axes = sheet.axes(MARGIN_PT + _CURVE_LEFT_PT, _CURVE_TOP_PT, *room)
-    levels, asked = np.array(found.levels), np.array(found.asked)
+    levels, asked = np.array(threshold.levels), np.array(threshold.asked)
     span = float(np.ptp(levels)) or 1.0
     axes.set_xlim(levels.min() - 0.04 * span, levels.max() + 0.04 * span)
     axes.set_ylim(-0.08, 1.08)
@@ -211,27 +211,29 @@ def draw_threshold(
         axes.plot(*zip(*points, strict=True), "o", gid=f"person-{person}", **look_of_person)
     if lowest_ms is not None:
         axes.axvline(lowest_ms, color=style.TEXT_SOFT, linewidth=0.8, dashes=(3, 2), gid="lowest")
-    half = found.half_way
-    if half is not None and found.effect is not None and found.width is not None:
+    half = threshold.half_way
+    if half is not None and threshold.effect is not None and threshold.width is not None:
         xs = np.linspace(levels.min(), levels.max(), 200)
-        shares = success("logistic", xs, found.effect, found.width, found.guess or 0.0, found.lapse or 0.0)
+        shares = success(
+            "logistic", xs, threshold.effect, threshold.width, threshold.guess or 0.0, threshold.lapse or 0.0
+        )
         axes.plot(xs, shares, color=style.ACCENT, linewidth=1.4, gid="curve")
-        if found.interval is not None:
-            ends = [found.interval.low, found.interval.high]
+        if threshold.interval is not None:
+            ends = [threshold.interval.low, threshold.interval.high]
             axes.plot(ends, [half, half], color=style.BAND, linewidth=4, solid_capstyle="butt", gid="interval")
-        axes.plot([found.effect], [half], marker="D", markersize=5, color=style.TEXT, gid="threshold", zorder=4)
-        axes.plot([found.effect] * 2, [-0.08, half], color=style.TEXT, linewidth=0.8, zorder=3)
-        words = f"{found.effect:.0f} ms"
-        if found.interval is not None:
-            words += f" [{found.interval.low:.0f}, {found.interval.high:.0f}]"
-        right = found.effect < levels.mean()
+        axes.plot([threshold.effect], [half], marker="D", markersize=5, color=style.TEXT, gid="threshold", zorder=4)
+        axes.plot([threshold.effect] * 2, [-0.08, half], color=style.TEXT, linewidth=0.8, zorder=3)
+        words = f"{threshold.effect:.0f} ms"
+        if threshold.interval is not None:
+            words += f" [{threshold.interval.low:.0f}, {threshold.interval.high:.0f}]"
+        right = threshold.effect < levels.mean()
         ground: Style = {"facecolor": "white", "edgecolor": "none", "pad": 1.0}
         where: Style = {"ha": "left" if right else "right", "va": "bottom", "zorder": 5, "bbox": ground}
-        at = (found.effect, half)
+        at = (threshold.effect, half)
         offset: Style = {"xytext": (6 if right else -6, 5), "textcoords": "offset points"}
         axes.annotate(words, at, fontproperties=sheet.font(8.5, "bold"), color=style.TEXT, **where, **offset)
     there = asked > 0
-    shares = np.array(found.yes)[there] / asked[there]
+    shares = np.array(threshold.yes)[there] / asked[there]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
     sheet.text(MARGIN_PT, 28, "Answers that agree", size=SMALL, colour=style.TEXT_SOFT)

@@ -87,37 +87,37 @@ def panels(
 
 
 def _ends(
-    found: LevelsResult, levels: Iterable[float], share: float, least: float, linear: float
+    result: LevelsResult, levels: Iterable[float], share: float, least: float, linear: float
 ) -> tuple[float, float]:
     """Return the ends of an axis of levels: with a margin of a share of the span, in decades where these are spaced so.
 
     ``least`` is the smallest factor of a margin in decades, ``linear`` the share of any other.
     """
-    known = [level for level in levels if level > 0 or found.spacing != "log"]
+    known = [level for level in levels if level > 0 or result.spacing != "log"]
     low, high = float(min(known)), float(max(known))
-    if found.spacing == "log":
+    if result.spacing == "log":
         factor = max((high / low) ** share, least)
         return low / factor, high * factor
     margin = linear * ((high - low) or 1.0)
     return low - margin, high + margin
 
 
-def _over_trials(axes: Axes, found: LevelsResult, trials: int, ends: tuple[float, float], *, first: bool) -> None:
+def _over_trials(axes: Axes, result: LevelsResult, trials: int, ends: tuple[float, float], *, first: bool) -> None:
     """Give axes ticks for trials from 1 and, between ``ends``, for levels."""
     axes.set_xticks([1, *(place for place in (round(trials / 2), trials) if place > 1)])
-    if found.spacing == "log":
+    if result.spacing == "log":
         axes.set_yscale("log")
         axes.minorticks_off()
     axes.set_ylim(*ends)
-    ticks = _level_ticks(found, ends)
+    ticks = _level_ticks(result, ends)
     axes.set_yticks(ticks, [f"{tick:g}" if first else "" for tick in ticks])
     axes.hlines(ticks, *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
 
 
-def _level_ticks(found: LevelsResult, ends: tuple[float, float]) -> list[float]:
+def _level_ticks(result: LevelsResult, ends: tuple[float, float]) -> list[float]:
     """Return round levels between the ends of an axis: from 1, 2 and 5, in decades where levels are spaced so."""
     low, high = ends
-    if found.spacing == "linear":
+    if result.spacing == "linear":
         step = 10.0 ** math.floor(math.log10(high - low))
         step *= next(times for times in (0.1, 0.2, 0.5, 1.0, 2.0) if (high - low) / (step * times) <= 6)
         return [float(f"{number * step:.12g}") for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
@@ -141,197 +141,204 @@ _BELOW: Final = 0.03
 _COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 
 
-def _level_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
+def _level_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
     """Draw the answers over levels of a block."""
-    bands = _bands(study, found, tracked)
-    own = len(people(found)) - _MOST_PEOPLE
+    bands = _bands(study, result, tracked)
+    own = len(people(result)) - _MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} only in the table." if own > 0 else ""
-    chance = "" if found.guess_rate is None else f" Dashed: chance ({100 * found.guess_rate:.0f} %)."
+    chance = "" if result.guess_rate is None else f" Dashed: chance ({100 * result.guess_rate:.0f} %)."
     caption = (
-        f"{found.title}: {summary_words(found)} at each level. {_panels(found, bool(bands))}{chance}{left_out} "
-        f"{sample_words(study, len(people(found)))}"
+        f"{result.title}: {summary_words(result)} at each level. {_panels(result, bool(bands))}{chance}{left_out} "
+        f"{sample_words(study, len(people(result)))}"
     )
-    return picture_of(study, found.block, name, found.title, caption, partial(_draw_levels, found, bands), forms)
+    return picture_of(study, result.block, name, result.title, caption, partial(_draw_levels, result, bands), forms)
 
 
-def _bands(study: Study, found: LevelsResult, tracked: _Tracked) -> Mapping[str, Array]:
+def _bands(study: Study, result: LevelsResult, tracked: _Tracked) -> Mapping[str, Array]:
     """Return the bands of the participants' functions, where there is one in each panel."""
-    if not Thresholds.own(found) or len(_standards(found)) > 1:
+    if not Thresholds.own(result) or len(_standards(result)) > 1:
         return {}
-    block = next(block for block in study.levels if block.id == found.block)
-    return psychometric_bands(block, tracked(), people(found)[:_MOST_PEOPLE], _limits(found, _places(found)))
+    block = next(block for block in study.levels if block.id == result.block)
+    return psychometric_bands(block, tracked(), people(result)[:_MOST_PEOPLE], _limits(result, _places(result)))
 
 
-def _panels(found: LevelsResult, banded: bool) -> str:
+def _panels(result: LevelsResult, banded: bool) -> str:
     band = ", with the 95 % band" if banded else ""
-    crosses = "; crosses: catch trials" if any(one.catch for one in Answers.of(found)) else ""
-    if Thresholds.own(found):
+    crosses = "; crosses: catch trials" if any(answer.catch for answer in Answers.of(result)) else ""
+    if Thresholds.own(result):
         return (
             f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals of the "
             "thresholds, stacked for several standards; circles: answers at each level, area proportional to "
             f"their number{crosses}. First panel: all participants."
         )
-    units = ", without each participant's unit" if found.own_units else ""
+    units = ", without each participant's unit" if result.own_units else ""
     return (
-        f"First panel: {mean_words(found)} over the participants with its 95 % interval (Student's t); thin lines show "
-        f"participants{units}. Other panels: each participant with the 95 % interval of the answers{crosses}."
+        f"First panel: {mean_words(result)} over the participants with its 95 % interval (Student's t); thin lines "
+        f"show participants{units}. Other panels: each participant with the 95 % interval of the answers{crosses}."
     )
 
 
 @style.own_settings()
-def _draw_levels(found: LevelsResult, bands: Mapping[str, Array], look: Look) -> Sheet:
-    shown_people = people(found)[:_MOST_PEOPLE]
-    words = summary_words(found)
+def _draw_levels(result: LevelsResult, bands: Mapping[str, Array], look: Look) -> Sheet:
+    shown_people = people(result)[:_MOST_PEOPLE]
+    words = summary_words(result)
     above = words[:1].upper() + words[1:]
-    standards = _standards(found)
+    standards = _standards(result)
     keys = [
-        (f"standard {with_unit(found, standard)}", colour)
+        (f"standard {with_unit(result, standard)}", colour)
         for standard, colour in zip(standards, _COLOURS, strict=False)
     ]
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         person = shown_people[place - 1] if place else None
-        _levels_panel(axes, found, person, first=first)
+        _levels_panel(axes, result, person, first=first)
         if person is not None and person in bands:
             u, lower, upper = bands[person]
             axes.fill_between(u, lower, upper, color=style.BAND, linewidth=0, zorder=1)
 
     names = [(name, "") for name in ("All", *shown_people)]
     shown = keys if len(standards) > 1 else ()
-    return panels(look, above, names, draw, level_words(found), keys=shown, foot_pt=_FOOT_PT)
+    return panels(look, above, names, draw, level_words(result), keys=shown, foot_pt=_FOOT_PT)
 
 
-def _standards(found: LevelsResult) -> list[float]:
-    return sorted({one.standard for one in Answers.of(found) if one.standard is not None})
+def _standards(result: LevelsResult) -> list[float]:
+    return sorted({answer.standard for answer in Answers.of(result) if answer.standard is not None})
 
 
-def _levels_panel(axes: Axes, found: LevelsResult, person: str | None, *, first: bool) -> None:
-    places = _places(found)
-    _levels_frame(axes, found, places, first=first)
-    groups: Sequence[float | None] = _standards(found) or [None]
+def _levels_panel(axes: Axes, result: LevelsResult, person: str | None, *, first: bool) -> None:
+    places = _places(result)
+    _levels_frame(axes, result, places, first=first)
+    groups: Sequence[float | None] = _standards(result) or [None]
     for number, (standard, colour) in enumerate(zip(groups, _COLOURS, strict=False)):
-        for one in Thresholds.own(found):
-            if one.standard == standard and person in {None, one.participant}:
+        for threshold in Thresholds.own(result):
+            if threshold.standard == standard and person in {None, threshold.participant}:
                 grey = person is None and len(groups) == 1
-                _curve(axes, found, one, style.PARTICIPANT if grey else colour)
+                _curve(axes, result, threshold, style.PARTICIPANT if grey else colour)
                 if person is not None:
-                    _threshold_interval(axes, found, one, colour, number)
-        if person is None and found.adaptive:
+                    _threshold_interval(axes, result, threshold, colour, number)
+        if person is None and result.adaptive:
             continue
-        span = 0.0 if Thresholds.own(found) else max(places.values()) - min(places.values())
+        span = 0.0 if Thresholds.own(result) else max(places.values()) - min(places.values())
         aside = _ASIDE * (number - (len(groups) - 1) / 2) * span
-        shown = [one for one in Answers.of(found) if one.standard == standard and not one.catch]
-        if person is None and len(groups) == 1 and not Thresholds.own(found):
-            for somebody in people(found):
-                _line(axes, shown, somebody, places, found)
+        shown = [answer for answer in Answers.of(result) if answer.standard == standard and not answer.catch]
+        if person is None and len(groups) == 1 and not Thresholds.own(result):
+            for somebody in people(result):
+                _line(axes, shown, somebody, places, result)
         shifted = {level: place + aside for level, place in places.items()}
-        _answer_points(axes, [one for one in shown if one.participant == person], shifted, found, colour)
+        _answer_points(axes, [answers for answers in shown if answers.participant == person], shifted, result, colour)
         caught = [
-            one for one in Answers.of(found) if one.standard == standard and one.catch and one.participant == person
+            answer
+            for answer in Answers.of(result)
+            if answer.standard == standard and answer.catch and answer.participant == person
         ]
-        heights = [_height(found, one.value) for one in caught]
-        axes.plot([shifted[_where(one)] for one in caught], heights, "x", color=colour, markersize=4, zorder=4)
+        heights = [_height(result, answers.value) for answers in caught]
+        axes.plot([shifted[_where(answers)] for answers in caught], heights, "x", color=colour, markersize=4, zorder=4)
 
 
 def _line(
-    axes: Axes, shown: Sequence[LevelAnswers], person: str, places: Mapping[Any, float], found: LevelsResult
+    axes: Axes, shown: Sequence[LevelAnswers], person: str, places: Mapping[Any, float], result: LevelsResult
 ) -> None:
     """Draw a participant's answers; numbers without the unit that the participant chose."""
-    points = [one for one in shown if one.participant == person]
-    heights = np.array([_height(found, one.value) for one in points])
-    if found.own_units and points:
-        heights += np.mean([_height(found, one.value) for one in shown if one.participant is None]) - heights.mean()
-    axes.plot([places[_where(one)] for one in points], heights, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
+    points = [answers for answers in shown if answers.participant == person]
+    heights = np.array([_height(result, point.value) for point in points])
+    if result.own_units and points:
+        heights += (
+            np.mean([_height(result, answers.value) for answers in shown if answers.participant is None])
+            - heights.mean()
+        )
+    axes.plot([places[_where(point)] for point in points], heights, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
 
 
-def _curve(axes: Axes, found: LevelsResult, one: ThresholdEstimate, colour: str) -> None:
+def _curve(axes: Axes, result: LevelsResult, estimate: ThresholdEstimate, colour: str) -> None:
     """Draw a participant's psychometric function."""
     low, high = axes.get_xlim()
     u = np.linspace(low, high, 120)
-    middle = _coordinate(found, one.threshold)
-    shape = cast("Family", found.family)
-    psi = success(shape, u, middle, one.width or 1.0, one.guess or 0.0, one.lapse or 0.0)
+    middle = _coordinate(result, estimate.threshold)
+    shape = cast("Family", result.family)
+    psi = success(shape, u, middle, estimate.width or 1.0, estimate.guess or 0.0, estimate.lapse or 0.0)
     axes.plot(u, psi, color=colour, linewidth=0.9, zorder=2)
 
 
-def _threshold_interval(axes: Axes, found: LevelsResult, one: ThresholdEstimate, colour: str, number: int) -> None:
+def _threshold_interval(
+    axes: Axes, result: LevelsResult, estimate: ThresholdEstimate, colour: str, number: int
+) -> None:
     """Draw the interval of a threshold at the height of the function there, each standard's below the one before."""
-    if one.low is None or one.high is None:
+    if estimate.low is None or estimate.high is None:
         return
-    guess = one.guess or 0.0
-    height = guess + (1.0 - guess - (one.lapse or 0.0)) / 2 - _BELOW * number
-    ends = [_coordinate(found, one.low), _coordinate(found, one.high)]
+    guess = estimate.guess or 0.0
+    height = guess + (1.0 - guess - (estimate.lapse or 0.0)) / 2 - _BELOW * number
+    ends = [_coordinate(result, estimate.low), _coordinate(result, estimate.high)]
     axes.plot(ends, [height, height], color=colour, linewidth=1.2, solid_capstyle="butt", zorder=2)
 
 
-def _coordinate(found: LevelsResult, level: float) -> float:
-    return math.log10(level) if found.spacing == "log" else level
+def _coordinate(result: LevelsResult, level: float) -> float:
+    return math.log10(level) if result.spacing == "log" else level
 
 
 def _answer_points(
-    axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], found: LevelsResult, colour: str
+    axes: Axes, points: Sequence[LevelAnswers], places: Mapping[Any, float], result: LevelsResult, colour: str
 ) -> None:
-    xs, ys = [places[_where(one)] for one in points], [_height(found, one.value) for one in points]
-    if Thresholds.own(found):
-        sizes = [_SIZE_PT2 * one.n for one in points]
+    xs, ys = [places[_where(point)] for point in points], [_height(result, point.value) for point in points]
+    if Thresholds.own(result):
+        sizes = [_SIZE_PT2 * point.n for point in points]
         axes.scatter(xs, ys, s=sizes, facecolors="none", edgecolors=colour, linewidths=0.7, zorder=3)
         return
-    joined = "none" if found.vary is None else "-"
+    joined = "none" if result.vary is None else "-"
     axes.plot(xs, ys, marker="o", markersize=3, color=colour, linewidth=0.9, linestyle=joined)
-    for x, one in zip(xs, points, strict=True):
-        if one.low is not None and one.high is not None:
-            axes.plot([x, x], [_height(found, one.low), _height(found, one.high)], color=colour, linewidth=0.9)
+    for x, point in zip(xs, points, strict=True):
+        if point.low is not None and point.high is not None:
+            axes.plot([x, x], [_height(result, point.low), _height(result, point.high)], color=colour, linewidth=0.9)
 
 
-def _where(one: LevelAnswers) -> Any:
-    return one.comparison if one.level is None else one.level
+def _where(answers: LevelAnswers) -> Any:
+    return answers.comparison if answers.level is None else answers.level
 
 
-def _height(found: LevelsResult, value: float) -> float:
-    return math.log10(value) if found.summary == "geometric mean" else value
+def _height(result: LevelsResult, value: float) -> float:
+    return math.log10(value) if result.summary == "geometric mean" else value
 
 
-def _places(found: LevelsResult) -> dict[Any, float]:
+def _places(result: LevelsResult) -> dict[Any, float]:
     """Return the place of each level on the horizontal axis: its logarithm where levels are spaced so."""
-    levels = list(dict.fromkeys(_where(one) for one in Answers.of(found) if one.participant is None))
-    if found.vary is None:
+    levels = list(dict.fromkeys(_where(answer) for answer in Answers.of(result) if answer.participant is None))
+    if result.vary is None:
         return {level: float(place) for place, level in enumerate(levels)}
-    if found.spacing == "linear":
+    if result.spacing == "linear":
         return {level: float(level) for level in levels}
     logs = {level: math.log10(level) for level in levels if level > 0}
     step = (max(logs.values()) - min(logs.values())) / max(1, len(logs) - 1) if len(logs) > 1 else 0.3
     return {level: logs.get(level, min(logs.values(), default=0.0) - step) for level in levels}  # 0: left of the least
 
 
-def _levels_frame(axes: Axes, found: LevelsResult, places: Mapping[Any, float], *, first: bool) -> None:
+def _levels_frame(axes: Axes, result: LevelsResult, places: Mapping[Any, float], *, first: bool) -> None:
     """Draw the axes: levels below, shares, points or numbers at the left."""
-    axes.set_xlim(*_limits(found, places))
-    shown = _shown_levels(found, places)
+    axes.set_xlim(*_limits(result, places))
+    shown = _shown_levels(result, places)
     axes.set_xticks(
         list(shown.values()), [level.replace("_", " ") if isinstance(level, str) else f"{level:.3g}" for level in shown]
     )
-    ticks = _ticks(found)
+    ticks = _ticks(result)
     low, high = ticks[0][0], ticks[-1][0]
     axes.set_ylim(low - 0.04 * (high - low), high + 0.04 * (high - low))
     axes.set_yticks([at for at, _ in ticks], [words if first else "" for _, words in ticks])
     axes.hlines([at for at, _ in ticks], *axes.get_xlim(), color=style.GRID, linewidth=0.6, zorder=0)
-    if found.guess_rate is not None:
-        axes.axhline(found.guess_rate, color=style.AXIS, linewidth=0.6, linestyle=(0, (4, 3)), zorder=1)
+    if result.guess_rate is not None:
+        axes.axhline(result.guess_rate, color=style.AXIS, linewidth=0.6, linestyle=(0, (4, 3)), zorder=1)
 
 
-def _limits(found: LevelsResult, places: Mapping[Any, float]) -> tuple[float, float]:
+def _limits(result: LevelsResult, places: Mapping[Any, float]) -> tuple[float, float]:
     """Return the ends of the horizontal axis."""
     low, high = min(places.values()), max(places.values())
-    margin = 0.5 if found.vary is None else 0.06 * ((high - low) or 1.0)
+    margin = 0.5 if result.vary is None else 0.06 * ((high - low) or 1.0)
     return low - margin, high + margin
 
 
-def _shown_levels(found: LevelsResult, places: Mapping[Any, float]) -> Mapping[Any, float]:
+def _shown_levels(result: LevelsResult, places: Mapping[Any, float]) -> Mapping[Any, float]:
     """Return the levels that are named below the axis, with their places: of many on log spacing, round ones."""
     named = sorted(places, key=lambda level: places[level])
-    if found.vary is None or len(named) <= _MOST_TICKS:
+    if result.vary is None or len(named) <= _MOST_TICKS:
         return {level: places[level] for level in named}
-    if found.spacing == "log":
+    if result.spacing == "log":
         low, high = places[named[0]], places[named[-1]]
         decades = range(math.floor(low), math.ceil(high) + 1)
         round_levels = [digit * 10.0**decade for decade in decades for digit in (1, 2, 5)]
@@ -341,12 +348,12 @@ def _shown_levels(found: LevelsResult, places: Mapping[Any, float]) -> Mapping[A
     return {level: places[level] for level in named[:: math.ceil(len(named) / _MOST_TICKS)]}
 
 
-def _ticks(found: LevelsResult) -> list[tuple[float, str]]:
-    if found.summary == "share":
+def _ticks(result: LevelsResult) -> list[tuple[float, str]]:
+    if result.summary == "share":
         return [(share, f"{100 * share:.0f} %") for share in (0.0, 0.25, 0.5, 0.75, 1.0)]
-    ends = [end for one in Answers.of(found) for end in (one.value, one.low, one.high) if end is not None]
-    if found.summary == "mean":
-        low, high = found.bounds or (min(ends), max(ends))
+    ends = [end for answer in Answers.of(result) for end in (answer.value, answer.low, answer.high) if end is not None]
+    if result.summary == "mean":
+        low, high = result.bounds or (min(ends), max(ends))
         return [(float(point), str(point)) for point in range(math.floor(low), math.ceil(high) + 1)]
     decades = range(math.floor(math.log10(min(ends))), math.ceil(math.log10(max(ends))) + 1)
     known = [(math.log10(step) + decade, f"{step * 10.0**decade:g}") for decade in decades for step in (1, 2, 5)]
@@ -363,40 +370,48 @@ _CROSS_PT2: Final = 11.0
 """Areas of the marks of answers, reversals and catch trials."""
 
 
-def _track_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
+def _track_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
     """Draw the tracks of a block whose levels answers chose, once the key is open."""
-    block = next(block for block in study.levels if block.id == found.block)
+    block = next(block for block in study.levels if block.id == result.block)
     shown = list(courses(block, tracked(), _MOST_PANELS))
-    rest = len(Thresholds.own(found)) - len(shown)
+    rest = len(Thresholds.own(result)) - len(shown)
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
-    success = "correct" if found.counts == "correct" else f"“{found.counts}”"
-    marks = " Colours: tracks." if any(one.tracks.max() > 1 for one in shown) else ""
-    marks += " Rings: reversals." if any(one.reversals.any() for one in shown) else ""
-    marks += " ×: catch trials answered correctly; +: incorrectly." if any(one.catches.any() for one in shown) else ""
+    success = "correct" if result.counts == "correct" else f"“{result.counts}”"
+    marks = " Colours: tracks." if any(course.tracks.max() > 1 for course in shown) else ""
+    marks += " Rings: reversals." if any(course.reversals.any() for course in shown) else ""
+    marks += (
+        " ×: catch trials answered correctly; +: incorrectly." if any(course.catches.any() for course in shown) else ""
+    )
     caption = (
-        f"{found.title}: the level of each trial. Filled: {success}; hollow: otherwise.{marks} Band: 95 % "
+        f"{result.title}: the level of each trial. Filled: {success}; hollow: otherwise.{marks} Band: 95 % "
         f"interval of the threshold from the answers so far.{left_out} "
-        f"{sample_words(study, len(people(found)))}"
+        f"{sample_words(study, len(people(result)))}"
     )
     return picture_of(
-        study, found.block, name, f"{found.title}: tracks", caption, partial(_draw_tracks, found, shown), forms
+        study, result.block, name, f"{result.title}: tracks", caption, partial(_draw_tracks, result, shown), forms
     )
 
 
 @style.own_settings()
-def _draw_tracks(found: LevelsResult, shown: Sequence[TrackCourse], look: Look) -> Sheet:
-    standards = len({one.standard for one in shown}) > 1
-    names = [(one.participant, f"standard {one.standard:g}" if standards else "") for one in shown]
-    ends = _ends(found, (level for one in shown for level in (*one.levels, one.low[-1], one.high[-1])), 0.12, 1.1, 0.06)
+def _draw_tracks(result: LevelsResult, shown: Sequence[TrackCourse], look: Look) -> Sheet:
+    standards = len({course.standard for course in shown}) > 1
+    names = [(course.participant, f"standard {course.standard:g}" if standards else "") for course in shown]
+    ends = _ends(
+        result,
+        (level for course in shown for level in (*course.levels, course.low[-1], course.high[-1])),
+        0.12,
+        1.1,
+        0.06,
+    )
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         n = len(shown[place].levels)
         axes.set_xlim(0.5 - 0.02 * n, n + 0.5 + 0.02 * n)
-        _over_trials(axes, found, n, ends, first=first)
+        _over_trials(axes, result, n, ends, first=first)
         _track_panel(axes, shown[place])
 
     below = "Trial at the standard" if standards else "Trial"
-    return panels(look, level_words(found), names, draw, below)
+    return panels(look, level_words(result), names, draw, below)
 
 
 def _track_panel(axes: Axes, course: TrackCourse) -> None:
@@ -432,59 +447,64 @@ def _marks(
 
 
 def _settings_picture(
-    study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked
+    study: Study, result: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked
 ) -> Picture:
     """Draw the settings of a block whose levels participants set, once the key is open."""
-    rest = len(Settings.own(found)) - _MOST_PANELS
+    rest = len(Settings.own(result)) - _MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
-    compared = any(one.constant_error is not None for one in Settings.own(found))
+    compared = any(setting.constant_error is not None for setting in Settings.own(result))
     standard = " Dashed: standard." if compared else ""
     caption = (
-        f"{found.title}: the levels set by participants, in order. Filled: started high; hollow: started low. "
+        f"{result.title}: the levels set by participants, in order. Filled: started high; hollow: started low. "
         f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
-        f"{sample_words(study, len(people(found)))}"
+        f"{sample_words(study, len(people(result)))}"
     )
     return picture_of(
-        study, found.block, name, f"{found.title}: settings", caption, partial(_draw_settings, found), forms
+        study, result.block, name, f"{result.title}: settings", caption, partial(_draw_settings, result), forms
     )
 
 
 @style.own_settings()
-def _draw_settings(found: LevelsResult, look: Look) -> Sheet:
-    shown = Settings.own(found)[:_MOST_PANELS]
-    standards = len({one.standard for one in shown}) > 1
+def _draw_settings(result: LevelsResult, look: Look) -> Sheet:
+    shown = Settings.own(result)[:_MOST_PANELS]
+    standards = len({estimate.standard for estimate in shown}) > 1
     names = [
         (
-            str(one.participant),
-            f"standard {with_unit(found, one.standard)}" if standards and one.standard is not None else "",
+            str(estimate.participant),
+            f"standard {with_unit(result, estimate.standard)}" if standards and estimate.standard is not None else "",
         )
-        for one in shown
+        for estimate in shown
     ]
-    levels = (level for one in shown for level in (*one.levels, one.low, one.high, _compared(one)) if level is not None)
-    ends = _ends(found, levels, 0.08, 1.05, 0.08)
+    levels = (
+        level
+        for estimate in shown
+        for level in (*estimate.levels, estimate.low, estimate.high, _compared(estimate))
+        if level is not None
+    )
+    ends = _ends(result, levels, 0.08, 1.05, 0.08)
 
     def draw(axes: Axes, place: int, first: bool) -> None:
         axes.set_xlim(0.4, shown[place].n + 0.6)
-        _over_trials(axes, found, shown[place].n, ends, first=first)
+        _over_trials(axes, result, shown[place].n, ends, first=first)
         _settings_panel(axes, shown[place])
 
-    return panels(look, level_words(found), names, draw, "Setting")
+    return panels(look, level_words(result), names, draw, "Setting")
 
 
-def _compared(one: SettingEstimate) -> float | None:
+def _compared(estimate: SettingEstimate) -> float | None:
     """Return the standard as a level that can be drawn among the settings; None where none was presented."""
-    return one.standard if one.constant_error is not None else None
+    return estimate.standard if estimate.constant_error is not None else None
 
 
-def _settings_panel(axes: Axes, one: SettingEstimate) -> None:
+def _settings_panel(axes: Axes, estimate: SettingEstimate) -> None:
     """Draw the PSE with its interval, the standard, and a circle for each setting."""
-    if one.low is not None and one.high is not None:
-        axes.axhspan(one.low, one.high, color=style.BAND, linewidth=0, zorder=1)
-    axes.axhline(one.pse, color=style.ACCENT, linewidth=1.0, zorder=2)
-    if (standard := _compared(one)) is not None:
+    if estimate.low is not None and estimate.high is not None:
+        axes.axhspan(estimate.low, estimate.high, color=style.BAND, linewidth=0, zorder=1)
+    axes.axhline(estimate.pse, color=style.ACCENT, linewidth=1.0, zorder=2)
+    if (standard := _compared(estimate)) is not None:
         axes.axhline(standard, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=2)
-    places, levels = np.arange(1.0, one.n + 1), np.array(one.levels)
-    high = np.array(one.started_high, dtype=bool)
+    places, levels = np.arange(1.0, estimate.n + 1), np.array(estimate.levels)
+    high = np.array(estimate.started_high, dtype=bool)
     for which, face in ((high, style.ACCENT), (~high, "white")):
         _marks(axes, places, levels, which, face, style.ACCENT)
 
@@ -499,70 +519,80 @@ Point = tuple[float, float, float | None, float | None]
 """Standard, Weber fraction, and the ends of its interval."""
 
 
-def _weber_fractions(found: LevelsResult, participant: str | None) -> list[Point]:
+def _weber_fractions(result: LevelsResult, participant: str | None) -> list[Point]:
     """Return the Weber fractions of a participant or, of None, of the group, by standard.
 
     A threshold that is a difference is divided by its standard; standards of zero and levels that are values have none.
     Where the percentage of the published values is known, the level at it is in the threshold's place.
     """
-    if found.level_kind not in {"weber", "difference"}:
+    if result.level_kind not in {"weber", "difference"}:
         return []
-    points, at_threshold = [], percent_compared(found) is None
-    for one in Thresholds.of(found):
-        shown = (one.threshold, one.low, one.high)
-        level, *ends = shown if at_threshold else (one.compared, one.compared_low, one.compared_high)
-        if one.participant != participant or one.standard is None or one.standard <= 0 or level is None or level <= 0:
+    points, at_threshold = [], percent_compared(result) is None
+    for threshold in Thresholds.of(result):
+        shown = (threshold.threshold, threshold.low, threshold.high)
+        level, *ends = shown if at_threshold else (threshold.compared, threshold.compared_low, threshold.compared_high)
+        if (
+            threshold.participant != participant
+            or threshold.standard is None
+            or threshold.standard <= 0
+            or level is None
+            or level <= 0
+        ):
             continue
-        unit = one.standard if found.level_kind == "difference" else 1.0
+        unit = threshold.standard if result.level_kind == "difference" else 1.0
         low, high = (None if end is None or end <= 0 else end / unit for end in ends)
-        points.append((one.standard, level / unit, low, high))
+        points.append((threshold.standard, level / unit, low, high))
     return points
 
 
-def _at(found: LevelsResult) -> str:
+def _at(result: LevelsResult) -> str:
     """Return at which percentage Weber fractions are shown."""
-    percent = percent_compared(found)
-    if percent is None and found.guess_rate is not None:
-        percent = 50 * (1 + found.guess_rate)
-    return "" if percent is None else f" at {percent:.3g} % {found.counts}"
+    percent = percent_compared(result)
+    if percent is None and result.guess_rate is not None:
+        percent = 50 * (1 + result.guess_rate)
+    return "" if percent is None else f" at {percent:.3g} % {result.counts}"
 
 
-def _weber_picture(study: Study, found: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked) -> Picture:
+def _weber_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two standards or more."""
-    listed = "; ".join(published_words(one) for one in found.published)
-    published = f" Open circles and dotted lines: published values, {listed}." if _published_fractions(found) else ""
+    listed = "; ".join(published_words(published) for published in result.published)
+    published = f" Open circles and dotted lines: published values, {listed}." if _published_fractions(result) else ""
     caption = (
-        f"{found.title}: Weber fraction of {found.quantity}{_at(found)}, against the standard. Thin: "
+        f"{result.title}: Weber fraction of {result.quantity}{_at(result)}, against the standard. Thin: "
         f"participants; thick: random-effects mean with its 95 % interval.{published} "
-        f"{sample_words(study, len(people(found)))}"
+        f"{sample_words(study, len(people(result)))}"
     )
     return picture_of(
         study,
-        found.block,
+        result.block,
         name,
-        found.title,
+        result.title,
         caption,
-        partial(_draw_fractions, found),
+        partial(_draw_fractions, result),
         forms,
         (counted(study.n, "participant"), f"n = {study.n}"),
     )
 
 
 @style.own_settings()
-def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
+def _draw_fractions(result: LevelsResult, look: Look) -> Sheet:
     sheet = look.sheet(_HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
-    sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(found)}", size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(result)}", size=SMALL, colour=style.TEXT_SOFT)
     axes = sheet.axes(
         _WEBER_LEFT_PT, _TOP_PT, sheet.width_pt - _WEBER_LEFT_PT - _RIGHT_PT, sheet.height_pt - _TOP_PT - _WEBER_FOOT_PT
     )
-    group = _weber_fractions(found, None)
-    own = [_weber_fractions(found, person) for person in people(found)]
-    published = _published_fractions(found)
+    group = _weber_fractions(result, None)
+    own = [_weber_fractions(result, person) for person in people(result)]
+    published = _published_fractions(result)
     _fractions_frame(axes, group, own, published)
     _published(axes, published, sheet)
     for points in own:
         axes.plot(
-            [one[0] for one in points], [one[1] for one in points], color=style.PARTICIPANT, linewidth=0.5, alpha=0.7
+            [point[0] for point in points],
+            [point[1] for point in points],
+            color=style.PARTICIPANT,
+            linewidth=0.5,
+            alpha=0.7,
         )
     xs = [one[0] for one in group]
     axes.plot(xs, [one[1] for one in group], marker="o", markersize=3.5, color=style.ACCENT, linewidth=1.2, zorder=3)
@@ -571,19 +601,19 @@ def _draw_fractions(found: LevelsResult, look: Look) -> Sheet:
             axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
     for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
         label.set_fontproperties(sheet.font(SMALL))
-    below = f"Standard of {found.quantity}" + (f" [{found.unit}]" if found.unit else "")
+    below = f"Standard of {result.quantity}" + (f" [{result.unit}]" if result.unit else "")
     sheet.text(_WEBER_LEFT_PT, sheet.height_pt - 8, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 
-def _published_fractions(found: LevelsResult) -> list[tuple[float | None, float]]:
+def _published_fractions(result: LevelsResult) -> list[tuple[float | None, float]]:
     """Return standard and Weber fraction of the published values that are one; a standard of None: of all."""
     points = []
-    for one in found.published:
-        if one.measure == "weber":
-            points.append((one.standard, one.value))
-        elif one.measure == "threshold" and found.level_kind == "difference" and one.standard:
-            points.append((one.standard, one.value / one.standard))
+    for published in result.published:
+        if published.measure == "weber":
+            points.append((published.standard, published.value))
+        elif published.measure == "threshold" and result.level_kind == "difference" and published.standard:
+            points.append((published.standard, published.value / published.standard))
     return points
 
 
@@ -627,8 +657,8 @@ _Draw: TypeAlias = Callable[[Study, LevelsResult, Sequence[str], str, _Tracked],
 
 _FIGURES: Final[tuple[tuple[str, Callable[[LevelsResult], object], _Draw], ...]] = (
     ("levels", Answers.of, _level_picture),
-    ("tracks", lambda found: found.adaptive and Thresholds.own(found), _track_picture),
-    ("weber", lambda found: len(_weber_fractions(found, None)) >= 2, _weber_picture),
+    ("tracks", lambda result: result.adaptive and Thresholds.own(result), _track_picture),
+    ("weber", lambda result: len(_weber_fractions(result, None)) >= 2, _weber_picture),
     ("settings", Settings.own, _settings_picture),
 )
 """What a figure is called, of which blocks there is one, and what draws it."""
@@ -644,10 +674,10 @@ def level_pictures(
     tracked = cache(partial(tracks, study))
     yield from attempted(
         (
-            (found.block, name := f"{what}-{found.block}", partial(draw, study, found, forms, name, tracked))
+            (level.block, name := f"{what}-{level.block}", partial(draw, study, level, forms, name, tracked))
             for what, applies, draw in _FIGURES
-            for found in levels
-            if applies(found)
+            for level in levels
+            if applies(level)
         ),
         failures,
     )

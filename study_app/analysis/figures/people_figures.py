@@ -100,22 +100,22 @@ class Panel:
     @property
     def numbers(self) -> list[float]:
         """All numbers that the scale must hold."""
-        means = [one.mean for one in self.columns if one.mean is not None]
+        means = [column.mean for column in self.columns if column.mean is not None]
         of_means = [end for mean in means for end in (mean.value, mean.low, mean.high) if end is not None]
-        own = [end for one in self.columns for ends in (one.ends or {}).values() for end in ends]
+        own = [end for column in self.columns for ends in (column.ends or {}).values() for end in ends]
         marks = [self.line] if self.line is not None else []
-        return [*(value for one in self.columns for value in one.values.values()), *of_means, *own, *marks]
+        return [*(value for column in self.columns for value in column.values.values()), *of_means, *own, *marks]
 
 
 def numbers_of_panels(panels: Sequence[Panel]) -> str:
     """Return the numbers of panels as lines with tabs: a row for each participant, then means and their intervals."""
-    columns = [(f"{panel.title} {one.name}".strip(), one) for panel in panels for one in panel.columns]
-    people = sorted({person for _, one in columns for person in one.values})
+    columns = [(f"{panel.title} {column.name}".strip(), column) for panel in panels for column in panel.columns]
+    people = sorted({person for _, column in columns for person in column.values})
     rows = [["participant", *(name for name, _ in columns)]]
-    rows += [[person, *(_cell(one.values.get(person)) for _, one in columns)] for person in people]
+    rows += [[person, *(_cell(column.values.get(person)) for _, column in columns)] for person in people]
     for field in ("value", "low", "high"):
         label = {"value": "mean", "low": "95 % interval, lower end", "high": "95 % interval, upper end"}[field]
-        rows.append([label, *(_cell(getattr(one.mean, field, None)) for _, one in columns)])
+        rows.append([label, *(_cell(getattr(column.mean, field, None)) for _, column in columns)])
     return "".join("\t".join(row) + "\n" for row in rows)
 
 
@@ -160,14 +160,14 @@ def draw_people(
     if len(panels) == 1:
         width_pt = min(width_pt, max(_NARROW_PT, _LEFT_PT + widths[0][0] + MARGIN_PT))
     titles = [
-        [ruler.wrap(one.title, width, SMALL, "bold") for one, width in zip(row, wide, strict=True)]
+        [ruler.wrap(panel.title, width, SMALL, "bold") for panel, width in zip(row, wide, strict=True)]
         for row, wide in zip(rows, widths, strict=True)
     ]
     names = [
-        [_names(ruler, one, width) for one, width in zip(row, wide, strict=True)]
+        [_names(ruler, panel, width) for panel, width in zip(row, wide, strict=True)]
         for row, wide in zip(rows, widths, strict=True)
     ]
-    title_pt = [_TITLE_PT * max((len(one) for one in row), default=0) * any(one.title for one in of)
+    title_pt = [_TITLE_PT * max((len(one) for one in row), default=0) * any(panel.title for panel in of)
                 for row, of in zip(titles, rows, strict=True)]  # fmt: skip
     name_pt = [_NAME_PT * max(len(lines) for panel in row for lines in panel) + 8 for row in names]
     head = _HEAD_PT + (10.0 if groups else 0.0)
@@ -195,17 +195,18 @@ def draw_people(
 
 def _widths(row: Sequence[Panel], inside: float, *, shared: bool) -> list[float]:
     room = inside - (_LEFT_PT + (len(row) - 1) * _GAP_PT if shared else len(row) * _LEFT_PT)
-    total = sum(one.share for one in row)
+    total = sum(panel.share for panel in row)
     most = [
-        _OF_MANY_PT if any(column.ends for column in one.columns) else _MOST_COLUMN_PT * len(one.columns) for one in row
+        _OF_MANY_PT if any(column.ends for column in panel.columns) else _MOST_COLUMN_PT * len(panel.columns)
+        for panel in row
     ]
-    return [min(room * one.share / total, limit) for one, limit in zip(row, most, strict=True)]
+    return [min(room * panel.share / total, limit) for panel, limit in zip(row, most, strict=True)]
 
 
 def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
     """Return the names of columns, broken into lines."""
     room = width / (len(panel.columns) or 1) - 3
-    return [ruler.wrap(one.name, room, SMALL) for one in panel.columns]
+    return [ruler.wrap(column.name, room, SMALL) for column in panel.columns]
 
 
 def _legend(sheet: Sheet, groups: Sequence[str]) -> None:
@@ -250,8 +251,8 @@ def _scale(sheet: Sheet, axes: Axes, panel: Panel, of: Sequence[Panel], *, words
 def scale_ticks(low: float, high: float, *, log: bool) -> list[float]:
     """Return round numbers between the ends of a scale: from 1, 2 and 5, in decades on a logarithmic one."""
     if not log:
-        found = MaxNLocator(nbins=5, steps=[1, 2, 5, 10]).tick_values(low, high)
-        return [float(f"{tick:.12g}") for tick in found if low <= tick <= high]
+        ticks = MaxNLocator(nbins=5, steps=[1, 2, 5, 10]).tick_values(low, high)
+        return [float(f"{tick:.12g}") for tick in ticks if low <= tick <= high]
     inside: list[float] = []
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     for digits in ((1,), (1, 3), (1, 2, 5), (1, 2, 3, 5, 7), tuple(range(1, 10)), tuple(np.arange(10, 100) / 10)):
@@ -280,12 +281,12 @@ def _draw_panel(
         axes.axhspan(*panel.bound, color=style.BAND, alpha=0.55, linewidth=0, zorder=0, gid="bound")
     if panel.line is not None:
         axes.axhline(panel.line, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
-    people = sorted({person for one in panel.columns for person in one.values})
+    people = sorted({person for column in panel.columns for person in column.values})
     alone = len(panel.columns) == 1 or not panel.joined
     offsets = dict(zip(people, _offsets(panel, people, apart=alone) * step, strict=True))
     for person in people:
-        at = [(x + offsets[person], one.values[person])
-              for x, one in zip(xs, panel.columns, strict=True) if person in one.values]  # fmt: skip
+        at = [(x + offsets[person], column.values[person])
+              for x, column in zip(xs, panel.columns, strict=True) if person in column.values]  # fmt: skip
         number = groups.index(members[person]) if person in members else None
         colour = style.PARTICIPANT if number is None else _GROUPS[number % len(_GROUPS)]
         if panel.joined and len(at) > 1:
@@ -293,14 +294,14 @@ def _draw_panel(
         marker = "o" if number is None else _MARKERS[number % len(_MARKERS)]
         axes.plot(*zip(*at, strict=True), marker, color=colour, markersize=2.6, markeredgewidth=0, zorder=3,
                   gid=f"person-{person}")  # fmt: skip
-    for x, one in zip(xs, panel.columns, strict=True):
-        for person, ends in (one.ends or {}).items():
+    for x, column in zip(xs, panel.columns, strict=True):
+        for person, ends in (column.ends or {}).items():
             axes.plot([x + offsets[person]] * 2, ends, color=style.PARTICIPANT, linewidth=0.5, zorder=2)
-        if one.mean is not None:
-            aside = x + (_ASIDE * step if one.values else 0.0)
-            axes.plot([aside], [one.mean.value], "D", color=style.TEXT, markersize=4, zorder=5, gid="mean")
-            if one.mean.low is not None and one.mean.high is not None:
-                axes.plot([aside] * 2, [one.mean.low, one.mean.high], color=style.TEXT, linewidth=1.5, zorder=4)
+        if column.mean is not None:
+            aside = x + (_ASIDE * step if column.values else 0.0)
+            axes.plot([aside], [column.mean.value], "D", color=style.TEXT, markersize=4, zorder=5, gid="mean")
+            if column.mean.low is not None and column.mean.high is not None:
+                axes.plot([aside] * 2, [column.mean.low, column.mean.high], color=style.TEXT, linewidth=1.5, zorder=4)
 
 
 def _offsets(panel: Panel, people: Sequence[str], *, apart: bool) -> np.ndarray:

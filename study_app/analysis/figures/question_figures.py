@@ -59,9 +59,12 @@ def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) 
     return sheet, axes
 
 
-def _rows_of_groups(found: QuestionResult, look: Look, row_pt: float) -> tuple[Sheet, Axes]:
+def _rows_of_groups(result: QuestionResult, look: Look, row_pt: float) -> tuple[Sheet, Axes]:
     return rows(
-        [one.name for one in found.groups], [int(one.numbers["n"]) for one in found.groups], look, row_pt=row_pt
+        [group.name for group in result.groups],
+        [int(group.numbers["n"]) for group in result.groups],
+        look,
+        row_pt=row_pt,
     )
 
 
@@ -77,10 +80,10 @@ _PILE: Final = 0.07  # from one of equal answers to the next
 
 
 @style.own_settings()
-def draw_distribution(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
+def draw_distribution(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
     """Draw the answers."""
-    groups = found.groups
-    sheet, axes = _rows_of_groups(found, look, _ROW_PT)
+    groups = result.groups
+    sheet, axes = _rows_of_groups(result, look, _ROW_PT)
     values = [value for group in groups for value in group.numbers["values"]]
     low, high = asked.bounds or (min(values, default=0.0), max(values, default=1.0))
     span = (high - low) or 1.0
@@ -110,12 +113,12 @@ _OPTION_PT: Final = 20.0
 
 
 @style.own_settings()
-def draw_options(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
+def draw_options(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
     """Draw the counts of all options."""
-    several = len(found.groups) > 1
+    several = len(result.groups) > 1
     bars = [
         (f"{group.name}: {words}" if several else words, int(group.numbers["counts"][option]), int(group.numbers["n"]))
-        for group in found.groups
+        for group in result.groups
         for option, words in asked.levels.items()
     ]
     sheet, axes = rows([name for name, _, _ in bars], [n for _, _, n in bars], look, row_pt=_OPTION_PT)
@@ -151,10 +154,10 @@ def _ink(colour: str) -> str:
 
 
 @style.own_settings()
-def draw_ratings(asked: PlacedQuestion, found: QuestionResult, look: Look) -> Sheet:
+def draw_ratings(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
     """Draw the counts of all points."""
-    groups = found.groups
-    sheet, axes = _rows_of_groups(found, look, _RATING_PT)
+    groups = result.groups
+    sheet, axes = _rows_of_groups(result, look, _RATING_PT)
     axes.set_xlim(0, 1)
     inks = colours(len(asked.levels))
     for place, group in enumerate(groups):
@@ -187,7 +190,7 @@ _RATINGS: Final = _QuestionFigure(
 )
 
 
-_FIGURES: Final = {one.id: one for one in (_RATINGS, _OPTIONS, _DISTRIBUTION)}
+_FIGURES: Final = {figure.id: figure for figure in (_RATINGS, _OPTIONS, _DISTRIBUTION)}
 """Every figure by the id that a kind of question names it by."""
 
 
@@ -206,19 +209,19 @@ def question_pictures(
     yield from attempted(
         (
             (
-                found.where,
-                name := f"question-{found.where}-{found.item}",
-                partial(_picture, study, asked, found, forms, name),
+                result.where,
+                name := f"question-{result.where}-{result.item}",
+                partial(_picture, study, asked, result, forms, name),
             )
-            for asked, found in zip(study.others.questions, answered, strict=True)
-            if found.figure is not None and found.n and found.where not in of_levels
+            for asked, result in zip(study.others.questions, answered, strict=True)
+            if result.figure is not None and result.n and result.where not in of_levels
         ),
         failures,
     )
 
 
-def _picture(study: Study, asked: PlacedQuestion, found: QuestionResult, forms: Sequence[str], name: str) -> Picture:
-    figure = by_name(_FIGURES, found.figure or "")
-    title = found.short if found.short == found.title else f"{found.title}: {found.short}"
-    caption = f"{found.title}: “{found.text}” {figure.caption} {sample_words(study, study.n)}"
-    return picture_of(study, found.where, name, title, caption, partial(figure.draw, asked, found), forms)
+def _picture(study: Study, asked: PlacedQuestion, result: QuestionResult, forms: Sequence[str], name: str) -> Picture:
+    figure = by_name(_FIGURES, result.figure or "")
+    title = result.short if result.short == result.title else f"{result.title}: {result.short}"
+    caption = f"{result.title}: “{result.text}” {figure.caption} {sample_words(study, study.n)}"
+    return picture_of(study, result.where, name, title, caption, partial(figure.draw, asked, result), forms)

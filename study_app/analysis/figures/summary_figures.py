@@ -40,16 +40,16 @@ class Estimates(NamedTuple):
     words: str
 
 
-def estimates_of(found: LevelsResult) -> Estimates | None:
+def estimates_of(result: LevelsResult) -> Estimates | None:
     """Return the estimates that answer the question of a block of levels; None without any."""
     for statistic, attribute, words in _MEASURES:
-        rows = [one for one in statistic.of(found) if getattr(one, attribute) is not None]
-        if own := [one for one in rows if one.participant is not None]:
-            return Estimates([one for one in rows if one.participant is None], own, attribute, words)
-    answers = [one for one in Answers.of(found) if not one.catch]
-    own = [one for one in answers if one.participant is not None]
-    words = f"share of answers “{found.counts}”" if found.summary == "share" else f"{found.summary} of the answers"
-    return Estimates([one for one in answers if one.participant is None], own, "value", words) if own else None
+        rows = [one for one in statistic.of(result) if getattr(one, attribute) is not None]
+        if own := [row for row in rows if row.participant is not None]:
+            return Estimates([row for row in rows if row.participant is None], own, attribute, words)
+    answers = [answer for answer in Answers.of(result) if not answer.catch]
+    own = [answer for answer in answers if answer.participant is not None]
+    words = f"share of answers “{result.counts}”" if result.summary == "share" else f"{result.summary} of the answers"
+    return Estimates([answer for answer in answers if answer.participant is None], own, "value", words) if own else None
 
 
 def place_of(one: Any) -> float | str | None:
@@ -68,42 +68,42 @@ def summary_pictures(
 def _pictures(
     study: Study, results: Results, forms: Sequence[str]
 ) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
-    for number, one in enumerate(results.contrasts, start=1):
-        if any(side.values for side in one.sides):
+    for number, contrast in enumerate(results.contrasts, start=1):
+        if any(side.values for side in contrast.sides):
             name = f"hypothesis-{number}"
-            yield one.contrast.blocks[0], name, partial(_hypothesis, study, results, one, forms, name)
-    for found in results.levels:
-        if estimates_of(found) is not None:
-            name = f"estimates-{found.block}"
-            yield found.block, name, partial(_estimates, study, found, forms, name)
+            yield contrast.contrast.blocks[0], name, partial(_hypothesis, study, results, contrast, forms, name)
+    for level in results.levels:
+        if estimates_of(level) is not None:
+            name = f"estimates-{level.block}"
+            yield level.block, name, partial(_estimates, study, level, forms, name)
     for where in numbers_of(study):
         name = f"answers-{where}"
         yield where, name, partial(_answers, study, where, forms, name)
 
 
-def _hypothesis(study: Study, results: Results, one: ContrastResult, forms: Sequence[str], name: str) -> Picture:
+def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms: Sequence[str], name: str) -> Picture:
     members = group_members(study)
-    shown = {person: members[person] for side in one.sides for person in side.values if person in members}
-    within = one.contrast.groups is None
-    log = one.ratio
+    shown = {person: members[person] for side in contrast.sides for person in side.values if person in members}
+    within = contrast.contrast.groups is None
+    log = contrast.ratio
     columns = tuple(
         Column(
             name=side.name,
             values=side.values,
             mean=None if side.mean is None else Mean(value=side.mean, low=side.low, high=side.high),
         )
-        for side in one.sides
+        for side in contrast.sides
     )
     panels = [Panel(columns=columns, joined=within, share=1.6, log=log)]
-    ends = one.interval
-    mean = None if one.effect is None else Mean(
-        value=one.effect, low=None if ends is None else ends.low, high=None if ends is None else ends.high
+    ends = contrast.interval
+    mean = None if contrast.effect is None else Mean(
+        value=contrast.effect, low=None if ends is None else ends.low, high=None if ends is None else ends.high
     )  # fmt: skip
-    bound = one.contrast.bound
+    bound = contrast.contrast.bound
     panels.append(
         Panel(
             title="",
-            columns=(Column(name=_effect_name(one), values=_differences(one) if within else {}, mean=mean),),
+            columns=(Column(name=_effect_name(contrast), values=_differences(contrast) if within else {}, mean=mean),),
             joined=False,
             line=1.0 if log else 0.0,
             bound=None if bound is None else (1 / bound, bound) if log else (-bound, bound),
@@ -111,47 +111,49 @@ def _hypothesis(study: Study, results: Results, one: ContrastResult, forms: Sequ
         )
     )
     band = " Band: the equivalence bound." if bound is not None else ""
-    weighted = " Means are weighted as in the test." if one.contrast.measure == "threshold" else ""
+    weighted = " Means are weighted as in the test." if contrast.contrast.measure == "threshold" else ""
     lines = "Lines join the numbers of a participant. " if within else ""
     caption = (
-        f"{capitalised(one.contrast.described(one.compared))}. {lines}Right: {_effect_name(one)}"
+        f"{capitalised(contrast.contrast.described(contrast.compared))}. {lines}Right: {_effect_name(contrast)}"
         f"{', of each participant and on average' if within else ''}; dashed: no difference.{band}{weighted} "
-        f"{sample_words(study, one.n)}"
+        f"{sample_words(study, contrast.n)}"
     )
-    found = next((level for level in results.levels if level.block == one.contrast.blocks[0]), None)
+    result = next((level for level in results.levels if level.block == contrast.contrast.blocks[0]), None)
     draw, numbers = (
-        partial(draw_people, panels, above=_scale_words(one, found), members=shown),
+        partial(draw_people, panels, above=_scale_words(contrast, result), members=shown),
         numbers_of_panels(panels),
     )
-    title = f"{capitalised(one.contrast.measure_words)}"
-    return picture_of(study, one.contrast.blocks[0], name, title, caption, draw, forms, (f"n = {one.n}",), numbers)
+    title = f"{capitalised(contrast.contrast.measure_words)}"
+    return picture_of(
+        study, contrast.contrast.blocks[0], name, title, caption, draw, forms, (f"n = {contrast.n}",), numbers
+    )
 
 
-def _effect_name(one: ContrastResult) -> str:
-    first, second = one.compared
-    return f"{first} {'÷' if one.ratio else '−'} {second}"
+def _effect_name(contrast: ContrastResult) -> str:
+    first, second = contrast.compared
+    return f"{first} {'÷' if contrast.ratio else '−'} {second}"
 
 
-def _differences(one: ContrastResult) -> dict[str, float]:
+def _differences(contrast: ContrastResult) -> dict[str, float]:
     """Return the difference, or ratio, of each participant."""
-    first, second = (side.values for side in one.sides)
-    return {who: first[who] / second[who] if one.ratio else first[who] - second[who] for who in first}
+    first, second = (side.values for side in contrast.sides)
+    return {who: first[who] / second[who] if contrast.ratio else first[who] - second[who] for who in first}
 
 
-def _scale_words(one: ContrastResult, found: LevelsResult | None) -> str:
+def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return what the scale of a hypothesis shows."""
-    if one.contrast.measure in ("threshold", "pse") and found is not None:
-        return level_words(found)
-    return {"d_prime": "d′", "exponent": "Exponent"}.get(one.contrast.measure, "Points of the scale")
+    if contrast.contrast.measure in ("threshold", "pse") and result is not None:
+        return level_words(result)
+    return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points of the scale")
 
 
-def _estimates(study: Study, found: LevelsResult, forms: Sequence[str], name: str) -> Picture | None:
-    estimates = estimates_of(found)
+def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: str) -> Picture | None:
+    estimates = estimates_of(result)
     if estimates is None:
         return None
     places = sorted({place_of(one) for one in estimates.own}, key=lambda place: (str(type(place)), place))
     alone = len(places) == 1
-    log = estimates.attribute in ("threshold", "pse") and found.spacing == "log"
+    log = estimates.attribute in ("threshold", "pse") and result.spacing == "log"
 
     def column(place: float | str | None) -> Column:
         here = [one for one in estimates.own if place_of(one) == place]
@@ -169,19 +171,19 @@ def _estimates(study: Study, found: LevelsResult, forms: Sequence[str], name: st
     people = len({one.participant for one in estimates.own})
     of_each = " Thin lines: the 95 % interval of each participant, in the order of the numbers." if alone else ""
     caption = (
-        f"{found.title}: {estimates.words} of each participant, and the mean with its 95 % interval.{of_each} "
+        f"{result.title}: {estimates.words} of each participant, and the mean with its 95 % interval.{of_each} "
         f"{sample_words(study, people)}"
     )
     words = estimates.words if estimates.words == "d′" else capitalised(estimates.words)
-    above = level_words(found) if estimates.attribute in ("threshold", "pse") else words
+    above = level_words(result) if estimates.attribute in ("threshold", "pse") else words
     of = "Standard" if getattr(estimates.own[0], "level", None) is None else "Level"
-    below = "" if found.quantity is None or alone else f"{of}: {found.quantity} [{found.unit}]"
+    below = "" if result.quantity is None or alone else f"{of}: {result.quantity} [{result.unit}]"
     draw, numbers = (
         partial(draw_people, [panel], above=above, below=below, members=group_members(study)),
         numbers_of_panels([panel]),
     )
-    title = f"{found.title}: {estimates.words}"
-    return picture_of(study, found.block, name, title, caption, draw, forms, (f"n = {people}",), numbers)
+    title = f"{result.title}: {estimates.words}"
+    return picture_of(study, result.block, name, title, caption, draw, forms, (f"n = {people}",), numbers)
 
 
 class Numbers(NamedTuple):
@@ -199,23 +201,34 @@ class Numbers(NamedTuple):
 def numbers_of(study: Study) -> dict[str, list[Numbers]]:
     """Return the scores and the answers that are numbers, by where they were asked; none of blocks of levels."""
     levels = {block.id for block in study.levels}
-    places = dict.fromkeys(one.where.id for one in study.others.questions if one.where.id not in levels)
+    places = dict.fromkeys(question.where.id for question in study.others.questions if question.where.id not in levels)
     return {where: found for where in places if (found := _numbers_at(study, where))}
 
 
 def _numbers_at(study: Study, where: str) -> list[Numbers]:
     """Return the scores of a questionnaire or, where it has none, the answers to its questions that are numbers."""
-    scores = [one for one in study.others.scores if one.where.id == where]
+    scores = [score for score in study.others.scores if score.where.id == where]
     tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
     if scores:
-        tables = [(one.name, None, one.where, scored(study, one).rename(columns={"score": "value"})) for one in scores]
-    else:
-        asked = [one for one in study.others.questions if one.where.id == where and one.bounds is not None]
         tables = [
-            (one.short, None if one.question.kind_id == "number" else one.bounds, one.where, study.answers_to(one))
-            for one in asked
+            (score.name, None, score.where, scored(study, score).rename(columns={"score": "value"})) for score in scores
         ]
-    found = []
+    else:
+        asked = [
+            question
+            for question in study.others.questions
+            if question.where.id == where and question.bounds is not None
+        ]
+        tables = [
+            (
+                question.short,
+                None if question.question.kind_id == "number" else question.bounds,
+                question.where,
+                study.answers_to(question),
+            )
+            for question in asked
+        ]
+    numbers = []
     for title, bounds, place, rows in tables:
         settings: list[tuple[str | None, str]] = [(it.code, place.name(it)) for it in place.settings]
         by_setting = {}
@@ -224,8 +237,8 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
             means = here.astype({"value": float}).groupby("participant")["value"].mean()
             by_setting[words] = {str(who): float(value) for who, value in means.items()}
         if any(by_setting.values()):
-            found.append(Numbers(title, bounds, bool(scores), by_setting))
-    return found
+            numbers.append(Numbers(title, bounds, bool(scores), by_setting))
+    return numbers
 
 
 def _with_room(low: float, high: float) -> tuple[float, float]:
@@ -238,17 +251,17 @@ def _answers(study: Study, where: str, forms: Sequence[str], name: str) -> Pictu
         return None
     panels = [
         Panel(
-            title=one.title,
+            title=numbers.title,
             columns=tuple(
                 Column(name=words, values=values, mean=mean_of(values.values()))
-                for words, values in one.by_setting.items()
+                for words, values in numbers.by_setting.items()
             ),
-            ends=None if one.bounds is None else _with_room(*one.bounds),
+            ends=None if numbers.bounds is None else _with_room(*numbers.bounds),
         )
-        for one in found
+        for numbers in found
     ]
-    people = len({who for panel in panels for one in panel.columns for who in one.values})
-    title = next(one.where.title for one in study.others.questions if one.where.id == where)
+    people = len({who for panel in panels for column in panel.columns for who in column.values})
+    title = next(question.where.title for question in study.others.questions if question.where.id == where)
     caption = (
         f"{title}: the number of each participant, and the mean with Student's 95 % interval. "
         f"{sample_words(study, people)}"

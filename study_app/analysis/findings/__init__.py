@@ -6,7 +6,7 @@ from typing import Any, Final
 from study_app.analysis.findings.finding import Finding
 from study_app.discovery import Registry, Returns, modules_of
 
-_held = [one for module in modules_of(sys.modules[__name__]) for one in vars(module).values()]
+_held = [var for module in modules_of(sys.modules[__name__]) for var in vars(module).values()]
 _found = {one for one in _held if isinstance(one, type) and issubclass(one, Finding) and hasattr(one, "key")}
 _RETURNS: Final = {
     "test": Returns(

@@ -53,15 +53,15 @@ def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, floa
 
     Equivalent is only what every test shows.
     """
-    found: dict[str, float | None] = {}
+    longest: dict[str, float | None] = {}
     stopped = set()
-    for one in against:
-        found.setdefault(one.item, None)
-        if one.verdict != "equivalent":
-            stopped.add(one.item)
-        elif one.item not in stopped:
-            found[one.item] = one.delay_ms
-    return found
+    for tested in against:
+        longest.setdefault(tested.item, None)
+        if tested.verdict != "equivalent":
+            stopped.add(tested.item)
+        elif tested.item not in stopped:
+            longest[tested.item] = tested.delay_ms
+    return longest
 
 
 def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
@@ -74,7 +74,7 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
         "interval lies beyond the bound; this is not corrected for the number of comparisons. Inconclusive: neither, "
         "which does not show a difference. Out of reach: too few participants to show equivalence with any answers."
     )
-    disagree = sum(one.found.checks_agree is False for one in against)
+    disagree = sum(tested.found.checks_agree is False for tested in against)
     if disagree:
         yield (
             f"* The t tests and the bootstrap disagree ({disagree} of {len(against)} comparisons). A comparison counts "
@@ -85,44 +85,46 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
 _VERDICTS: Final = ("equivalent", "not equivalent", "inconclusive", "out of reach")
 
 
-def by_delay(found: BlockResult) -> list[list[str]]:
+def by_delay(result: BlockResult) -> list[list[str]]:
     """Return a row a delay: in which statements it has each verdict, and what may be said of it in one sentence."""
     rows = []
-    for delay_ms in dict.fromkeys(one.delay_ms for one in ContrastsWithControl.of(found)):
-        here = [one for one in ContrastsWithControl.of(found) if one.delay_ms == delay_ms]
+    for delay_ms in dict.fromkeys(tested.delay_ms for tested in ContrastsWithControl.of(result)):
+        here = [tested for tested in ContrastsWithControl.of(result) if tested.delay_ms == delay_ms]
         cells = [
-            ", ".join(short(found, one.item) for one in here if one.verdict == verdict) or "–" for verdict in _VERDICTS
+            ", ".join(short(result, tested.item) for tested in here if tested.verdict == verdict) or "–"
+            for verdict in _VERDICTS
         ]
-        rows.append([ms(delay_ms), *cells, _said_of(found, delay_ms, here)])
+        rows.append([ms(delay_ms), *cells, _said_of(result, delay_ms, here)])
     return rows
 
 
-def _said_of(found: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
-    if all(one.verdict == "equivalent" for one in here):
-        return f"Mean answers to these statements stay within the bound; {_not_excluded([one.found for one in here])}."
+def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
+    if all(tested.verdict == "equivalent" for tested in here):
+        not_excluded = _not_excluded([tested.found for tested in here])
+        return f"Mean answers to these statements stay within the bound; {not_excluded}."
     claim = f"“delays up to {ms(delay_ms)} do not matter”"
-    if reasons := _evidence_up_to(found, delay_ms):
+    if reasons := _evidence_up_to(result, delay_ms):
         return f"These data speak against {claim}: {'; '.join(reasons)}."
     return f"These data neither support nor refute {claim}."
 
 
-def _evidence_up_to(found: BlockResult, delay_ms: float) -> tuple[str, ...]:
+def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
     """Return what shows that delays up to this one change answers.
 
     That is a trend up to this delay or a shorter one, with the error rate held over all statements, or an interval
     beyond the bound.
     """
-    exploratory = {trend.item for trend in DelayTrend.of(found) if not trend.primary}
+    exploratory = {trend.item for trend in DelayTrend.of(result) if not trend.primary}
     trends = (
-        f"agreement with “{short(found, one.item)}” shows a trend over delays up to {ms(shown_ms)}"
-        + (" (exploratory)" if one.item in exploratory else "")
-        for one in LowestDelay.of(found)
-        if (shown_ms := one.over_all_ms) is not None and shown_ms <= delay_ms
+        f"agreement with “{short(result, lowest.item)}” shows a trend over delays up to {ms(shown_ms)}"
+        + (" (exploratory)" if lowest.item in exploratory else "")
+        for lowest in LowestDelay.of(result)
+        if (shown_ms := lowest.over_all_ms) is not None and shown_ms <= delay_ms
     )
     beyond: dict[float, list[str]] = {}
-    for one in ContrastsWithControl.of(found):
-        if one.verdict == "not equivalent" and one.delay_ms <= delay_ms:
-            beyond.setdefault(one.delay_ms, []).append(f"“{short(found, one.item)}”")
+    for tested in ContrastsWithControl.of(result):
+        if tested.verdict == "not equivalent" and tested.delay_ms <= delay_ms:
+            beyond.setdefault(tested.delay_ms, []).append(f"“{short(result, tested.item)}”")
     differing = (
         f"at {ms(at)} {listed(items)} differ{'s' * (len(items) == 1)} by more than the bound"
         for at, items in beyond.items()
@@ -130,9 +132,9 @@ def _evidence_up_to(found: BlockResult, delay_ms: float) -> tuple[str, ...]:
     return (*trends, *differing)
 
 
-def common_ms(found: BlockResult) -> float | None:
+def common_ms(result: BlockResult) -> float | None:
     """Return the longest delay up to which every statement is equivalent at every delay."""
-    delays = list(equivalent_up_to(ContrastsWithControl.of(found)).values())
+    delays = list(equivalent_up_to(ContrastsWithControl.of(result)).values())
     known = [delay for delay in delays if delay is not None]
     return min(known) if known and len(known) == len(delays) else None
 
@@ -149,7 +151,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[ContrastWithControl, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[ContrastWithControl, ...], Absent]:
         """Compare every delay with the shortest one, by the bound that was decided."""
         bound, delays_ms = answers.decided.equivalence_bound, answers.block.delays_ms
         if answers.k < 2:
@@ -167,9 +169,9 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         return tuple(compared), ()
 
     @classmethod
-    def entries(cls, found: BlockResult) -> Mapping[str, Any]:
-        against = cls.of(found)
-        up_to = equivalent_up_to(against) if cls.key in found.findings else None
+    def entries(cls, result: BlockResult) -> Mapping[str, Any]:
+        against = cls.of(result)
+        up_to = equivalent_up_to(against) if cls.key in result.findings else None
         return {cls.key: against, "equivalent_up_to": up_to}
 
     def rows(self) -> Iterator[Row]:
@@ -194,15 +196,15 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         yield heading(3, f"Each delay against {control}")
         yield table_of(
             self.value,
-            ("Statement", lambda one: short(self.found, one.item)),
-            ("Delay", lambda one: ms(one.delay_ms)),
-            ("n", lambda one: str(one.found.n)),
-            ("difference", lambda one: number(one.found.effect)),
-            ("interval", lambda one: interval(one.found.interval)),
-            ("people beyond the bound", lambda one: beyond(one.found)),
-            ("p equivalent", lambda one: p_value(one.found.p)),
-            ("p, bootstrap", lambda one: p_value(one.found.p_bootstrap)),
-            ("Verdict", lambda one: one.verdict + (" *" if one.found.checks_agree is False else "")),
+            ("Statement", lambda tested: short(self.found, tested.item)),
+            ("Delay", lambda tested: ms(tested.delay_ms)),
+            ("n", lambda tested: str(tested.found.n)),
+            ("difference", lambda tested: number(tested.found.effect)),
+            ("interval", lambda tested: interval(tested.found.interval)),
+            ("people beyond the bound", lambda tested: beyond(tested.found)),
+            ("p equivalent", lambda tested: p_value(tested.found.p)),
+            ("p, bootstrap", lambda tested: p_value(tested.found.p_bootstrap)),
+            ("Verdict", lambda tested: tested.verdict + (" *" if tested.found.checks_agree is False else "")),
             words=2,
             last=1,
         )
@@ -211,16 +213,16 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         yield table(head, by_delay(self.found), words=len(head), folded=True)
 
     def limits(self) -> Iterator[str]:
-        against, found = self.value, self.found
-        if against and found.n < fewest((first := against[0].found).alpha, first.bound):
+        against, result = self.value, self.found
+        if against and result.n < fewest((first := against[0].found).alpha, first.bound):
             yield (
-                f"{lead(found)}: a comparison can count as equivalent only with {enough(first.alpha, first.bound)}. "
-                f"This study has {found.n}."
+                f"{lead(result)}: a comparison can count as equivalent only with {enough(first.alpha, first.bound)}. "
+                f"This study has {result.n}."
             )
-        undecided = [one for one in against if one.verdict in ("inconclusive", "out of reach")]
+        undecided = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
         if undecided:
             yield (
-                f"{lead(found)}: {len(undecided)} of {number_text.counted(len(against), 'comparison')} with "
+                f"{lead(result)}: {len(undecided)} of {number_text.counted(len(against), 'comparison')} with "
                 f"{ms(undecided[0].control_ms)} {'is' if len(undecided) == 1 else 'are'} undecided: the mean "
                 "difference is not shown to lie within the equivalence bound, nor beyond it."
             )
@@ -273,14 +275,14 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Lowest, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Lowest, ...], Absent]:
         """Step down in the statements whose trend is there at all."""
-        trends, lowest = DelayTrend.of(found), []
-        showing = [one for one in trends if one.verdict in FOUND]
-        for one in showing:
-            direction, alpha = answers.decided.direction(one.item), answers.decided.alpha
-            steps = step_down(answers.values[one.item], answers.block.delays_ms, direction, alpha=alpha)
-            lowest.append(Lowest(one.item, steps, one.members))
+        trends, lowest = DelayTrend.of(result), []
+        showing = [trend for trend in trends if trend.verdict in FOUND]
+        for test in showing:
+            direction, alpha = answers.decided.direction(test.item), answers.decided.alpha
+            steps = step_down(answers.values[test.item], answers.block.delays_ms, direction, alpha=alpha)
+            lowest.append(Lowest(test.item, steps, test.members))
         if trends and not showing:
             why = "no statement shows a trend over all delays, which does not show that delays go unnoticed"
             return (), (NotTested(cls.what, why),)
@@ -303,12 +305,14 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         yield heading(3, "The lowest delay with a trend")
         yield table_of(
             self.value,
-            ("Statement", lambda one: short(self.found, one.item)),
-            ("lowest", lambda one: "–" if one.over_all_ms is None else f"≤ {ms(one.over_all_ms)}"),
-            ("uncorrected", lambda one: "–" if one.steps.lowest_ms is None else f"≤ {ms(one.steps.lowest_ms)}"),
+            ("Statement", lambda lowest: short(self.found, lowest.item)),
+            ("lowest", lambda row: "–" if row.over_all_ms is None else f"≤ {ms(row.over_all_ms)}"),
+            ("uncorrected", lambda row: "–" if row.steps.lowest_ms is None else f"≤ {ms(row.steps.lowest_ms)}"),
             (
                 "steps down: longest delay, p",
-                lambda one: "; ".join(f"{ms(step.longest_ms)} {p_value(step.trend.p)}" for step in one.steps.steps),
+                lambda lowest: "; ".join(
+                    f"{ms(step.longest_ms)} {p_value(step.trend.p)}" for step in lowest.steps.steps
+                ),
             ),
             words=4,
         )
@@ -336,11 +340,13 @@ class DetectionThreshold(Finding[Threshold | None]):
     figure_title = "Agreement against delay"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Threshold | None, Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[Threshold | None, Absent]:
         item = answers.decided.noticed
         if item is None or item not in answers.values:
             return None, (NotTested(cls.what, "the protocol does not state a detection question (analysis.noticed)"),)
-        rising = [one.item for one in DelayTrend.of(found) if one.verdict in FOUND and (one.outcome.effect or 0.0) > 0]
+        rising = [
+            test.item for test in DelayTrend.of(result) if test.verdict in FOUND and (test.outcome.effect or 0.0) > 0
+        ]
         if item not in rising:
             return None, (NotTested(cls.what, "agreement is not shown to increase with the delay"),)
         return noticed(answers.single[item], answers.block.delays_ms), ()
@@ -377,7 +383,8 @@ class DetectionThreshold(Finding[Threshold | None]):
         if threshold is None or not any(threshold.asked):
             return None
         lowest = min(
-            (one.over_all_ms for one in LowestDelay.of(drawing.found) if one.over_all_ms is not None), default=None
+            (lowest.over_all_ms for lowest in LowestDelay.of(drawing.found) if lowest.over_all_ms is not None),
+            default=None,
         )
         curve = f"No curve: {threshold.note}."
         if threshold.effect is not None:
@@ -397,7 +404,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         """Return of each participant the share of answers that agree, by delay."""
         answers = drawing.study.answers(drawing.block)
         rows = answers[(answers["item"] == self.results.decided.noticed) & answers["response"].notna()]
-        delays_ms = {one.code: one.delay_ms or 0.0 for one in drawing.found.settings}
+        delays_ms = {setting.code: setting.delay_ms or 0.0 for setting in drawing.found.settings}
         rows = rows.assign(delay=rows["code"].map(delays_ms).astype(float), agrees=rows["response"].isin(AGREEMENT))
         people = rows.groupby("participant", sort=True)
         return {str(who): dict(own.groupby("delay")["agrees"].mean()) for who, own in people}
@@ -452,7 +459,9 @@ class NoticedFrom(Finding[None]):
 
     def _shortest(self, items: Sequence[str]) -> str:
         """Return the sentence of the shortest delay that changes one of these statements; empty without any."""
-        lowest = [one for one in LowestDelay.of(self.found) if one.over_all_ms is not None and one.item in items]
+        lowest = [
+            lowest for lowest in LowestDelay.of(self.found) if lowest.over_all_ms is not None and lowest.item in items
+        ]
         if not lowest:
             return ""
         at = min(one.over_all_ms or 0.0 for one in lowest)
@@ -498,7 +507,10 @@ class UnchangedUpTo(Finding[None]):
         """Return up to which delay mean answers are equivalent to those at the shortest."""
         against = ContrastsWithControl.of(self.found)
         if not against:
-            why = next((one.why for one in self.found.absent if "equivalence" in one.what), "there was no comparison")
+            why = next(
+                (not_tested.why for not_tested in self.found.absent if "equivalence" in not_tested.what),
+                "there was no comparison",
+            )
             return self.answered("not tested", f"No answer: {why}.")
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
@@ -506,7 +518,7 @@ class UnchangedUpTo(Finding[None]):
                 "not shown", f"{_NO_DELAY.format(within)} {_largest_words(self.found, against)}{_beyond_words(against)}"
             )
         statements = all_of(len(equivalent_up_to(against)), "statement")
-        share = _not_excluded([one.found for one in against if one.delay_ms <= at])
+        share = _not_excluded([tested.found for tested in against if tested.delay_ms <= at])
         text = f"Up to {ms(at)} mean answers to {statements} stay {within}; {share}."
         return self.answered("shown", text)
 
@@ -514,14 +526,14 @@ class UnchangedUpTo(Finding[None]):
 _NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."
 
 
-def _largest_words(found: BlockResult, against: Sequence[ContrastWithControl]) -> str:
+def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) -> str:
     """Return the largest mean difference with its interval, as a sentence with a space; nothing without any."""
-    known = [one for one in against if one.found.effect is not None and one.found.interval is not None]
+    known = [tested for tested in against if tested.found.effect is not None and tested.found.interval is not None]
     if not known:
         return ""
     most = max(known, key=lambda one: abs(one.found.effect or 0.0))
     return (
-        f"The largest mean difference is {number(most.found.effect)} points (“{short(found, most.item)}” at "
+        f"The largest mean difference is {number(most.found.effect)} points (“{short(result, most.item)}” at "
         f"{ms(most.delay_ms)}, {percent(1 - 2 * most.found.alpha)} interval {interval(most.found.interval)}, "
         f"n = {most.found.n}). "
     )
@@ -529,7 +541,7 @@ def _largest_words(found: BlockResult, against: Sequence[ContrastWithControl]) -
 
 def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
     """Return how many comparisons are not equivalent, as a sentence; without any, that nothing follows."""
-    beyond = sum(one.verdict == "not equivalent" for one in against)
+    beyond = sum(tested.verdict == "not equivalent" for tested in against)
     if not beyond:
         return "This does not show that they change."
     return (
@@ -540,7 +552,9 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
 
 def _not_excluded(tested: Sequence[Equivalence]) -> str:
     """Return how many people may differ by more than the bound, by the 95 % interval of their share."""
-    most = max((one.beyond.interval.high for one in tested if one.beyond is not None), default=1.0)
+    most = max(
+        (equivalence.beyond.interval.high for equivalence in tested if equivalence.beyond is not None), default=1.0
+    )
     return f"the data do not exclude that up to {100 * most:.0f} % of people differ by more"
 
 
@@ -558,8 +572,8 @@ _MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovemen
 
 def _kept(block: Block, results: Results) -> str:
     """Say how many trials kept to the limits of timing."""
-    here = [one for one in results.delivered if one.block == block.id]
-    judged, valid = sum(one.judged for one in here), sum(one.valid for one in here)
+    here = [delivered for delivered in results.delivered if delivered.block == block.id]
+    judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
     if not judged:
         return "Whether trials met the protocol's timing limits was not measured."
     return f"{valid} of {judged} trials met the protocol's timing limits; all are included."

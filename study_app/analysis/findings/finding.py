@@ -191,14 +191,14 @@ def judged(outcomes: Mapping[str, Outcome], answers: BlockAnswers, family: str) 
     """Return the tests of statements (item → outcome): primary ones as a Holm family, the others exploratory by FDR."""
     primary = {item: outcome for item, outcome in outcomes.items() if answers.decided.is_primary(item)}
     others = {item: outcome for item, outcome in outcomes.items() if item not in primary}
-    found = {
-        **{one.item: one for one in in_family(primary, answers, family, holm, HOLM, primary=True)},
+    verdicts = {
+        **{test.item: test for test in in_family(primary, answers, family, holm, HOLM, primary=True)},
         **{
-            one.item: one
-            for one in in_family(others, answers, f"{family}, exploratory", false_discovery, FDR, primary=False)
+            test.item: test
+            for test in in_family(others, answers, f"{family}, exploratory", false_discovery, FDR, primary=False)
         },
     }
-    return tuple(found[item] for item in outcomes)
+    return tuple(verdicts[item] for item in outcomes)
 
 
 def in_family(
@@ -213,12 +213,12 @@ def in_family(
     """Return tests that are corrected together; ``primary``: all of them, or for each whether it is."""
     of_primary = [primary] * len(outcomes) if isinstance(primary, bool) else primary
     ps = [outcome.p for outcome in outcomes.values()]
-    found = []
+    members = []
     for place, ((item, outcome), p) in enumerate(zip(outcomes.items(), correct(ps), strict=True)):
         least = correct([*ps[:place], outcome.smallest_p, *ps[place + 1 :]])[place]
         said = answers.verdict(p, least, primary=of_primary[place])
         adjusted = None if p is None else max(p, answers.gate)
-        found.append(
+        members.append(
             Tested(
                 item=item,
                 outcome=outcome,
@@ -230,7 +230,7 @@ def in_family(
                 verdict=said,
             )
         )
-    return tuple(found)
+    return tuple(members)
 
 
 def verdict(p: float | None, least: float | None, alpha: float, *, primary: bool) -> Verdict:
@@ -280,12 +280,12 @@ TESTS: Final = (
 )
 
 
-def test_row(found: BlockResult, question: str, outcome: Outcome) -> dict[str, Any]:
+def test_row(result: BlockResult, question: str, outcome: Outcome) -> dict[str, Any]:
     """Return the row of a test that answers a question about a block; its family and verdict are empty."""
     interval = outcome.interval
     blank = {column.name: None for column in TESTS}
     return blank | {
-        "block": found.id,
+        "block": result.id,
         "question": question,
         **{
             field: getattr(outcome, field)
@@ -299,36 +299,36 @@ def test_row(found: BlockResult, question: str, outcome: Outcome) -> dict[str, A
         "level": None if interval is None else interval.level,
         "interval": outcome.no_interval or None if interval is None else interval.method,
         "note": outcome.note or None,
-        "codes": codes_of(found),
+        "codes": codes_of(result),
     }
 
 
-def codes_of(found: BlockResult, *delays_ms: float) -> str:
+def codes_of(result: BlockResult, *delays_ms: float) -> str:
     """Return the codes of a block's settings, or those of these delays, in order; those of one delay are joined."""
-    if not found.delays_ms:
-        return " ".join(setting.code for setting in found.settings)
+    if not result.delays_ms:
+        return " ".join(setting.code for setting in result.settings)
     return " ".join(
-        "+".join(setting.code for setting in found.settings if (setting.delay_ms or 0.0) == delay_ms)
-        for delay_ms in delays_ms or found.delays_ms
+        "+".join(setting.code for setting in result.settings if (setting.delay_ms or 0.0) == delay_ms)
+        for delay_ms in delays_ms or result.delays_ms
     )
 
 
-def judged_row(found: BlockResult, question: str, one: Tested) -> dict[str, Any]:
+def judged_row(result: BlockResult, question: str, test: Tested) -> dict[str, Any]:
     """Return the row of a test of one statement, with its family and verdict."""
-    return test_row(found, question, one.outcome) | {
-        "item": one.item,
-        "family": one.family,
-        "members": one.members,
-        "correction": one.correction,
-        "p_adjusted": one.p_adjusted,
-        "primary": one.primary,
-        "verdict": one.verdict,
+    return test_row(result, question, test.outcome) | {
+        "item": test.item,
+        "family": test.family,
+        "members": test.members,
+        "correction": test.correction,
+        "p_adjusted": test.p_adjusted,
+        "primary": test.primary,
+        "verdict": test.verdict,
     }
 
 
-def rows_alone(found: BlockResult, what: str) -> dict[str, Any]:
+def rows_alone(result: BlockResult, what: str) -> dict[str, Any]:
     """Return the family of a test that is corrected for no other."""
-    return {"family": f"{found.id}: {what}", "members": 1, "correction": ALONE}
+    return {"family": f"{result.id}: {what}", "members": 1, "correction": ALONE}
 
 
 NO_EVIDENCE: Final = "This does not show that there is no difference."
@@ -407,31 +407,31 @@ class Finding(Generic[R]):
             if not isinstance(value := getattr(cls, name), int | float):
                 raise StudyError(f"{cls.__name__} has the {name} {value!r}: give a number")
 
-    def __init__(self, found: BlockResult, results: Results, pictures: Mapping[str, Picture] | None = None) -> None:
-        self.found = found
+    def __init__(self, result: BlockResult, results: Results, pictures: Mapping[str, Picture] | None = None) -> None:
+        self.found = result
         self.results = results
-        self.value = self.of(found)
+        self.value = self.of(result)
         self._pictures = pictures or {}
 
     @classmethod
-    def of(cls, found: BlockResult) -> R:
+    def of(cls, result: BlockResult) -> R:
         """Return the value that was found in a block."""
-        return cast("R", found.findings.get(cls.key, cls.empty))
+        return cast("R", result.findings.get(cls.key, cls.empty))
 
     @classmethod
-    def add_to(cls, found: BlockResult, value: R) -> BlockResult:
+    def add_to(cls, result: BlockResult, value: R) -> BlockResult:
         """Return a block's findings with this value."""
-        return replace(found, findings={**found.findings, cls.key: value})
+        return replace(result, findings={**result.findings, cls.key: value})
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[R, Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[R, Absent]:
         """Return the value, of a block's answers and the findings with lower places, and what was not tested."""
         raise NotImplementedError
 
     @classmethod
-    def entries(cls, found: BlockResult) -> Mapping[str, Any]:
+    def entries(cls, result: BlockResult) -> Mapping[str, Any]:
         """Return the entries of report.json."""
-        return {cls.key: cls.of(found)}
+        return {cls.key: cls.of(result)}
 
     @classmethod
     def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterable[str]:

@@ -55,7 +55,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     figure_title = "Names given to each liquid"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[RecognitionResult | None, Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[RecognitionResult | None, Absent]:
         """Test whether settings were named for what they were."""
         labels = answers.decided.names
         right = tuple(setting.label for setting in answers.block.settings)
@@ -206,31 +206,31 @@ class Distinguished(Finding[None]):
 
         Exploratory tests count only where no primary one shows anything.
         """
-        found, named = self.found, LiquidRecognition.of(self.found)
+        result, named = self.found, LiquidRecognition.of(self.found)
         known = () if named is None else recognised(named, self.results.decided.alpha)
-        differing = [one for one in SettingsDiffer.of(found) if one.verdict in FOUND]
-        pairs = [((one.first, one.second), one.tested) for one in Pairs.of(found) if one.tested.verdict in FOUND]
-        if len(found.settings) == 2:
-            pairs = [((found.settings[0].code, found.settings[1].code), one) for one in differing]
-        verdicts = {one.verdict for one in (*differing, *(tested for _, tested in pairs))}
+        differing = [test for test in SettingsDiffer.of(result) if test.verdict in FOUND]
+        pairs = [((pair.first, pair.second), pair.tested) for pair in Pairs.of(result) if pair.tested.verdict in FOUND]
+        if len(result.settings) == 2:
+            pairs = [((result.settings[0].code, result.settings[1].code), test) for test in differing]
+        verdicts = {test.verdict for test in (*differing, *(tested for _, tested in pairs))}
         verdicts |= {named.verdict} if named is not None and known else set()
         verdict = "shown" if "shown" in verdicts else "suggested"
         apart = [
-            f"{name(found, first)} – {name(found, second)}".lower()
-            for (first, second), one in pairs
-            if one.verdict == verdict
+            f"{name(result, first)} – {name(result, second)}".lower()
+            for (first, second), test in pairs
+            if test.verdict == verdict
         ]
-        items = [f"“{short(found, one.item)}”" for one in differing if one.verdict == verdict]
+        items = [f"“{short(result, one.item)}”" for one in differing if one.verdict == verdict]
         if apart:
             text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
         elif items:
-            text = f"The {found.kind} were rated differently in {listed(items)}; the tests do not show which ones."
+            text = f"The {result.kind} were rated differently in {listed(items)}; the tests do not show which ones."
         else:
-            text = f"No statement showed a difference between any two {found.kind}."
+            text = f"No statement showed a difference between any two {result.kind}."
         if named is not None and named.found.p is not None:
-            names = listed([found.names[place].lower() for place in known])
+            names = listed([result.names[place].lower() for place in known])
             hits = (
-                f"Participants named {number(named.found.statistic, 0)} of {sum(one.n for one in named.found.rates)} "
+                f"Participants named {number(named.found.statistic, 0)} of {sum(rate.n for rate in named.found.rates)} "
                 f"liquids correctly ({number(named.found.expected, 1)} expected by chance, {p_equals(named.found.p)})."
             )
             text = f"{f'Recognised above chance: {names}.' if names else _NONE_RECOGNISED} {hits} {text}"

@@ -50,18 +50,18 @@ ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare
 
 
 def table_of_tests(
-    title: str, found: BlockResult, tests: Sequence[Tested], compared: Sequence[str] = ()
+    title: str, result: BlockResult, tests: Sequence[Tested], compared: Sequence[str] = ()
 ) -> Iterator[str]:
     """Yield a table of tests; ``compared`` are the names of what each of them compares."""
     if not tests:
         return
-    first, outcomes = tests[0], [one.outcome for one in tests]
-    intervals = dict.fromkeys(one.interval.method for one in outcomes if one.interval is not None)
-    reasons = dict.fromkeys(one.no_interval for one in outcomes if one.no_interval)
-    methods = dict.fromkeys(one.method for one in outcomes if one.p is not None)
+    first, outcomes = tests[0], [test.outcome for test in tests]
+    intervals = dict.fromkeys(outcome.interval.method for outcome in outcomes if outcome.interval is not None)
+    reasons = dict.fromkeys(outcome.no_interval for outcome in outcomes if outcome.no_interval)
+    methods = dict.fromkeys(outcome.method for outcome in outcomes if outcome.p is not None)
     family = dict.fromkeys(
-        f"p adjusted by {one.correction} over {number_text.counted(one.members, 'test')} (“{one.family}”)"
-        for one in tests
+        f"p adjusted by {test.correction} over {number_text.counted(test.members, 'test')} (“{test.family}”)"
+        for test in tests
     )
     two = isinstance(first.outcome, Paired) and len(compared) == 2
     above = f", above 0 if {compared[0]} was rated higher than {compared[1]}" if two else ""
@@ -69,14 +69,14 @@ def table_of_tests(
     yield heading(3, title)
     yield table_of(
         tests,
-        ("Statement", lambda one: short(found, one.item)),
-        ("n", lambda one: f"{one.outcome.n}" + (f" (−{one.outcome.dropped})" if one.outcome.dropped else "")),
-        ("Statistic", lambda one: statistic(one.outcome)),
-        ("p", lambda one: p_value(one.outcome.p)),
-        ("adjusted p", lambda one: p_value(one.p_adjusted)),
-        ("smallest p", lambda one: p_value(one.outcome.smallest_p)),
-        ("Effect", lambda one: number(one.outcome.effect)),
-        ("Interval", lambda one: interval(one.outcome.interval)),
+        ("Statement", lambda test: short(result, test.item)),
+        ("n", lambda test: f"{test.outcome.n}" + (f" (−{test.outcome.dropped})" if test.outcome.dropped else "")),
+        ("Statistic", lambda test: statistic(test.outcome)),
+        ("p", lambda test: p_value(test.outcome.p)),
+        ("adjusted p", lambda test: p_value(test.p_adjusted)),
+        ("smallest p", lambda test: p_value(test.outcome.smallest_p)),
+        ("Effect", lambda test: number(test.outcome.effect)),
+        ("Interval", lambda test: interval(test.outcome.interval)),
         ("Verdict", _verdict),
         last=1,
     )
@@ -89,13 +89,13 @@ def table_of_tests(
         yield paragraph(f"{'; '.join(map(number_text.capitalised, reasons))}.", "soft")
 
 
-def _verdict(one: Tested) -> str:
-    return one.verdict + (f" ({one.outcome.note})" if one.verdict == "not tested" and one.outcome.note else "")
+def _verdict(test: Tested) -> str:
+    return test.verdict + (f" ({test.outcome.note})" if test.verdict == "not tested" and test.outcome.note else "")
 
 
 def families(tests: Sequence[Tested]) -> str:
     """Return what is corrected together: primary statements, and apart from them the exploratory ones."""
-    each = sorted({(not one.primary, one.members, one.correction) for one in tests})
+    each = sorted({(not test.primary, test.members, test.correction) for test in tests})
     several = len(each) > 1
     return "with p adjusted " + listed(
         [
@@ -142,7 +142,7 @@ class StatementTests(Finding[tuple[Tested, ...]]):
         return ()
 
     def rows(self) -> Iterator[Row]:
-        return (judged_row(self.found, self.asks, one) for one in self.value)
+        return (judged_row(self.found, self.asks, test) for test in self.value)
 
     def section(self) -> Iterator[str]:
         return table_of_tests(self._said(self.title), self.found, self.value, self.compared())
@@ -165,7 +165,7 @@ class SettingsDiffer(StatementTests):
     title = "Do the {noun}s differ, statement by statement?"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         return compared(answers)
 
     def compared(self) -> Sequence[str]:
@@ -173,15 +173,15 @@ class SettingsDiffer(StatementTests):
 
     def methods(self) -> Iterator[str]:
         if tests := self.value:
-            one = _first_tested(tests)
+            test = _first_tested(tests)
             yield (
-                f"Each statement was tested by {test_name(one.outcome)} ({one.outcome.method}), {families(tests)}; the "
-                f"effect size is {one.outcome.effect_name}."
+                f"Each statement was tested by {test_name(test.outcome)} ({test.outcome.method}), {families(tests)}; "
+                f"the effect size is {test.outcome.effect_name}."
             )
 
 
 def _first_tested(tests: Sequence[Tested]) -> Tested:
-    return next((one for one in tests if one.outcome.p is not None), tests[0])
+    return next((test for test in tests if test.outcome.p is not None), tests[0])
 
 
 class DelayTrend(StatementTests):
@@ -198,7 +198,7 @@ class DelayTrend(StatementTests):
     title = "Do answers show a trend over the delay?"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
         outcomes: Mapping[str, Outcome]
@@ -214,7 +214,7 @@ class DelayTrend(StatementTests):
     def methods(self) -> Iterator[str]:
         if trends := self.value:
             decided = self.results.decided
-            by, sides = TRENDS[decided.trends], [decided.direction(one.item) is not None for one in trends]
+            by, sides = TRENDS[decided.trends], [decided.direction(test.item) is not None for test in trends]
             if decided.trends == "ranks":
                 by += f" ({_first_tested(trends).outcome.method.split(',')[0]})"
             stated = "before the first session" if decided.binding else "by the protocol"
@@ -244,9 +244,9 @@ class _SessionsDiffer(StatementTests):
         return [f"session {number}" for number in self.found.sessions]
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         """A participant's answers in a session are their median over the settings answered in all sessions."""
-        numbers = found.sessions
+        numbers = result.sessions
         if len(numbers) < 2:
             return (), ()
         outcomes = {}
@@ -257,7 +257,7 @@ class _SessionsDiffer(StatementTests):
             outcomes[item.id] = _alike(answers, medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1)))
         ungated = replace(answers, gate=0.0)  # sessions may differ where settings do not
         tested = in_family(outcomes, ungated, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False)
-        if all(one.outcome.n == 0 for one in tested):
+        if all(test.outcome.n == 0 for test in tested):
             return (), (NotTested(cls.what, "no participant answered the same setting in all sessions"),)
         return tested, ()
 
@@ -274,11 +274,11 @@ def gated(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[Blo
         values = np.array(list(answers.values.values()))
         return global_permutation(values, draws=draws or answers.draws_over_all, seed=answers.seed)
 
-    tests = [one.failures.attempt(OverAll.what, partial(test, one), block=one.block.id) for one in blocks]
-    adjusted = holm([one.p if isinstance(one, Outcome) else None for one in tests])
+    tests = [block.failures.attempt(OverAll.what, partial(test, block), block=block.block.id) for block in blocks]
+    adjusted = holm([test.p if isinstance(test, Outcome) else None for test in tests])
     return tuple(
-        replace(answers, over_all=one, gate=1.0 if p is None else p)
-        for answers, one, p in zip(blocks, tests, adjusted, strict=True)
+        replace(answers, over_all=test, gate=1.0 if p is None else p)
+        for answers, test, p in zip(blocks, tests, adjusted, strict=True)
     )
 
 
@@ -292,7 +292,7 @@ class OverAll(Finding[Outcome | None]):
     waits = ("liquids", "views")
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[Outcome | None, Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[Outcome | None, Absent]:
         if isinstance(answers.over_all, Failure):
             return None, (NotTested(cls.what, answers.over_all.why),)
         return answers.over_all, ()
@@ -349,7 +349,7 @@ class Effects(Finding[tuple[Effect, ...]]):
     figure_title = "Every participant's answers"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Effect, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Effect, ...], Absent]:
         if answers.verdicts_only or answers.k < 2:
             return (), ()
         codes = {column: code for code, column in reversed(answers.block.columns.items())}
@@ -368,40 +368,40 @@ class Effects(Finding[tuple[Effect, ...]]):
 
     def figure(self, drawing: Drawing) -> Picture | None:
         """Draw every participant's answers to each statement; of delays, their differences from the shortest."""
-        found, study = self.found, drawing.study
+        result, study = self.found, drawing.study
         if not self.value:
             return None
-        over_delay = bool(found.delays_ms)
+        over_delay = bool(result.delays_ms)
         bound = drawing.results.decided.equivalence_bound if over_delay else None
         answers = study.answers(drawing.block)
         people = sorted(answers["participant"].unique())
         codes = {column: code for code, column in reversed(drawing.block.columns.items())}
         panels = []
-        for item in found.items:
+        for item in result.items:
             values = by_participant(answers, people, drawing.block.columns, item.id)
             shown = values[:, 1:] - values[:, :1] if over_delay else values
             columns = []
             for place in range(shown.shape[1]):
                 numbers = dict(zip(people, shown[:, place].tolist(), strict=True))
                 numbers = {who: value for who, value in numbers.items() if not math.isnan(value)}
-                words = name(found, codes[place + over_delay]).removesuffix(" ms")
+                words = name(result, codes[place + over_delay]).removesuffix(" ms")
                 columns.append(Column(name=words, values=numbers, mean=mean_of(numbers.values())))
             panels.append(
                 Panel(
                     title=item.short,
                     columns=tuple(columns),
-                    places=found.delays_ms[1:],
+                    places=result.delays_ms[1:],
                     line=0.0 if over_delay else None,
                     bound=None if bound is None else (-bound, bound),
                     ends=None if over_delay else (LEVELS[0] - 0.5, LEVELS[-1] + 0.5),
                 )
             )
-        first = name(found, found.settings[0].code)
+        first = name(result, result.settings[0].code)
         what = f"Difference of each participant's answers from those at {first}" if over_delay else (
-            f"Each participant's answers about each {settings_noun(found)}"
+            f"Each participant's answers about each {settings_noun(result)}"
         )  # fmt: skip
         caption = (
-            f"{what} ({drawing.simulated}n = {found.n}). Diamonds: means with Student's 95 % interval, not corrected "
+            f"{what} ({drawing.simulated}n = {result.n}). Diamonds: means with Student's 95 % interval, not corrected "
             "for the number of intervals. The tests decide what is shown."
             + (f" Band: the equivalence bound, ±{bound:g}." if bound else "")
         )
@@ -414,7 +414,7 @@ class Effects(Finding[tuple[Effect, ...]]):
             shared=True,
         )
         title = f"Differences from {first}" if over_delay else self.figure_title
-        return drawing.picture(title, caption, draw, (f"n = {found.n}",), numbers_of_panels(panels))
+        return drawing.picture(title, caption, draw, (f"n = {result.n}",), numbers_of_panels(panels))
 
 
 @dataclass(frozen=True, slots=True)
@@ -446,7 +446,7 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
             f"over {math.comb(k, 2)} pairs, which is above {significant(alpha)}"
         )
         return (), (NotTested(Pairs.what, why),)
-    opened = [one.item for one in omnibus if one.verdict in ("shown", "suggested")]
+    opened = [test.item for test in omnibus if test.verdict in ("shown", "suggested")]
     if not opened:
         return (), (NotTested(Pairs.what, "no statement shows a difference between the settings"),)
     each = [(item, *two) for item in opened for two in combinations(range(k), 2)]
@@ -457,8 +457,8 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
     primary = [answers.decided.is_primary(item) for item, *_ in each]
     tested = in_family(outcomes, answers, f"{answers.block.id}: all pairs of settings", holm, HOLM, primary=primary)
     return tuple(
-        Pair(codes[first], codes[second], replace(one, item=item))
-        for (item, first, second), one in zip(each, tested, strict=True)
+        Pair(codes[first], codes[second], replace(test, item=item))
+        for (item, first, second), test in zip(each, tested, strict=True)
     ), ()
 
 
@@ -474,8 +474,8 @@ class Pairs(Finding[tuple[Pair, ...]]):
     empty = ()
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Pair, ...], Absent]:
-        return pairs_of(answers, SettingsDiffer.of(found))
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Pair, ...], Absent]:
+        return pairs_of(answers, SettingsDiffer.of(result))
 
     def rows(self) -> Iterator[Row]:
         for pair in self.value:
@@ -489,16 +489,16 @@ class Pairs(Finding[tuple[Pair, ...]]):
         yield heading(3, f"Which {settings_noun(self.found)}s differ?")
         yield table_of(
             pairs,
-            ("Statement", lambda one: short(self.found, one.tested.item)),
-            ("Pair", lambda one: f"{name(self.found, one.first)} – {name(self.found, one.second)}"),
-            ("n", lambda one: f"{one.tested.outcome.n} ({_differing(one)} differ)"),
-            ("V", lambda one: number(one.tested.outcome.statistic, 1)),
-            ("p", lambda one: p_value(one.tested.outcome.p)),
-            ("adjusted p", lambda one: p_value(one.tested.p_adjusted)),
-            ("smallest p", lambda one: p_value(one.tested.outcome.smallest_p)),
-            ("rank-biserial", lambda one: number(one.tested.outcome.effect)),
+            ("Statement", lambda pair: short(self.found, pair.tested.item)),
+            ("Pair", lambda pair: f"{name(self.found, pair.first)} – {name(self.found, pair.second)}"),
+            ("n", lambda pair: f"{pair.tested.outcome.n} ({_differing(pair)} differ)"),
+            ("V", lambda pair: number(pair.tested.outcome.statistic, 1)),
+            ("p", lambda pair: p_value(pair.tested.outcome.p)),
+            ("adjusted p", lambda pair: p_value(pair.tested.p_adjusted)),
+            ("smallest p", lambda pair: p_value(pair.tested.outcome.smallest_p)),
+            ("rank-biserial", lambda pair: number(pair.tested.outcome.effect)),
             ("Interval", _pair_interval),
-            ("Verdict", lambda one: one.tested.verdict),
+            ("Verdict", lambda pair: pair.tested.verdict),
             words=2,
             last=1,
         )
@@ -545,7 +545,7 @@ class MeanTests(StatementTests):
     title = "Do mean answers differ? (exploratory)"
 
     @classmethod
-    def test(cls, answers: BlockAnswers, found: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is one setting"),)
         if answers.block.kind == "delays" and answers.decided.trends == "slopes":
@@ -556,7 +556,7 @@ class MeanTests(StatementTests):
     def section(self) -> Iterator[str]:
         yield from super().section()
         effects = [
-            f"{short(self.found, one.item)}: "
+            f"{short(self.found, test.item)}: "
             + listed(
                 [
                     f"{number(slope)} {interval(ends)} (SD {number(sd)})"
@@ -564,8 +564,8 @@ class MeanTests(StatementTests):
                 ]
             )
             + (f", intercept SD {number(it.intercept_sd)}" if it.intercept_sd is not None else "")
-            for one in self.value
-            if isinstance(it := one.outcome, SlopeTest) and it.slopes
+            for test in self.value
+            if isinstance(it := test.outcome, SlopeTest) and it.slopes
         ]
         if effects:
             what = "Slopes per 100 ms of delay" if self.found.delays_ms else "Differences from the first setting"
@@ -576,13 +576,13 @@ class MeanTests(StatementTests):
             )
 
     @classmethod
-    def tested(cls, found: BlockResult) -> bool:
+    def tested(cls, result: BlockResult) -> bool:
         """Return whether any statement of a block was tested."""
-        return any(one.outcome.p is not None for one in cls.of(found))
+        return any(test.outcome.p is not None for test in cls.of(result))
 
     @classmethod
     def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterator[str]:
-        tests = {one.outcome.test for found in blocks for one in cls.of(found) if one.outcome.p is not None}
+        tests = {test.outcome.test for block in blocks for test in cls.of(block) if test.outcome.p is not None}
         if tests:
             how = {
                 HOTELLING: "differences between the settings were tested by Hotelling's T²",

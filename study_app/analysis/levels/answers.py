@@ -116,18 +116,18 @@ class Settings(LevelStatistic[SettingEstimate]):
 
     @property
     def _are_compared(self) -> bool:
-        return any(one.constant_error is not None for one in self.rows)
+        return any(row.constant_error is not None for row in self.rows)
 
     def shown(self) -> Sequence[Shown]:
         in_u = "decades" if self.found.spacing == "log" else self.found.unit or "units of the level"
         return (
             self.standard(),
             *OF_WHOM,
-            (f"PSE{unit(self.found)}", lambda one: digits(one.pse)),
+            (f"PSE{unit(self.found)}", lambda row: digits(row.pse)),
             INTERVAL,
-            (f"JND [{in_u}]", lambda one: digits(one.jnd)),
-            (f"constant error [{in_u}]", lambda one: signed(one.constant_error)) if self._are_compared else None,
-            (f"hysteresis [{in_u}]", lambda one: signed(one.hysteresis)),
+            (f"JND [{in_u}]", lambda row: digits(row.jnd)),
+            (f"constant error [{in_u}]", lambda row: signed(row.constant_error)) if self._are_compared else None,
+            (f"hysteresis [{in_u}]", lambda row: signed(row.hysteresis)),
         )
 
     def explained(self) -> str:
@@ -151,7 +151,7 @@ class Settings(LevelStatistic[SettingEstimate]):
             f"{title}: settings depend on how a participant decides that two stimuli are equal, so their "
             "scatter is not a criterion-free threshold."
         )
-        if few := [str(one.participant) for one in own if one.hysteresis is None]:
+        if few := [str(estimate.participant) for estimate in own if estimate.hysteresis is None]:
             words = "all settings started near the same end, so hysteresis is unknown"
             yield f"{title}: {words} ({listed(few[:_MOST_NAMED])})."
         yield f"{title}: {MOTORS}"
@@ -297,27 +297,27 @@ def _summarised(summary: Summary, bounds: tuple[float, float] | None, values: Ar
     return _Mean(value=float(values.mean()), low=low, high=high)
 
 
-def _of_group(found: LevelsResult) -> tuple[LevelAnswers, ...]:
+def _of_group(result: LevelsResult) -> tuple[LevelAnswers, ...]:
     """Return the answers of all participants together, in order of standard and level; without catch trials."""
-    return tuple(one for one in Answers.of(found) if one.participant is None and not one.catch)
+    return tuple(answer for answer in Answers.of(result) if answer.participant is None and not answer.catch)
 
 
-def people(found: LevelsResult) -> tuple[str, ...]:
+def people(result: LevelsResult) -> tuple[str, ...]:
     """Return the participants who answered."""
-    answered = {str(one.participant) for one in Answers.own(found)}
-    return tuple(sorted(answered | {str(one.participant) for one in Settings.own(found)}))
+    answered = {str(answer.participant) for answer in Answers.own(result)}
+    return tuple(sorted(answered | {str(setting.participant) for setting in Settings.own(result)}))
 
 
-def summary_words(found: LevelsResult) -> str:
+def summary_words(result: LevelsResult) -> str:
     """Return what a value at a level is: "share correct", "mean rating", "geometric mean of the numbers"."""
-    if found.summary == "share":
-        return "share correct" if found.counts == "correct" else f"share “{found.counts}”"
-    return "mean rating" if found.summary == "mean" else "geometric mean of the numbers"
+    if result.summary == "share":
+        return "share correct" if result.counts == "correct" else f"share “{result.counts}”"
+    return "mean rating" if result.summary == "mean" else "geometric mean of the numbers"
 
 
-def mean_words(found: LevelsResult) -> str:
+def mean_words(result: LevelsResult) -> str:
     """Return what a value of all participants is."""
-    return "geometric mean" if found.summary == "geometric mean" else "mean"
+    return "geometric mean" if result.summary == "geometric mean" else "mean"
 
 
 class Answers(LevelStatistic[LevelAnswers]):
@@ -329,62 +329,68 @@ class Answers(LevelStatistic[LevelAnswers]):
     compute = staticmethod(lambda block, opened, _study, found: _level_answers(block, opened, found.bounds))
 
     def section(self) -> Iterator[str]:
-        found = self.found
-        if not found.adaptive:
+        result = self.found
+        if not result.adaptive:
             yield self._of_group()
             units = (
                 " The interval ignores each participant's choice of unit: it uses ln answers minus the "
                 "participant's mean."
             )
             yield paragraph(
-                f"{mean_words(found).capitalize()} over the participants, with Student's 95 % interval if at "
+                f"{mean_words(result).capitalize()} over the participants, with Student's 95 % interval if at "
                 "least two participants differ. The rows below show each participant with the number of "
-                "answers." + (units if found.own_units else ""),
+                "answers." + (units if result.own_units else ""),
                 "soft",
             )
-        yield from drawn(self.pictures, f"levels-{found.block}")
-        if not found.adaptive:
-            for standard in sorted({one.standard for one in self.rows}, key=lambda one: one or 0.0):
+        yield from drawn(self.pictures, f"levels-{result.block}")
+        if not result.adaptive:
+            for standard in sorted({row.standard for row in self.rows}, key=lambda one: one or 0.0):
                 yield self._of_people(standard)
 
     def _value(self, value: float) -> str:
         return f"{100 * value:.0f} %" if self.found.summary == "share" else f"{value:.3g}"
 
     def _of_group(self) -> str:
-        found, rows = self.found, _of_group(self.found)
-        standards = any(one.standard is not None for one in rows)
-        alone = found.level_kind == "value" and not standards
+        result, rows = self.found, _of_group(self.found)
+        standards = any(row.standard is not None for row in rows)
+        alone = result.level_kind == "value" and not standards
         return table_of(
             rows,
-            (f"Standard{unit(found)}", lambda one: plain(one.standard)) if standards else None,
-            None if found.level_kind in {None, "value"} else (level_words(found), lambda one: plain(one.level)),
-            (level_words(found) if alone else f"Comparison{unit(found)}", lambda one: plain(one.comparison)),
-            ("participants", lambda one: str(one.participants)),
-            ("n", lambda one: str(one.n)),
-            (summary_words(found), lambda one: self._value(one.value)),
-            ("95 % interval", lambda one: between(one.low, one.high, self._value)),
-            words=1 if found.vary is None else 0,
+            (f"Standard{unit(result)}", lambda answers: plain(answers.standard)) if standards else None,
+            None
+            if result.level_kind in {None, "value"}
+            else (level_words(result), lambda answers: plain(answers.level)),
+            (level_words(result) if alone else f"Comparison{unit(result)}", lambda answers: plain(answers.comparison)),
+            ("participants", lambda answers: str(answers.participants)),
+            ("n", lambda answers: str(answers.n)),
+            (summary_words(result), lambda answers: self._value(answers.value)),
+            ("95 % interval", lambda answers: between(answers.low, answers.high, self._value)),
+            words=1 if result.vary is None else 0,
         )
 
     def _of_people(self, standard: float | None) -> str:
         """Return a row per participant, a column per level."""
-        shown = [one for one in _of_group(self.found) if one.standard == standard]
+        shown = [answers for answers in _of_group(self.found) if answers.standard == standard]
         own = {
-            (one.participant, one.level, one.comparison): one
-            for one in self.rows
-            if one.standard == standard and not one.catch
+            (row.participant, row.level, row.comparison): row
+            for row in self.rows
+            if row.standard == standard and not row.catch
         }
 
         def cell(person: str, level: LevelAnswers) -> str:
-            one = own.get((person, level.level, level.comparison))
-            if one is None:
+            answers = own.get((person, level.level, level.comparison))
+            if answers is None:
                 return "–"
-            return f"{self._value(one.value)} ({one.n})" if one.count is None else f"{one.count}/{one.n}"
+            return (
+                f"{self._value(answers.value)} ({answers.n})"
+                if answers.count is None
+                else f"{answers.count}/{answers.n}"
+            )
 
-        names = [plain(one.comparison if one.level is None else one.level) for one in shown]
+        names = [plain(answers.comparison if answers.level is None else answers.level) for answers in shown]
         return table(
             ("Participant" if standard is None else f"Standard {with_unit(self.found, standard)}", *names),
-            [[person, *(cell(person, one) for one in shown)] for person in people(self.found)],
+            [[person, *(cell(person, answers) for answers in shown)] for person in people(self.found)],
         )
 
     def methods(self, block: LevelBlock) -> Iterator[str]:

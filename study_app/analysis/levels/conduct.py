@@ -106,25 +106,25 @@ class Delivery(LevelStatistic[_Row]):
     compute = staticmethod(lambda block, opened, study, _found: _level_conduct(block, opened, study.intervals))
 
     def standard(self) -> Shown:
-        if all(one["standard"] is None for one in self.rows):
+        if all(row["standard"] is None for row in self.rows):
             return None
-        return f"Standard{unit(self.found)}", lambda one: digits(one["standard"], 4)
+        return f"Standard{unit(self.found)}", lambda row: digits(row["standard"], 4)
 
     def shown(self) -> Sequence[Shown]:
         decimals, of = (4, "") if self.found.level_kind == "weber" else (3, unit(self.found))
         return (
             self.standard(),
-            ("trials", lambda one: str(one["trials"])),
-            ("repeated attempts", lambda one: str(one["repeated"])),
-            ("measured", lambda one: str(one["measured"])),
-            (f"level error{of}, mean", lambda one: number(one["error_mean"], decimals)),
-            ("largest", lambda one: number(one["error_largest"], decimals)),
-            ("hand speed, RMS [m/s]", lambda one: number(one["pace_mps"], 3)),
-            ("apparent mass [kg]", lambda one: number(one["apparent_mass_kg"], 3)),
+            ("trials", lambda row: str(row["trials"])),
+            ("repeated attempts", lambda row: str(row["repeated"])),
+            ("measured", lambda row: str(row["measured"])),
+            (f"level error{of}, mean", lambda row: number(row["error_mean"], decimals)),
+            ("largest", lambda row: number(row["error_largest"], decimals)),
+            ("hand speed, RMS [m/s]", lambda row: number(row["pace_mps"], 3)),
+            ("apparent mass [kg]", lambda row: number(row["apparent_mass_kg"], 3)),
         )
 
     def explained(self) -> str:
-        reasons = sum((Counter(one["reasons"]) for one in self.rows), Counter[str]())
+        reasons = sum((Counter(row["reasons"]) for row in self.rows), Counter[str]())
         named = [
             f"{name.rpartition('_')[0].replace('_', ' ') or name} in {counted(count, 'interval')}"
             for name, count in reasons.most_common()
@@ -134,7 +134,7 @@ class Delivery(LevelStatistic[_Row]):
             f"Limits that intervals exceeded: {listed(named)}." if reasons else "All intervals were within the limits."
         )
         mass = f" Apparent mass: least-squares fit of F = −b v − m a to the force sent{with_estimator}."
-        mass = mass if any(one["apparent_mass_kg"] is not None for one in self.rows) else ""
+        mass = mass if any(row["apparent_mass_kg"] is not None for row in self.rows) else ""
         return (
             "Level error is the delivered minus the requested level, from the recorded samples (for delays "
             f"from the frames); fits use delivered levels.{mass} {kept}"
@@ -157,11 +157,11 @@ class _CatchTrials(LevelStatistic[_Row]):
 
     def shown(self) -> Sequence[Shown]:
         return (
-            ("Participant", lambda one: one["participant"]),
-            ("session", lambda one: str(one["session"])),
-            ("n", lambda one: str(one["n"])),
-            ("incorrect", lambda one: str(one["wrong"])),
-            ("share", lambda one: f"{100 * one['wrong'] / one['n']:.0f} %"),
+            ("Participant", lambda row: row["participant"]),
+            ("session", lambda row: str(row["session"])),
+            ("n", lambda row: str(row["n"])),
+            ("incorrect", lambda row: str(row["wrong"])),
+            ("share", lambda row: f"{100 * row['wrong'] / row['n']:.0f} %"),
             ("rule", _rule),
         )
 
@@ -183,9 +183,9 @@ class _Withheld(LevelStatistic[_Row]):
         return (
             self.standard(),
             (f"Level{unit(self.found)}", _levels),
-            ("intervals", lambda one: str(one["n"])),
-            ("mean", lambda one: f"{one['mean_percent']:.1f} %"),
-            ("most", lambda one: f"{one['most_percent']:.1f} %"),
+            ("intervals", lambda row: str(row["n"])),
+            ("mean", lambda row: f"{row['mean_percent']:.1f} %"),
+            ("most", lambda row: f"{row['most_percent']:.1f} %"),
         )
 
     def explained(self) -> str:
@@ -199,8 +199,8 @@ class _Withheld(LevelStatistic[_Row]):
     def _up_to(self) -> Iterator[str]:
         """Yield for each standard up to which level hardly anything was withheld in any comparison."""
         of = f" {self.found.unit}" if self.found.unit else ""
-        for standard in dict.fromkeys(one["standard"] for one in self.rows):
-            rows = [one for one in self.rows if one["standard"] == standard]
+        for standard in dict.fromkeys(row["standard"] for row in self.rows):
+            rows = [row for row in self.rows if row["standard"] == standard]
             kept = list(takewhile(lambda one: one["most_percent"] <= WITHHELD_PERCENT, rows))
             at = "" if standard is None else f" at the standard of {standard:.4g}{of}"
             until = f"up to {kept[-1]['high']:.3g}{of}" if kept else "not at any level presented"

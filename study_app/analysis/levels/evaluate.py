@@ -45,16 +45,16 @@ def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[Level
 def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opened: pd.DataFrame | None) -> LevelsResult:
     counted = timed[(timed["block"] == block.id) & timed["counted"] & timed["response"].notna()]
     stimulus = block.stimulus
-    found = LevelsResult(
+    result = LevelsResult(
         block=block.id,
         title=block.title,
         design=block.design.kind,
         revealed=opened is not None,
-        times=tuple(_times(counted, block, one) for one in block.settings),
+        times=tuple(_times(counted, block, setting) for setting in block.settings),
         summary=SUMMARIES[block.design.reply],
         counts=block.counts,
         guess_rate=block.design.guess_rate if block.has_correct_answer else None,
-        bounds=next((one.bounds for one in study.others.questions if one.where.id == block.id), None),
+        bounds=next((question.bounds for question in study.others.questions if question.where.id == block.id), None),
         own_units=chooses_units(block),
         family=None if block.assumed is None else block.assumed.family,
         adaptive=block.method is not None and block.method.adaptive,
@@ -62,8 +62,8 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
         device=study.own_dynamics,
     )
     if stimulus is not None:
-        found = replace(
-            found,
+        result = replace(
+            result,
             vary=stimulus.vary,
             quantity=quantity_words(stimulus.vary),
             unit=quantity(stimulus.vary).unit,
@@ -71,10 +71,10 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
             spacing=stimulus.spacing,
         )
     if opened is not None:
-        for one in statistics():
-            rows = tuple(one.compute(block, opened, study, found))
-            found = replace(found, statistics={**found.statistics, one.key: rows})
-    return found
+        for statistic in statistics():
+            rows = tuple(statistic.compute(block, opened, study, result))
+            result = replace(result, statistics={**result.statistics, statistic.key: rows})
+    return result
 
 
 def _times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupAnswers:
@@ -83,57 +83,61 @@ def _times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupA
     return GroupAnswers(setting.code, setting_name(setting, block.settings), numbers)
 
 
-def level_section(found: LevelsResult, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
+def level_section(result: LevelsResult, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
     """Yield what a block's section says in addition to the counts of its answers.
 
     ``estimator`` is the name of the servo's velocity estimator, None where the receipt has none.
     """
     yield heading(3, "Time to answer")
     yield table_of(
-        found.times,
-        ("Setting" if found.revealed else "Code", lambda one: one.name),
-        ("n", lambda one: str(one.numbers["n"])),
-        ("median [s]", lambda one: number(one.numbers["median"])),
-        ("quartiles [s]", lambda one: between(one.numbers["q1"], one.numbers["q3"], number)),
+        result.times,
+        ("Setting" if result.revealed else "Code", lambda answers: answers.name),
+        ("n", lambda answers: str(answers.numbers["n"])),
+        ("median [s]", lambda answers: number(answers.numbers["median"])),
+        ("quartiles [s]", lambda answers: between(answers.numbers["q1"], answers.numbers["q3"], number)),
     )
-    at_each = "Answers at each level" if found.vary is not None or not found.revealed else "Answers"
-    if not Settings.of(found):
-        yield heading(3, "Answers against levels" if found.adaptive else at_each)
-    if not found.revealed:
+    at_each = "Answers at each level" if result.vary is not None or not result.revealed else "Answers"
+    if not Settings.of(result):
+        yield heading(3, "Answers against levels" if result.adaptive else at_each)
+    if not result.revealed:
         yield paragraph(_SEALED)
         return
-    if not Settings.of(found) and not Answers.of(found):
+    if not Settings.of(result) and not Answers.of(result):
         yield paragraph("There are no answers to analyse yet.")
         return
-    for one in (Settings,) if Settings.of(found) else statistics():
-        yield from one(found, {picture.name: picture for picture in pictures}, estimator).section()
+    for statistic in (Settings,) if Settings.of(result) else statistics():
+        yield from statistic(result, {picture.name: picture for picture in pictures}, estimator).section()
 
 
-def level_findings(found: LevelsResult) -> Iterator[str]:
+def level_findings(result: LevelsResult) -> Iterator[str]:
     """Yield the findings of a block with n and interval; none while the key is sealed."""
-    sentences = [line for one in statistics() for line in one(found).sentences()]
+    sentences = [line for statistic in statistics() for line in statistic(result).sentences()]
     yield from sentences
-    if sentences and found.published:
-        yield f"{found.title}: published values: {'; '.join(published_words(one) for one in found.published)}."
+    if sentences and result.published:
+        yield f"{result.title}: published values: {'; '.join(map(published_words, result.published))}."
 
 
-def level_limits(found: LevelsResult) -> Iterator[str]:
+def level_limits(result: LevelsResult) -> Iterator[str]:
     """Yield what the statistics of a block cannot show."""
-    for one in statistics():
-        yield from one(found).limits()
+    for statistic in statistics():
+        yield from statistic(result).limits()
 
 
 def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsResult]) -> Iterator[str]:
     """Yield the sentences about blocks whose key is open and that have answers."""
     by_id = {block.id: block for block in blocks}
-    opened = [found for found in levels if found.revealed and (Answers.of(found) or Settings.of(found))]
-    for found in opened:
-        for one in statistics():
-            yield from one(found).methods(by_id[found.block])
+    opened = [level for level in levels if level.revealed and (Answers.of(level) or Settings.of(level))]
+    for result in opened:
+        for statistic in statistics():
+            yield from statistic(result).methods(by_id[result.block])
     for one in statistics():
         yield from one.common_methods(opened)
 
 
-def level_entries(found: LevelsResult) -> dict[str, Any]:
+def level_entries(result: LevelsResult) -> dict[str, Any]:
     """Return the entries of report.json of a block's statistics; those of later formats only where there are rows."""
-    return {one.key: one.of(found) for one in statistics() if one.since == 1 or one.of(found)}
+    return {
+        statistic.key: statistic.of(result)
+        for statistic in statistics()
+        if statistic.since == 1 or statistic.of(result)
+    }

@@ -85,14 +85,19 @@ def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
 
     It is further from 0 than `_BIASED` and than twice its standard error.
     """
-    found = dict[str, list[tuple[float, float]]]()
-    for one in of_people:
-        if one.participant is None or one.criterion is None or one.d_prime is None or one.high is None:
+    counts = dict[str, list[tuple[float, float]]]()
+    for estimate in of_people:
+        if (
+            estimate.participant is None
+            or estimate.criterion is None
+            or estimate.d_prime is None
+            or estimate.high is None
+        ):
             continue
-        error = (one.high - one.d_prime) / Z_95 / math.sqrt(2)  # of a criterion, whose rates are those of d′
-        found.setdefault(one.participant, []).append((one.criterion, error))
-    means = {person: np.mean([criterion for criterion, _ in rows]) for person, rows in found.items()}
-    errors = {person: math.hypot(*(error for _, error in rows)) / len(rows) for person, rows in found.items()}
+        error = (estimate.high - estimate.d_prime) / Z_95 / math.sqrt(2)  # of a criterion, whose rates are those of d′
+        counts.setdefault(estimate.participant, []).append((estimate.criterion, error))
+    means = {person: np.mean([criterion for criterion, _ in rows]) for person, rows in counts.items()}
+    errors = {person: math.hypot(*(error for _, error in rows)) / len(rows) for person, rows in counts.items()}
     return {person: float(mean) for person, mean in means.items() if abs(mean) > max(_BIASED, 2 * errors[person])}
 
 
@@ -105,13 +110,13 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
             for which, some in rows.groupby(by, dropna=False, sort=True):
                 where = {"standard": number_or_none(which)} if by == "standard" else {"comparison": str(which)}
                 people = some.groupby("participant", sort=True)
-                yield from _with_group([_of_choices(block, str(person), one, where) for person, one in people])
+                yield from _with_group([_of_choices(block, str(person), frame, where) for person, frame in people])
         case "rating":
             lowest, *levels = sorted(rows["level"].dropna().unique()) or [None]
             for level in levels:
                 people = rows.groupby("participant", sort=True)
-                own = [_of_ratings(str(person), one, lowest, level) for person, one in people]
-                yield from _with_group([one for one in own if one is not None])
+                own = [_of_ratings(str(person), frame, lowest, level) for person, frame in people]
+                yield from _with_group([estimate for estimate in own if estimate is not None])
         case "number" | "setting":
             return
 
@@ -119,16 +124,16 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
 def _with_group(own: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
     """Yield the means over participants, followed by those of each."""
     if own:
-        shares = {answer: float(np.mean([one.shares[answer] for one in own])) for answer in own[0].shares}
+        shares = {answer: float(np.mean([estimate.shares[answer] for estimate in own])) for answer in own[0].shares}
         yield replace(mean_over(own, "d_prime", "criterion", "other"), shares=shares)
     yield from own
 
 
 def _of_ratings(person: str, rows: pd.DataFrame, lowest: float, level: float) -> SensitivityEstimate | None:
     noise, signal = (rows.loc[rows["level"] == at, "value"].dropna().to_numpy(float) for at in (lowest, level))
-    found = rating(noise, signal)
-    one = SensitivityEstimate(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
-    return None if found is None else _measured(one, found)
+    sensitivity = rating(noise, signal)
+    estimate = SensitivityEstimate(participant=person, n=len(noise) + len(signal), shares={}, level=float(level))
+    return None if sensitivity is None else _measured(estimate, sensitivity)
 
 
 def _of_choices(
@@ -138,41 +143,41 @@ def _of_choices(
     pairs = zip(rows["arrangement"].astype(str), rows["response"].astype(str), strict=True)
     counts = Counter((arrangement_of(design, letters), answer) for letters, answer in pairs)
     given = Counter(rows["response"].astype(str))
-    found = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
+    sensitivity = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
     shares = {answer: given[answer] / len(rows) for answer in design.answers}
-    one = SensitivityEstimate(participant=person, n=len(rows), shares=shares, **where)  # type: ignore[arg-type]  # standard or comparison
-    if found is None:
-        return one
-    measured = _measured(one, found)
-    return _with_ends(measured, design, counts, found.model) if design.kind in _FROM_SHARE_CORRECT else measured
+    estimate = SensitivityEstimate(participant=person, n=len(rows), shares=shares, **where)  # type: ignore[arg-type]  # standard or comparison
+    if sensitivity is None:
+        return estimate
+    measured = _measured(estimate, sensitivity)
+    return _with_ends(measured, design, counts, sensitivity.model) if design.kind in _FROM_SHARE_CORRECT else measured
 
 
 def _with_ends(
-    one: SensitivityEstimate, design: Design, counts: Mapping[tuple[int, str], int], model: Model | None
+    estimate: SensitivityEstimate, design: Design, counts: Mapping[tuple[int, str], int], model: Model | None
 ) -> SensitivityEstimate:
     """Return an estimate with d′ at the ends of the interval of the share correct; as it is if all are correct."""
     correct, n = design.correct_of(counts)
     if correct == n:
-        return one
+        return estimate
     share, task = clopper_pearson(correct, n), f"{design.kind}{f' {model}' if model else ''}"
-    return replace(one, low=d_prime_at(task, share.low), high=d_prime_at(task, share.high))
+    return replace(estimate, low=d_prime_at(task, share.low), high=d_prime_at(task, share.high))
 
 
-def _measured(one: SensitivityEstimate, found: Sensitivity) -> SensitivityEstimate:
-    half = math.nan if found.variance is None else Z_95 * math.sqrt(found.variance)
+def _measured(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> SensitivityEstimate:
+    half = math.nan if sensitivity.variance is None else Z_95 * math.sqrt(sensitivity.variance)
     return replace(
-        one,
-        d_prime=found.d_prime,
-        low=number_or_none(found.d_prime - half),
-        high=number_or_none(found.d_prime + half),
-        criterion=found.criterion,
-        model=found.model,
-        other=found.other,
+        estimate,
+        d_prime=sensitivity.d_prime,
+        low=number_or_none(sensitivity.d_prime - half),
+        high=number_or_none(sensitivity.d_prime + half),
+        criterion=sensitivity.criterion,
+        model=sensitivity.model,
+        other=sensitivity.other,
     )
 
 
-def _where(one: SensitivityEstimate) -> str:
-    return plain(one.comparison or (one.level if one.standard is None else one.standard))
+def _where(estimate: SensitivityEstimate) -> str:
+    return plain(estimate.comparison or (estimate.level if estimate.standard is None else estimate.standard))
 
 
 class Sensitivities(LevelStatistic[SensitivityEstimate]):
@@ -189,33 +194,41 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
     compute = staticmethod(lambda block, opened, _study, _found: sensitivities(block, opened))
 
     def exported(self) -> Iterator[Mapping[str, Any]]:
-        exponents = {one.participant: one.exponent for one in Exponents.of(self.found)}
-        thresholds = {(one.participant, one.standard): one for one in Thresholds.own(self.found)}
+        exponents = {exponent.participant: exponent.exponent for exponent in Exponents.of(self.found)}
+        thresholds = {
+            (threshold.participant, threshold.standard): threshold for threshold in Thresholds.own(self.found)
+        }
         columns = RESULTS[self.table].columns
-        for one in self.own(self.found):
-            if one.level is not None:
+        for estimate in self.own(self.found):
+            if estimate.level is not None:
                 continue
-            row = {column.name: getattr(one, column.name, None) for column in columns}
-            row |= {"low": None, "high": None, "participant": one.participant, "block": self.found.block}
-            if one.comparison is None and (threshold := thresholds.get((one.participant, one.standard))) is not None:
+            row = {column.name: getattr(estimate, column.name, None) for column in columns}
+            row |= {"low": None, "high": None, "participant": estimate.participant, "block": self.found.block}
+            if (
+                estimate.comparison is None
+                and (threshold := thresholds.get((estimate.participant, estimate.standard))) is not None
+            ):
                 known = {column.name: getattr(threshold, column.name, None) for column in columns}
                 row |= {name: value for name, value in known.items() if value is not None}
-                row |= {"flat_width_threshold": threshold.flat_width, "weber_exponent": exponents.get(one.participant)}
+                row |= {
+                    "flat_width_threshold": threshold.flat_width,
+                    "weber_exponent": exponents.get(estimate.participant),
+                }
             yield row | {
-                "condition": one.comparison,
-                "d_prime_model": one.model,
-                "d_prime_other": one.other,
-                "share_first": next(iter(one.shares.values()), None),
+                "condition": estimate.comparison,
+                "d_prime_model": estimate.model,
+                "d_prime_other": estimate.other,
+                "share_first": next(iter(estimate.shares.values()), None),
             }
 
     def shown(self) -> Sequence[Shown]:
         first = self.rows[0]
         where = "Comparison" if first.level is None else "Level"
-        measured = any(one.d_prime is not None for one in self.rows)
-        biased = any(one.criterion is not None for one in self.rows)
+        measured = any(row.d_prime is not None for row in self.rows)
+        biased = any(row.criterion is not None for row in self.rows)
         answers = tuple(first.shares)
         shares: list[Shown] = [
-            (f"“{answer.replace('_', ' ')}”", lambda one, answer=answer: f"{100 * one.shares[answer]:.0f} %")  # type: ignore[misc]
+            (f"“{answer.replace('_', ' ')}”", lambda row, answer=answer: f"{100 * row.shares[answer]:.0f} %")  # type: ignore[misc]
             for answer in (answers[:1] if len(answers) == 2 else answers)
         ]
         return (
@@ -223,9 +236,9 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
             if len(set(map(_where, self.rows))) > 1
             else None,
             *OF_WHOM,
-            ("d′", lambda one: number(one.d_prime)) if measured else None,
+            ("d′", lambda row: number(row.d_prime)) if measured else None,
             INTERVAL_2 if measured else None,
-            ("k" if self.found.design == "samedifferent" else "c", lambda one: number(one.criterion))
+            ("k" if self.found.design == "samedifferent" else "c", lambda row: number(row.criterion))
             if biased
             else None,
             *shares,
@@ -243,7 +256,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
 
     def explained(self) -> str:
         shares = "Percentages refer to the answers." if self.rows[0].shares else ""
-        if all(one.d_prime is None for one in self.rows):
+        if all(row.d_prime is None for row in self.rows):
             return shares
         over = "over all levels presented" if self.found.vary is not None else "for each comparison"
         if self.found.summary == "mean":
@@ -256,7 +269,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        if any(one.d_prime is not None for found in blocks for one in cls.of(found)):
+        if any(estimate.d_prime is not None for block in blocks for estimate in cls.of(block)):
             yield (
                 "Sensitivity is d′ from rates with the log-linear correction (Hautus 1995), by the model of each "
                 "design (Macmillan & Creelman 2005)."

@@ -63,22 +63,22 @@ class LevelStatistic(Generic[R]):
     table: ClassVar[str] = ""
 
     def __init__(
-        self, found: LevelsResult, pictures: Mapping[str, Picture] | None = None, estimator: str | None = None
+        self, result: LevelsResult, pictures: Mapping[str, Picture] | None = None, estimator: str | None = None
     ) -> None:
-        self.found = found
-        self.rows = self.of(found)
+        self.found = result
+        self.rows = self.of(result)
         self.pictures = pictures or {}
         self.estimator = estimator
 
     @classmethod
-    def of(cls, found: LevelsResult) -> tuple[R, ...]:
+    def of(cls, result: LevelsResult) -> tuple[R, ...]:
         """Return its rows in a block."""
-        return found.statistics.get(cls.key, ())
+        return result.statistics.get(cls.key, ())
 
     @classmethod
-    def own(cls, found: LevelsResult) -> tuple[R, ...]:
+    def own(cls, result: LevelsResult) -> tuple[R, ...]:
         """Return its rows of participants in a block."""
-        return tuple(one for one in cls.of(found) if getattr(one, "participant", None) is not None)
+        return tuple(one for one in cls.of(result) if getattr(one, "participant", None) is not None)
 
     @classmethod
     def exported_in(cls, study: Study) -> bool:
@@ -105,7 +105,9 @@ class LevelStatistic(Generic[R]):
         yield table_of(self.rows, *columns, words=int(columns[0][0] == "Participant"))
         if words := self.explained():
             yield paragraph(words, "soft")
-        if published := [published_words(one) for one in self.found.published if self.compares(one.measure)]:
+        if published := [
+            published_words(published) for published in self.found.published if self.compares(published.measure)
+        ]:
             yield paragraph(f"Published: {'; '.join(published)}.")
         for name in self.figures:
             yield from drawn(self.pictures, f"{name}-{self.found.block}")
@@ -146,15 +148,15 @@ class LevelStatistic(Generic[R]):
 
         if len(set(map(standard, self.rows))) < 2:
             return None
-        return f"Standard{unit(self.found)}", lambda one: digits(standard(one), 4)
+        return f"Standard{unit(self.found)}", lambda row: digits(standard(row), 4)
 
 
 @cache
 def statistics() -> tuple[type[LevelStatistic[Any]], ...]:
     """Return every statistic of the modules of this folder, in the order of their places."""
-    held = {one for module in modules_of(levels) for one in vars(module).values() if isinstance(one, type)}
-    found = {one for one in held if issubclass(one, LevelStatistic) and hasattr(one, "key")}
-    return tuple(sorted(found, key=lambda one: one.place))
+    held = {var for module in modules_of(levels) for var in vars(module).values() if isinstance(var, type)}
+    classes = {one for one in held if issubclass(one, LevelStatistic) and hasattr(one, "key")}
+    return tuple(sorted(classes, key=lambda one: one.place))
 
 
 def digits(value: float | None, count: int = 3) -> str:
@@ -177,41 +179,41 @@ def between(low: float | None, high: float | None, written: Callable[[float], st
     return "–" if low is None or high is None else f"{written(low)} – {written(high)}"
 
 
-def unit(found: LevelsResult) -> str:
+def unit(result: LevelsResult) -> str:
     """Return the unit of the varied number in brackets."""
-    return f" [{found.unit}]" if found.unit else ""
+    return f" [{result.unit}]" if result.unit else ""
 
 
 OF_WHOM: Final[tuple[tuple[str, Callable[[Any], str]], ...]] = (
-    ("Participant", lambda one: one.participant or f"group of {one.n}"),
-    ("n", lambda one: "–" if one.participant is None else str(one.n)),
+    ("Participant", lambda row: row.participant or f"group of {row.n}"),
+    ("n", lambda row: "–" if row.participant is None else str(row.n)),
 )
 """The columns that say of whom a row is."""
-INTERVAL: Final[Shown] = ("95 % interval", lambda one: between(one.low, one.high))
-INTERVAL_2: Final[Shown] = ("95 % interval", lambda one: between(one.low, one.high, number))
+INTERVAL: Final[Shown] = ("95 % interval", lambda row: between(row.low, row.high))
+INTERVAL_2: Final[Shown] = ("95 % interval", lambda row: between(row.low, row.high, number))
 """With two decimals."""
 
 KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}
 _LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
 
 
-def level_words(found: LevelsResult) -> str:
+def level_words(result: LevelsResult) -> str:
     """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
-    if found.quantity is None:
+    if result.quantity is None:
         return "Condition"
-    words = f"{_LEVELS[found.level_kind]}{found.quantity}"
-    return words[:1].upper() + words[1:] + ("" if found.level_kind == "weber" else unit(found))
+    words = f"{_LEVELS[result.level_kind]}{result.quantity}"
+    return words[:1].upper() + words[1:] + ("" if result.level_kind == "weber" else unit(result))
 
 
-def with_unit(found: LevelsResult, value: float) -> str:
+def with_unit(result: LevelsResult, value: float) -> str:
     """Return a value of the varied number with its unit."""
-    return f"{value:g} {found.unit or ''}".rstrip()
+    return f"{value:g} {result.unit or ''}".rstrip()
 
 
-def standards_of(found: LevelsResult, rows: Iterable[Any]) -> str:
+def standards_of(result: LevelsResult, rows: Iterable[Any]) -> str:
     """Return the standards of rows in words: " of 4 and 8 N·s/m"; nothing without any."""
-    standards = sorted({one.standard for one in rows if one.standard is not None})
-    return f" of {listed([f'{one:g}' for one in standards])} {found.unit}".rstrip() if standards else ""
+    standards = sorted({row.standard for row in rows if row.standard is not None})
+    return f" of {listed([f'{standard:g}' for standard in standards])} {result.unit}".rstrip() if standards else ""
 
 
 def interval_words(one: Any, written: Callable[[float], str]) -> str:

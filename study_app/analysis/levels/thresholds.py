@@ -156,9 +156,9 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
     for standard, at_standard in _answered(block, opened).groupby("standard", dropna=False, sort=True):
         fits, priors = _fits(block, assumed, at_standard[at_standard["analysed"]])
         heard = dict(list(at_standard.groupby("participant")))
-        own = [_own(block, stimulus, standard, one, heard[one.person]) for one in fits]
+        own = [_own(block, stimulus, standard, fit, heard[fit.person]) for fit in fits]
         if priors is not None:
-            yield _group(stimulus, standard, own, priors, early_change([(one.fit, one.posterior) for one in fits]))
+            yield _group(stimulus, standard, own, priors, early_change([(fit.fit, fit.posterior) for fit in fits]))
         yield from own
 
 
@@ -195,7 +195,7 @@ def _fits(block: LevelBlock, assumed: Assumed, rows: pd.DataFrame) -> tuple[list
     fits, of_people = _flat_fits(block, rows), dict(list(rows.groupby("participant")))
     if not fits:
         return [], None
-    priors = group_priors([one.flat for one in fits.values()], assumed.width_prior)
+    priors = group_priors([fit.flat for fit in fits.values()], assumed.width_prior)
     return [
         FittedPerson(person, of_people[person], fit, factors)
         for (person, fit), factors in zip(fits.items(), priors.factors, strict=True)
@@ -223,7 +223,9 @@ def thresholds_compared(
         rows = _answered(block, opened)
         at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
         of_blocks.append([_flat_fits(block, at_standard) for _, at_standard in at_standards])
-    stimuli = [(one.stimulus and one.stimulus.model_copy(update={"condition": None}), one.assumed) for one in blocks]
+    stimuli = [
+        (block.stimulus and block.stimulus.model_copy(update={"condition": None}), block.assumed) for block in blocks
+    ]
     alike = stimuli[0] == stimuli[1] and first.design == second.design and len(of_blocks[0]) == len(of_blocks[1])
     found: tuple[dict[str, list[Posterior]], ...] = ({}, {})
     shared = 0.0
@@ -233,7 +235,7 @@ def thresholds_compared(
             others = of_blocks[1 - place][standard] if alike else {}
             if prior is None or not people:
                 continue
-            fits = [one.flat for one in (*people.values(), *others.values())]
+            fits = [fit.flat for fit in (*people.values(), *others.values())]
             priors = group_priors(fits, prior.width_prior)
             shared += 0.0 if alike else priors.variance / len(of_block)
             for (person, fit), factors in zip(people.items(), priors.factors, strict=False):
@@ -241,8 +243,8 @@ def thresholds_compared(
     first_of, second_of = (
         {
             person: ThresholdInU(
-                value=float(np.mean([one.threshold for one in each])),
-                variance=sum(one.variance for one in each) / len(each) ** 2,
+                value=float(np.mean([posterior.threshold for posterior in each])),
+                variance=sum(posterior.variance for posterior in each) / len(each) ** 2,
             )
             for person, each in of_block.items()
         }
@@ -267,11 +269,11 @@ def _own(
     block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: FittedPerson, heard: pd.DataFrame
 ) -> ThresholdEstimate:
     """Return a participant's threshold; ``heard`` are also the rows that are not analysed."""
-    fit, found, rows = fitted.fit, fitted.posterior, fitted.rows
-    given, grid = fit.given, found.grid
-    level_of, threshold, (low, high) = stimulus.level_of, found.threshold, found.interval
-    others = found.others
-    psi, (lowest, highest) = fit.expected(found), stimulus.domain
+    fit, posterior, rows = fitted.fit, fitted.posterior, fitted.rows
+    given, grid = fit.given, posterior.grid
+    level_of, threshold, (low, high) = stimulus.level_of, posterior.threshold, posterior.interval
+    others = posterior.others
+    psi, (lowest, highest) = fit.expected(posterior), stimulus.domain
     _, first, cells = np.unique([given.places, fit.shifts], axis=1, return_index=True, return_inverse=True)
     decades = fit.change / (1.0 if grid.log else abs(threshold) * math.log(10))
     percent, compared = compared_percent(block.published), math.nan
@@ -289,8 +291,8 @@ def _own(
         guess=others.guess,
         flat_width=level_of(fit.flat.threshold),
         beyond="above" if threshold > highest else "below" if threshold < lowest else None,
-        variance=found.variance,
-        open_end=_OPEN_ENDS[found.open_ends],
+        variance=posterior.variance,
+        open_end=_OPEN_ENDS[posterior.open_ends],
         fit_p=p_of_fit(np.bincount(cells, given.successes), np.bincount(cells), psi[first]),
         drift=drift(given.successes, psi),
         change=10.0**decades - 1.0 if fit.named else 0.0,
@@ -321,10 +323,10 @@ def _group(
         return None if end is None else stimulus.level_of(end)
 
     def mean(levels: Sequence[float]) -> GroupMean:
-        variances = [one.variance or 0.0 for one in own]
+        variances = [estimate.variance or 0.0 for estimate in own]
         return group_mean([*map(stimulus.coordinate, levels)], variances, (priors.below, priors.above))
 
-    found = mean([one.threshold for one in own])
+    found = mean([estimate.threshold for estimate in own])
     group = ThresholdEstimate(
         participant=None,
         standard=number_or_none(standard),
@@ -334,7 +336,7 @@ def _group(
         high=level_of(found.high),
         early_change=early,
     )
-    compared = [one.compared for one in own if one.compared is not None]
+    compared = [estimate.compared for estimate in own if estimate.compared is not None]
     if len(compared) < len(own):
         return group
     found = mean(compared)
@@ -362,7 +364,7 @@ def psychometric_bands(
     u = np.linspace(*ends, PLACES)
     rows = _answered(block, opened)
     fits, _ = _fits(block, assumed, rows[rows["analysed"]])
-    return {str(one.person): np.array([u, *one.posterior.band(u)]) for one in fits if one.person in people}
+    return {str(fit.person): np.array([u, *fit.posterior.band(u)]) for fit in fits if fit.person in people}
 
 
 Flags = NDArray[np.bool_]
@@ -397,9 +399,9 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
     rows = _answered(block, opened)
     at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
     fits: list[tuple[Any, FittedPerson]] = [
-        (standard, one) for standard, own in at_standards for one in _fits(block, assumed, own)[0]
+        (standard, person) for standard, own in at_standards for person in _fits(block, assumed, own)[0]
     ]
-    for standard, fitted in sorted(fits, key=lambda one: one[1].person)[:most]:
+    for standard, fitted in sorted(fits, key=lambda fit: fit[1].person)[:most]:
         own, ends = fitted.rows, []
         for n in range(1, len(own) + 1):
             so_far = fitted.fit.after(n).reweighted(fitted.factors)
@@ -419,24 +421,37 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
         )
 
 
-def percent_compared(found: LevelsResult) -> float | None:
+def percent_compared(result: LevelsResult) -> float | None:
     """Return the percentage of successes at which thresholds are compared with published ones; None: at no other."""
-    return compared_percent(found.published) if any(one.compared is not None for one in Thresholds.of(found)) else None
+    return (
+        compared_percent(result.published)
+        if any(threshold.compared is not None for threshold in Thresholds.of(result))
+        else None
+    )
 
 
-def _with_device(found: LevelsResult, one: ThresholdEstimate) -> float | None:
+def _with_device(result: LevelsResult, estimate: ThresholdEstimate) -> float | None:
     """Return a Weber fraction of damping with the device's own in the standard, ΔB/(B + b); None where unknown."""
-    if found.device is None or one.standard is None or (found.vary, found.level_kind) != ("damping_nspm", "weber"):
+    if (
+        result.device is None
+        or estimate.standard is None
+        or (result.vary, result.level_kind) != ("damping_nspm", "weber")
+    ):
         return None
-    return one.threshold * one.standard / (one.standard + found.device.damping_nspm)
+    return estimate.threshold * estimate.standard / (estimate.standard + result.device.damping_nspm)
 
 
 def _named_people(own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEstimate]) -> str:
     """Return whose thresholds they are: at each standard where there are several, at most `_MOST_NAMED` by name."""
     if len(some) > _MOST_NAMED:
         return f"{len(some)} of {len(own)} thresholds"
-    several = len({one.standard for one in own}) > 1
-    return listed([f"{one.participant} at {one.standard:g}" if several else str(one.participant) for one in some])
+    several = len({estimate.standard for estimate in own}) > 1
+    return listed(
+        [
+            f"{estimate.participant} at {estimate.standard:g}" if several else str(estimate.participant)
+            for estimate in some
+        ]
+    )
 
 
 class Thresholds(LevelStatistic[ThresholdEstimate]):
@@ -450,62 +465,70 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
     compute = staticmethod(lambda block, opened, _study, _found: thresholds(block, opened))
 
     def shown(self) -> Sequence[Shown]:
-        found, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
+        result, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
 
-        def fit(one: ThresholdEstimate) -> str:
-            return "–" if one.fit_p is None else f"{one.fit_p:.3f}{'' if one.fits else ': the function does not fit'}"
+        def fit(estimate: ThresholdEstimate) -> str:
+            return (
+                "–"
+                if estimate.fit_p is None
+                else f"{estimate.fit_p:.3f}{'' if estimate.fits else ': the function does not fit'}"
+            )
 
-        def interval(one: ThresholdEstimate) -> str:
-            if one.low is None or one.high is None:
+        def interval(estimate: ThresholdEstimate) -> str:
+            if estimate.low is None or estimate.high is None:
                 return "–"
-            below, above = one.open_end in ("low", "both"), one.open_end in ("high", "both")
-            return f"{'< ' * below}{digits(one.low)} – {'> ' * above}{digits(one.high)}"
+            below, above = estimate.open_end in ("low", "both"), estimate.open_end in ("high", "both")
+            return f"{'< ' * below}{digits(estimate.low)} – {'> ' * above}{digits(estimate.high)}"
 
-        def drift(one: ThresholdEstimate) -> str:
-            if one.participant is None and one.early_change is not None:
-                return f"{one.early_change:+.1f} SE{'!' if one.learned else ''}".replace("-", "−")
-            return "–" if one.drift is None else f"{one.drift:+.2f}{'!' if one.drifts else ''}".replace("-", "−")
+        def drift(estimate: ThresholdEstimate) -> str:
+            if estimate.participant is None and estimate.early_change is not None:
+                return f"{estimate.early_change:+.1f} SE{'!' if estimate.learned else ''}".replace("-", "−")
+            return (
+                "–"
+                if estimate.drift is None
+                else f"{estimate.drift:+.2f}{'!' if estimate.drifts else ''}".replace("-", "−")
+            )
 
         return (
             self.standard(),
             *OF_WHOM,
             (
-                "threshold" + (" (Weber fraction)" if found.level_kind == "weber" else unit(found)),
-                lambda one: f"{BEYOND[one.beyond]}{one.threshold:.3g}",
+                "threshold" + (" (Weber fraction)" if result.level_kind == "weber" else unit(result)),
+                lambda row: f"{BEYOND[row.beyond]}{row.threshold:.3g}",
             ),
             ("95 % interval", interval),
-            None if compared is None else (f"at {compared:g} %", lambda one: digits(one.compared)),
-            ("with device damping", lambda one: digits(_with_device(found, one)))
-            if any(_with_device(found, one) is not None for one in self.rows)
+            None if compared is None else (f"at {compared:g} %", lambda row: digits(row.compared)),
+            ("with device damping", lambda row: digits(_with_device(result, row)))
+            if any(_with_device(result, row) is not None for row in self.rows)
             else None,
-            (f"width [{_WIDTH_UNITS[found.spacing]}]", lambda one: digits(one.width, 2)),
-            ("flat width prior", lambda one: digits(one.flat_width)),
+            (f"width [{_WIDTH_UNITS[result.spacing]}]", lambda row: digits(row.width, 2)),
+            ("flat width prior", lambda row: digits(row.flat_width)),
             None
             if percent is None
-            else (f"mean of reversals ({percent:.1f} %)", lambda one: digits(one.reversal_mean)),
+            else (f"mean of reversals ({percent:.1f} %)", lambda row: digits(row.reversal_mean)),
             ("fit (p)", fit),
             ("drift", drift),
         )
 
     def _target_percent(self) -> float | None:
-        return next((one.target_percent for one in self.own(self.found)), None)
+        return next((estimate.target_percent for estimate in self.own(self.found)), None)
 
     def explained(self) -> str:
-        found, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
-        at = "" if found.guess_rate is None else f" ({50 * (1 + found.guess_rate):.3g} % {found.counts})"
-        catch = ", including answers to catch trials" if any(one.catch for one in Answers.of(found)) else ""
+        result, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
+        at = "" if result.guess_rate is None else f" ({50 * (1 + result.guess_rate):.3g} % {result.counts})"
+        catch = ", including answers to catch trials" if any(answer.catch for answer in Answers.of(result)) else ""
         reversals = (
             ""
             if percent is None
             else " The mean of reversals is the classical estimate of an up–down track, at "
-            f"{percent:.1f} % {found.counts}."
+            f"{percent:.1f} % {result.counts}."
         )
         level = (
             "" if compared is None else f" “At {compared:g} %” is the level at which the published value was measured."
         )
-        function = FAMILIES[found.family or ""]
+        function = FAMILIES[result.family or ""]
         return (
-            f"A threshold is the level ({level_words(found)}) at which the {function} function is halfway "
+            f"A threshold is the level ({level_words(result)}) at which the {function} function is halfway "
             f"between guess rate and one minus lapse rate{at}: posterior median with an equal-tailed 95 % "
             "interval, from all counted answers, at the levels delivered to the hand. The width, from 5 to 95 "
             "% of the rise, has a log-normal prior; the next column is the threshold under a flat prior. "
@@ -518,23 +541,25 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             "sets of answers. Drift: correlation of trial number and deviance residual, with “!” if the "
             f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, by how "
             f"many standard errors thresholds rose or fell after the first trials. n counts answers{catch}."
-            + (f" {REMOVED.format('is')}" if found.design == "2ifc" else "")
+            + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
     def compares(self, measure: str) -> bool:
         return measure != "exponent"
 
     def sentences(self) -> Iterator[str]:
-        found = self.found
-        for one in self.rows:
-            if one.participant is None:
-                where = "" if one.standard is None else f", standard {with_unit(found, one.standard)}"
-                percent = "" if found.guess_rate is None else f" at {50 * (1 + found.guess_rate):.3g} % {found.counts}"
-                if one.compared is not None:
-                    percent += f", {one.compared:.3g} at {percent_compared(found):g} %"
+        result = self.found
+        for row in self.rows:
+            if row.participant is None:
+                where = "" if row.standard is None else f", standard {with_unit(result, row.standard)}"
+                percent = (
+                    "" if result.guess_rate is None else f" at {50 * (1 + result.guess_rate):.3g} % {result.counts}"
+                )
+                if row.compared is not None:
+                    percent += f", {row.compared:.3g} at {percent_compared(result):g} %"
                 yield (
-                    f"{found.title}{where}: threshold {one.threshold:.3g}{percent} ({level_words(found)}; "
-                    f"{interval_words(one, digits)}; {counted(one.n, 'participant')})."
+                    f"{result.title}{where}: threshold {row.threshold:.3g}{percent} ({level_words(result)}; "
+                    f"{interval_words(row, digits)}; {counted(row.n, 'participant')})."
                 )
 
     def limits(self) -> Iterator[str]:
@@ -542,45 +567,49 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if not own:
             return
 
-        def shifted(one: ThresholdEstimate) -> bool:
-            return one.flat_width is not None and abs(one.flat_width - one.threshold) > _SHIFT * abs(one.threshold)
+        def shifted(estimate: ThresholdEstimate) -> bool:
+            return estimate.flat_width is not None and abs(estimate.flat_width - estimate.threshold) > _SHIFT * abs(
+                estimate.threshold
+            )
 
         kinds: tuple[tuple[Callable[[ThresholdEstimate], bool], str], ...] = (
             (shifted, f"the prior of the width shifts a threshold by more than {100 * _SHIFT:.0f} %: too few answers"),
             (
-                lambda one: one.beyond == "above",
+                lambda estimate: estimate.beyond == "above",
                 "a threshold lies above the highest level of the stimulus; the distance is unknown",
             ),
             (
-                lambda one: one.beyond == "below",
+                lambda estimate: estimate.beyond == "below",
                 "a threshold lies below the lowest level of the stimulus; the distance is unknown",
             ),
-            (lambda one: not one.fits, "the function does not fit the answers, so a threshold may be biased"),
-            (lambda one: one.n < _FEW_ANSWERS, f"fewer than {_FEW_ANSWERS} answers, so intervals are wide"),
+            (lambda estimate: not estimate.fits, "the function does not fit the answers, so a threshold may be biased"),
+            (lambda estimate: estimate.n < _FEW_ANSWERS, f"fewer than {_FEW_ANSWERS} answers, so intervals are wide"),
         )
         for applies, words in kinds:
-            if some := [one for one in own if applies(one)]:
+            if some := [estimate for estimate in own if applies(estimate)]:
                 yield f"{title}: {words} ({_named_people(own, some)})."
-        if some := [one for one in own if one.open_end]:
+        if some := [estimate for estimate in own if estimate.open_end]:
             yield (
                 f"{title}: the answers leave an end of the 95 % interval open, which is marked “<” or “>” "
                 f"({_named_people(own, some)})."
             )
-        for one in self.rows:
-            if one.participant is None and one.learned:
-                where = "" if one.standard is None else f" at standard {with_unit(self.found, one.standard)}"
+        for row in self.rows:
+            if row.participant is None and row.learned:
+                where = "" if row.standard is None else f" at standard {with_unit(self.found, row.standard)}"
                 yield (
                     f"{title}: the answers do not fit thresholds that stay the same or change evenly: thresholds "
-                    f"{'rose' if (one.early_change or 0.0) > 0 else 'fell'} after the first trials{where} by "
-                    f"{abs(one.early_change or 0.0):.1f} standard errors, so that the group's threshold may be biased."
+                    f"{'rose' if (row.early_change or 0.0) > 0 else 'fell'} after the first trials{where} by "
+                    f"{abs(row.early_change or 0.0):.1f} standard errors, so that the group's threshold may be biased."
                 )
-        if some := [one for one in own if one.drifts]:
-            sizes = listed([f"{100 * (one.change or 0.0):+.0f} %".replace("-", "−") for one in some[:_MOST_NAMED]])
+        if some := [estimate for estimate in own if estimate.drifts]:
+            sizes = listed(
+                [f"{100 * (estimate.change or 0.0):+.0f} %".replace("-", "−") for estimate in some[:_MOST_NAMED]]
+            )
             yield (
                 f"{title}: the threshold changed over the trials, which the interval includes "
                 f"({_named_people(own, some)}: {sizes} from the first trial to the last)."
             )
-        if (people := len({one.participant for one in own})) < FEWEST:
+        if (people := len({estimate.participant for estimate in own})) < FEWEST:
             yield (
                 f"{title}: {counted(people, 'participant')}; at least {FEWEST} are needed for a group interval, "
                 "because differences between people are otherwise unknown."
@@ -591,23 +620,23 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
 
     def _limit_of_device(self) -> str:
         """Return what the device's own dynamics leave open."""
-        found, own = self.found, self.found.device
+        result, own = self.found, self.found.device
         if own is None:
             return (
-                f"{found.title}: the device's own damping, friction and mass are unknown, because they were not "
+                f"{result.title}: the device's own damping, friction and mass are unknown, because they were not "
                 "measured. Weber fractions refer to the force that the motors delivered; relative to the sum "
                 "with the device's own they are smaller."
             )
         where = "" if own.sessions == own.of else f" (measured for {own.sessions} of {own.of} sessions)"
         words = (
-            f"{found.title}: the device's own damping of {own.damping_nspm:.2g} N·s/m, friction of "
+            f"{result.title}: the device's own damping of {own.damping_nspm:.2g} N·s/m, friction of "
             f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to the force that the motors "
             "delivered; Weber fractions refer to the motors' force"
         )
         shares = [
-            f"{share:.3g} instead of {one.threshold:.3g} at {one.standard:g} {found.unit}"
-            for one in self.rows
-            if one.participant is None and (share := _with_device(found, one)) is not None
+            f"{share:.3g} instead of {row.threshold:.3g} at {row.standard:g} {result.unit}"
+            for row in self.rows
+            if row.participant is None and (share := _with_device(result, row)) is not None
         ]
         if not shares:
             return f"{words}."
@@ -724,11 +753,14 @@ def weber_exponents(thresholds: Sequence[ThresholdEstimate], level_kind: str) ->
     if level_kind == "value":
         return
     own = []
-    for person in dict.fromkeys(one.participant for one in thresholds if one.participant is not None):
+    for person in dict.fromkeys(threshold.participant for threshold in thresholds if threshold.participant is not None):
         places = [
-            (one.standard, one.threshold * (one.standard if level_kind == "weber" else 1.0))
-            for one in thresholds
-            if one.participant == person and one.standard is not None and one.standard > 0 and one.threshold > 0
+            (threshold.standard, threshold.threshold * (threshold.standard if level_kind == "weber" else 1.0))
+            for threshold in thresholds
+            if threshold.participant == person
+            and threshold.standard is not None
+            and threshold.standard > 0
+            and threshold.threshold > 0
         ]
         if len(places) >= 2:
             own.append(ExponentEstimate(participant=person, n=len(places), exponent=jnd_slope(*np.array(places).T)))
@@ -757,8 +789,8 @@ class Exponents(LevelStatistic[ExponentEstimate]):
 
     def exported(self) -> Iterator[Mapping[str, Any]]:
         for row in super().exported() if self._is_power_law else ():
-            (one,) = (one for one in self.rows if one.participant == row["participant"])
-            yield {**row, "levels": one.n}
+            (estimate,) = (estimate for estimate in self.rows if estimate.participant == row["participant"])
+            yield {**row, "levels": estimate.n}
 
     @property
     def _is_power_law(self) -> bool:
@@ -775,7 +807,7 @@ class Exponents(LevelStatistic[ExponentEstimate]):
     def shown(self) -> Sequence[Shown]:
         over = "standards" if Thresholds.of(self.found) else "levels"
         participant, (_, n) = OF_WHOM
-        return participant, (over, n), ("exponent", lambda one: number(one.exponent)), INTERVAL_2
+        return participant, (over, n), ("exponent", lambda row: number(row.exponent)), INTERVAL_2
 
     def explained(self) -> str:
         if Thresholds.of(self.found):
@@ -798,17 +830,17 @@ class Exponents(LevelStatistic[ExponentEstimate]):
     def sentences(self) -> Iterator[str]:
         over = f" over {self.found.quantity}"
         meaning = "; 1 is Weber’s law, 0 a constant JND" if Thresholds.of(self.found) else over
-        for one in self.rows:
-            if one.participant is None:
+        for row in self.rows:
+            if row.participant is None:
                 yield (
-                    f"{self.found.title}: {self.name} {number(one.exponent)} ({interval_words(one, number)}; "
-                    f"{counted(one.n, 'participant')}){meaning}."
+                    f"{self.found.title}: {self.name} {number(row.exponent)} ({interval_words(row, number)}; "
+                    f"{counted(row.n, 'participant')}){meaning}."
                 )
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
-        held = [found for found in blocks if cls.of(found)]
-        if any(found.summary == "geometric mean" for found in held):
+        held = [block for block in blocks if cls.of(block)]
+        if any(result.summary == "geometric mean" for result in held):
             yield (
                 "The exponent of magnitude estimation (Stevens 1957) is the slope of the mean ln answer at each level "
                 "on ln level, by least squares for each participant; the group’s is the mean with Student’s 95 % "

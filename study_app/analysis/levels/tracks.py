@@ -56,21 +56,21 @@ def tracks(study: Study) -> pd.DataFrame:
     rows = study.trials[study.trials["block"].isin(list(by_id))]
     rows = rows.sort_values("attempt").drop_duplicates(_PRESENTATION[:-1], keep="last").sort_index()
     answers = answers_timed(study)[[*_PRESENTATION, "response", "value", "response_s"]]
-    found = rows.merge(_presented(study.intervals), on=_PRESENTATION, how="left")
-    found = found.merge(answers, on=_PRESENTATION, how="left")
-    found["slot"] = found.groupby(TRACK).cumcount() + 1
-    track_rows = [_track_row(by_id[row["block"]], row) for row in found[list(_READ)].to_dict("records")]
-    found = found.drop(columns=list(_DELIVERED))
-    found = found.join(pd.DataFrame(track_rows, index=found.index, columns=list(_TYPES)).astype(_TYPES))
-    found = found.assign(reversal=_reversals(found, by_id))
+    frame = rows.merge(_presented(study.intervals), on=_PRESENTATION, how="left")
+    frame = frame.merge(answers, on=_PRESENTATION, how="left")
+    frame["slot"] = frame.groupby(TRACK).cumcount() + 1
+    track_rows = [_track_row(by_id[row["block"]], row) for row in frame[list(_READ)].to_dict("records")]
+    frame = frame.drop(columns=list(_DELIVERED))
+    frame = frame.join(pd.DataFrame(track_rows, index=frame.index, columns=list(_TYPES)).astype(_TYPES))
+    frame = frame.assign(reversal=_reversals(frame, by_id))
     if study.with_below_chance:
-        return found
-    decided = {one.what[:2] for one in study.kept if one.rule_or_person == "below_chance"}
-    for one in below_chance(found, study.levels):
+        return frame
+    decided = {exclusion.what[:2] for exclusion in study.kept if exclusion.rule_or_person == "below_chance"}
+    for one in below_chance(frame, study.levels):
         if (one.participant, one.session) not in decided:
-            own = (found["participant"] == one.participant) & (found["session"] == one.session)
-            found["analysed"] &= ~(own & (found["block"] == one.block)).astype("boolean")
-    return found
+            own = (frame["participant"] == one.participant) & (frame["session"] == one.session)
+            frame["analysed"] &= ~(own & (frame["block"] == one.block)).astype("boolean")
+    return frame
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,13 +85,13 @@ class BelowChance:
     p: float
 
 
-def below_chance(found: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[BelowChance]:
+def below_chance(frame: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[BelowChance]:
     """Yield where answers are correct less often than by chance (binomial p below `BELOW_CHANCE_P`).
 
     Chance is known of designs with a guess rate alone: elsewhere a preference makes answers of few correct.
     """
     by_id = {block.id: block for block in blocks}
-    answered = found[found["analysed"].fillna(False) & found["right"].notna()]
+    answered = frame[frame["analysed"].fillna(False) & frame["right"].notna()]
     of_blocks: Iterable[tuple[Any, pd.DataFrame]] = answered.groupby(["participant", "session", "block"])
     for (who, session, block), rows in of_blocks:
         if (chance := by_id[block].design.guess_rate) is None:
@@ -120,10 +120,10 @@ def _heard(rows: pd.DataFrame) -> pd.DataFrame:
     return rows[compared & ~rows["catch"].fillna(False).astype(bool)].sort_values("trial")
 
 
-def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:
+def _reversals(frame: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:
     """Return whether the direction of its track changed at each trial; missing where the method has no steps."""
-    reversal = pd.Series(pd.NA, index=found.index, dtype="boolean")
-    for _, rows in found.groupby(TRACK, sort=False):
+    reversal = pd.Series(pd.NA, index=frame.index, dtype="boolean")
+    for _, rows in frame.groupby(TRACK, sort=False):
         block = blocks[rows["block"].iloc[0]]
         setting = setting_of(block, rows["track"].iloc[0])
         if setting is None or block.method is None or block.method.target_percent is None:
@@ -135,7 +135,7 @@ def _reversals(found: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Seri
 
 
 def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
-    track = next(one.condition for one in block.settings if one.code == row["code"])
+    track = next(setting.condition for setting in block.settings if setting.code == row["code"])
     found: dict[str, Any] = {**dict.fromkeys(_TYPES, pd.NA), "track": track}
     modulus = block.design.first is not None and int(row["index"]) == 1
     found["analysed"] = bool(row["counted"]) and not modulus
@@ -179,16 +179,16 @@ def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
     """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
     ordered = intervals.sort_values([*_PRESENTATION, "interval"])
     letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
-    found = ordered.groupby(_PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
+    frame = ordered.groupby(_PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()
     presented: dict[Any, str] = {}
     for which, letter in zip(zip(*(ordered[name] for name in _PRESENTATION), strict=True), letters, strict=True):
         presented[which] = presented.get(which, "") + letter
-    found["arrangement"] = pd.Series(presented, dtype="string").reindex(found.index)
+    frame["arrangement"] = pd.Series(presented, dtype="string").reindex(frame.index)
     for name, what in (("value_delivered", "value"), ("delay_error_mean_ms", "delay_error_ms")):
         means = ordered.assign(letter=letters).groupby([*_PRESENTATION, "letter"])[name].mean().unstack("letter")
         for letter in "CS":
-            found[f"{what}_{letter}"] = means.get(letter, pd.NA)
+            frame[f"{what}_{letter}"] = means.get(letter, pd.NA)
     for name in OF_INTERVALS:
         wide = ordered.pivot(index=_PRESENTATION, columns="interval", values=name)
-        found = found.join(wide.rename(columns={number: f"{name}_{number}" for number in wide.columns}))
-    return found.reset_index()
+        frame = frame.join(wide.rename(columns={number: f"{name}_{number}" for number in wide.columns}))
+    return frame.reset_index()

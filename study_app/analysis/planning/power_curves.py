@@ -182,25 +182,25 @@ def _curves(block: Planned, counts: Counts, studies: int) -> Iterator[Curve]:
 
 
 def _contrast_curves(plan: Plan, counts: Counts, studies: int) -> Iterator[Curve]:
-    for one in plan.contrasts:
-        power, alarms = _shares(counts[one.described(), "contrast"] / studies)
-        within = None if len(one.blocks) == 2 else alarms  # effects are those of the settings of one block
+    for contrast in plan.contrasts:
+        power, alarms = _shares(counts[contrast.described(), "contrast"] / studies)
+        within = None if len(contrast.blocks) == 2 else alarms  # effects are those of the settings of one block
         yield Curve(
-            block=one.blocks[0],
+            block=contrast.blocks[0],
             question="contrast",
             item=None,
-            over=one.described(),
+            over=contrast.described(),
             setting=None,
             power=power,
             alarms=within,
             effect=None,
             detectable=None,
         )
-        if one.bound is not None:
-            equal = f"{one.described()}, {IF_EQUAL}"
+        if contrast.bound is not None:
+            equal = f"{contrast.described()}, {IF_EQUAL}"
             power, _ = _shares(counts[equal, "contrast"] / studies)
             yield Curve(
-                block=one.blocks[0],
+                block=contrast.blocks[0],
                 question="contrast",
                 item=None,
                 over=equal,
@@ -223,9 +223,9 @@ def _effects(block: Planned, means: Array) -> Array:
     return np.asarray(np.ptp(means, axis=1))
 
 
-def _detectable(found: Array, effects: Array) -> float | None:
+def _detectable(array: Array, effects: Array) -> float | None:
     """Return the effect at which the share of studies that find it reaches 80 %, between those that were simulated."""
-    rising = np.maximum.accumulate(found)
+    rising = np.maximum.accumulate(array)
     reached = np.flatnonzero(rising >= WANTED)
     if not len(reached):
         return None
@@ -331,17 +331,17 @@ _HEADS: Final[dict[Question, tuple[str, str]]] = {
 }
 
 
-def power_csv(found: Powers) -> bytes:
+def power_csv(power: Powers) -> bytes:
     """Return a row for every test and size."""
-    return csv_bytes(COLUMNS, _csv_rows(found))
+    return csv_bytes(COLUMNS, _csv_rows(power))
 
 
-def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
-    for curve, kind in ((curve, kind) for kind, curves in found.kinds.items() for curve in curves):
-        for place, size in enumerate(found.sizes):
-            low, high = interval(curve.power[place], found.studies)
+def _csv_rows(power: Powers) -> Iterator[dict[str, Any]]:
+    for curve, kind in ((curve, kind) for kind, curves in power.kinds.items() for curve in curves):
+        for place, size in enumerate(power.sizes):
+            low, high = interval(curve.power[place], power.studies)
             yield {
-                "study": found.plan.name,
+                "study": power.plan.name,
                 "simulated": True,
                 "block": curve.block,
                 "question": curve.question,
@@ -350,7 +350,7 @@ def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
                 "setting": curve.setting,
                 "people": kind,
                 "participants": size,
-                "studies": found.studies,
+                "studies": power.studies,
                 "power": round(curve.power[place], 6),
                 "power_low": round(low, 4),
                 "power_high": round(high, 4),
@@ -360,35 +360,35 @@ def _csv_rows(found: Powers) -> Iterator[dict[str, Any]]:
             }
 
 
-def power_markdown(found: Powers) -> str:
+def power_markdown(power: Powers) -> str:
     """Return the tables in Markdown, with what they rest on and what they cannot tell."""
-    lines = [f"# Power of {found.plan.title} ({found.plan.name} {found.plan.version})", "", *_preface(found)]
-    lines += _summary(found)
-    for block in found.plan.blocks:
+    lines = [f"# Power of {power.plan.title} ({power.plan.name} {power.plan.version})", "", *_preface(power)]
+    lines += _summary(power)
+    for block in power.plan.blocks:
         for question, (head, first) in _HEADS.items():
-            curves = [one for one in found.curves if (one.block, one.question) == (block.id, question)]
+            curves = [curve for curve in power.curves if (curve.block, curve.question) == (block.id, question)]
             if curves:
-                lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, found), ""]
-                lines += _markdown_table(curves, found, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
-            if any(one.detectable for one in curves):
+                lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, power), ""]
+                lines += _markdown_table(curves, power, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
+            if any(curve.detectable for curve in curves):
                 lines += ["", "The smallest difference of mean answers that 80 % of studies detect, in points:", ""]
                 lines += _markdown_table(
-                    [one for one in curves if one.detectable],
-                    found,
+                    [curve for curve in curves if curve.detectable],
+                    power,
                     first,
                     lambda curve, at: difference_text(curve.points(at), 2),
                 )
-    return "\n".join([*lines, *_between(found)]) + "\n"
+    return "\n".join([*lines, *_between(power)]) + "\n"
 
 
-def _preface(found: Powers) -> list[str]:
-    decided = found.plan.decided
-    low, high = interval(WANTED, found.studies)
+def _preface(power: Powers) -> list[str]:
+    decided = power.plan.decided
+    low, high = interval(WANTED, power.studies)
     of_looks = ", ".join(f"{n}: {level:.2g}" for n, level in zip(decided.looks, decided.alphas, strict=False))
     looks = f" of all looks ({of_looks}), detected at a look or an earlier look" if of_looks else ""
     lines = [
-        f"**SIMULATED.** {found.studies} studies of each size were simulated with the rehearsals' answer model "
-        f"(seed {found.seed}, liquid-study {__version__}), whose effects are plausible but not measured: real "
+        f"**SIMULATED.** {power.studies} studies of each size were simulated with the rehearsals' answer model "
+        f"(seed {power.seed}, liquid-study {__version__}), whose effects are plausible but not measured: real "
         "effects may be smaller. Read the tables of the smallest detectable difference together with the tables of "
         "power.",
         "",
@@ -397,19 +397,19 @@ def _preface(found: Powers) -> list[str]:
         f"Hochberg. Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's were tried. A power of 80 % "
         f"is uncertain by ±{50 * (high - low):.1f} percentage points.",
         "",
-        f"Numbers are for {_people(next(iter(found.kinds)))}, with the lowest and the highest over all kinds of "
+        f"Numbers are for {_people(next(iter(power.kinds)))}, with the lowest and the highest over all kinds of "
         "people in parentheses: "
-        + "; ".join(f"**{kind}**: {people.described()}" for kind, people in found.plan.kinds.items())
+        + "; ".join(f"**{kind}**: {people.described()}" for kind, people in power.plan.kinds.items())
         + f". {_SOURCES}",
     ]
-    if not found.complete:
-        lines += ["", f"**Ended early: {found.studies} of {found.asked} studies.**"]
-    if found.plan.unknown:
-        named = ", ".join(found.plan.unknown)
+    if not power.complete:
+        lines += ["", f"**Ended early: {power.studies} of {power.asked} studies.**"]
+    if power.plan.unknown:
+        named = ", ".join(power.plan.unknown)
         lines += ["", f"The model does not know {named}: effects are not simulated there, so detections are chance."]
     lines += [
         line
-        for block in found.plan.blocks
+        for block in power.plan.blocks
         if block.groups
         for line in (
             "",
@@ -436,56 +436,56 @@ def _people(kind: str) -> str:
     return f"people {kind}" if kind == STATED else f"{kind} people"
 
 
-def _summary(found: Powers) -> Iterator[str]:
+def _summary(power: Powers) -> Iterator[str]:
     """Yield the power of the primary tests at the planned number of participants, for each kind of people."""
-    plan, sizes = found.plan, found.sizes
+    plan, sizes = power.plan, power.sizes
     place = sizes.index(plan.participants) if plan.participants in sizes else len(sizes) - 1
     planned = "the planned " if plan.participants in sizes else ""
-    main = next(iter(found.kinds))
+    main = next(iter(power.kinds))
     lines = []
-    for curve in found.curves:
+    for curve in power.curves:
         primary = (
             curve.item is not None
             and curve.item not in plan.unknown
             and (not plan.decided.made or plan.decided.is_primary(curve.item))
         )
         if curve.question == "contrast" or (primary and curve.question in ("settings differ", "trend")):
-            shares = dict(zip(found.kinds, (one.power[place] for one in found.among_kinds(curve)), strict=True))
+            shares = dict(zip(power.kinds, (kind.power[place] for kind in power.among_kinds(curve)), strict=True))
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
-                f"- {_name(curve, found).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect it if "
+                f"- {_name(curve, power).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect it if "
                 f"people are {CONSISTENT}, {shares[main]:.0%} if {main}, and {shares[NOISY]:.0%} if {NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
 
 
-def _between(found: Powers) -> Iterator[str]:
+def _between(power: Powers) -> Iterator[str]:
     """Yield a table for each contrast of a statement between groups; the model knows no difference between groups."""
-    plan = found.plan
-    given = people(plan, _MANY, found.seed, 0) if plan.between else ()
-    for one, shares in plan.between:
-        place = [block.id for block in plan.blocks].index(one.blocks[0])
-        item = [it.id for it in plan.blocks[place].items].index(one.measure)
+    plan = power.plan
+    given = people(plan, _MANY, power.seed, 0) if plan.between else ()
+    for contrast, shares in plan.between:
+        place = [block.id for block in plan.blocks].index(contrast.blocks[0])
+        item = [it.id for it in plan.blocks[place].items].index(contrast.measure)
         spreads = {
             name: float(given[place].answers(1.0, kind)[:, :, item].mean(axis=1).std(ddof=1))
             for name, kind in plan.kinds.items()
         }
         said = "SD: of the mean answers of simulated participants, in points."
-        rows = [(f"{one.measure}, {_people(name)}", f"{spread:.2f}", spread) for name, spread in spreads.items()]
+        rows = [(f"{contrast.measure}, {_people(name)}", f"{spread:.2f}", spread) for name, spread in spreads.items()]
         yield from smallest_differences(
-            one, found.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement", said,
-            "±{:.2f}".format, shares, one.bound, bounds=_bounds(plan), largest=STEPS,
+            contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
+            said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan), largest=STEPS,
         )  # fmt: skip
 
 
 def _bounds(plan: Plan) -> int:
     """Return how many hypotheses state a bound of equality."""
-    return sum(one.bound is not None for one in plan.contrasts) + plan.untested_bounds
+    return sum(contrast.bound is not None for contrast in plan.contrasts) + plan.untested_bounds
 
 
 def smallest_differences(
-    one: Contrast,
+    contrast: Contrast,
     sizes: Sequence[int],
     alpha: float,
     members: int,
@@ -509,10 +509,10 @@ def smallest_differences(
     """
     equal = [] if bound is None else [f"shown within the bound {IF_EQUAL}"]
     heads = (first, "participants", "SD", "half width of the 95 % interval", "smallest difference", *equal)
-    sides, strictest = "two-sided" if one.expected is None else "one-sided", alpha / members
+    sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} over {members} hypotheses)"
     both = "" if shares is None else f" Of the participants {shares[0]:.0%} and {shares[1]:.0%} are in the two groups."
-    yield from ("", f"## Contrast: {one.described()}", "")
+    yield from ("", f"## Contrast: {contrast.described()}", "")
     at = f"at α = {strictest:.2g}{corrected}, {sides}"
     within = (
         ""
@@ -530,7 +530,7 @@ def smallest_differences(
             groups = [n] if shares is None else [int(n * share + 1e-9) for share in shares]
             ends = ["–"] * (2 + len(equal))
             if min(groups) > 1:
-                reached = detectable(*groups, tail=strictest / (2 if one.expected is None else 1))
+                reached = detectable(*groups, tail=strictest / (2 if contrast.expected is None else 1))
                 ends = [written(end * spread) for end in reached]
                 if bound is not None:
                     enough_people = min(groups) >= fewest(alpha / bounds, bound, largest)
@@ -628,9 +628,12 @@ def _markdown_table(
     lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
     for curve in curves:
         kinds = found.among_kinds(curve)
-        cells = [_name(curve, found), *(with_range([cell(one, at) for one in kinds]) for at in range(len(found.sizes)))]
+        cells = [
+            _name(curve, found),
+            *(with_range([cell(kind, at) for kind in kinds]) for at in range(len(found.sizes))),
+        ]
         if needed:
-            cells.append(with_range([str(one.needed(found.sizes) or f"> {found.sizes[-1]}") for one in kinds]))
+            cells.append(with_range([str(kind.needed(found.sizes) or f"> {found.sizes[-1]}") for kind in kinds]))
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
@@ -652,10 +655,10 @@ def _order(number: str) -> tuple[bool, float]:
     return number == BEYOND or ">" in number, 0.0 if number == BEYOND else float(number.strip("%> "))
 
 
-def _name(curve: Curve, found: Powers) -> str:
+def _name(curve: Curve, power: Powers) -> str:
     if curve.item is None:
         return f"*{curve.over}*"
-    short = {item.id: item.short for block in found.plan.blocks for item in block.items}[curve.item]
+    short = {item.id: item.short for block in power.plan.blocks for item in block.items}[curve.item]
     return short if curve.setting is None else f"{short}, {curve.setting}"
 
 
@@ -676,29 +679,31 @@ _Plot: TypeAlias = tuple[str, Question, tuple[Curve, ...]]
 """Title, question and curves of a plot."""
 
 
-def _plots(found: Powers, block: Planned) -> Iterator[list[_Plot]]:
+def _plots(power: Powers, block: Planned) -> Iterator[list[_Plot]]:
     """Yield the rows of plots of a block: a plot for each statement and for the test over all."""
     for question in HEADS:
         curves = [
-            one for one in found.curves if (one.block, one.question) == (block.id, question) and one.setting != IF_EQUAL
+            curve
+            for curve in power.curves
+            if (curve.block, curve.question) == (block.id, question) and curve.setting != IF_EQUAL
         ]
         plots: list[_Plot] = [
             (item.short, question, mine)
             for item in block.items
-            if (mine := tuple(one for one in curves if one.item == item.id))
+            if (mine := tuple(curve for curve in curves if curve.item == item.id))
         ]
-        plots += [(one.over.capitalize(), question, (one,)) for one in curves if one.over == _OVER_ALL]
+        plots += [(curve.over.capitalize(), question, (curve,)) for curve in curves if curve.over == _OVER_ALL]
         yield from (plots[first : first + _PLOTS_A_ROW] for first in range(0, len(plots), _PLOTS_A_ROW))
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw_power(found: Powers, block: Planned) -> Figure:
+def draw_power(power: Powers, block: Planned) -> Figure:
     """Draw the power of one block over the number of participants."""
-    rows = list(_plots(found, block))
+    rows = list(_plots(power, block))
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 0.7 + 1.45 * len(rows)), layout="constrained")
     figure.suptitle(
-        f"{block.title}: share of {found.studies} studies with SIMULATED participants, over their number\n"
-        f"α = {found.plan.decided.alpha:g}; {_people(next(iter(found.kinds)))}, band: range over all kinds of people; "
+        f"{block.title}: share of {power.studies} studies with SIMULATED participants, over their number\n"
+        f"α = {power.plan.decided.alpha:g}; {_people(next(iter(power.kinds)))}, band: range over all kinds of people; "
         "dashed: without any effect",
         fontsize=7.5,
     )
@@ -713,7 +718,7 @@ def draw_power(found: Powers, block: Planned) -> Figure:
             axes.tick_params(labelleft=column == 0, labelsize=SMALL)
             if column == 0:
                 axes.set_ylabel(HEADS[question], fontsize=SMALL)
-            _draw_curves(axes, found, curves)
+            _draw_curves(axes, power, curves)
     delays = {str(line.get_label()): line for axes in figure.axes for line in axes.lines if line.get_gid() == "delay"}
     if delays:
         figure.legend(delays.values(), delays, loc="outside lower center", ncols=len(delays), frameon=False)
@@ -728,7 +733,7 @@ def _draw_curves(axes: Axes, found: Powers, curves: Sequence[Curve]) -> None:
             label: Style = {"label": curve.setting, "gid": "delay", "markersize": 3}
             axes.plot(found.sizes, curve.power, color=DELAYS(share), marker=".", **label)
             continue
-        kinds = [one.power for one in found.among_kinds(curve)]
+        kinds = [kind.power for kind in found.among_kinds(curve)]
         low, high = np.min(kinds, axis=0), np.max(kinds, axis=0)
         axes.fill_between(found.sizes, low, high, color=style.BAND, linewidth=0)
         axes.plot(found.sizes, curve.power, color=style.ACCENT, marker=".", markersize=3)
@@ -736,7 +741,7 @@ def _draw_curves(axes: Axes, found: Powers, curves: Sequence[Curve]) -> None:
             axes.plot(found.sizes, curve.alarms, color=style.PARTICIPANT, linewidth=0.9, linestyle="--")
 
 
-def write_power(found: Powers, to: Path) -> tuple[Path, ...]:
+def write_power(power: Powers, to: Path) -> tuple[Path, ...]:
     """Write tables (CSV, Markdown) and a figure a block (PNG, SVG, PDF) into ``to``; return the files.
 
     Raises
@@ -744,10 +749,10 @@ def write_power(found: Powers, to: Path) -> tuple[Path, ...]:
     AnalysisError
         ``to`` cannot be written; nothing was.
     """
-    files = {"power.md": power_markdown(found).encode(), "power.csv": power_csv(found)}
-    for block in found.plan.blocks:
-        title = f"{found.plan.name}: power of {block.title}"
-        figure = draw_power(found, block)
+    files = {"power.md": power_markdown(power).encode(), "power.csv": power_csv(power)}
+    for block in power.plan.blocks:
+        title = f"{power.plan.name}: power of {block.title}"
+        figure = draw_power(power, block)
         for form in style.FORMATS:
             files[f"power-{block.id}.{form}"] = style.file_bytes(figure, form, title, style.PLOT_SETTINGS)
     return write_files(Path(to), files)

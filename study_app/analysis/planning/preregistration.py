@@ -80,13 +80,13 @@ def read_commitment(folder: Path) -> Commitment | None:
     """Return what the preregistration in a study's folder commits to; None: there is none."""
     path = folder / FILE
     try:
-        found = _BLOCK.findall(path.read_text(encoding="utf-8"))
+        blocks = _BLOCK.findall(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError) as error:
         raise AnalysisError(f"{path} cannot be read ({error}): restore it from a copy") from error
     try:
-        return TypeAdapter(Commitment).validate_json(found[-1], strict=True)
+        return TypeAdapter(Commitment).validate_json(blocks[-1], strict=True)
     except (IndexError, ValueError) as error:
         raise AnalysisError(
             f"{path} does not end with what `liquid-study preregister` writes there ({type(error).__name__}): restore "
@@ -115,8 +115,8 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
             yield from _of_intervals(protocol, block)
         else:
             yield from _of_statements(protocol, block, language)
-    for one in () if protocol.analysis is None else protocol.analysis.published:
-        yield f"Published value to compare with: {one.described()}."
+    for published in () if protocol.analysis is None else protocol.analysis.published:
+        yield f"Published value to compare with: {published.described()}."
 
 
 def _test_of(contrast: Contrast, of: str) -> str:
@@ -130,7 +130,7 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
     """Return how equality is tested, and how many participants it takes; nothing without a bound."""
     if contrast.bound is None or protocol.analysis is None:
         return ""
-    bounds = sum(one.bound is not None for one in protocol.analysis.contrasts)
+    bounds = sum(contrast.bound is not None for contrast in protocol.analysis.contrasts)
     reach, largest = equality_limits(contrast, contrast.bound, ratio=contrast.measure in RATIOS)
     alpha = decisions(protocol).alphas[-1] / bounds
     return (
@@ -152,7 +152,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
         asked = {"number": "With which exponent do estimates grow with", "rating": "How do ratings change with"}
         yield f"Block {block.id}: {asked.get(design.reply, 'How do answers change with')} {what}?"
         return
-    at = f" at {listed([f'{one:g}' for one in standards])} {unit}".rstrip() if standards else ""
+    at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
     yield f"Block {block.id}: what is the {kind} of {what}{at}? We estimate it with its interval and do not test it."
     if len(standards) > 1:
@@ -188,7 +188,9 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
         f"Hypothesis, block {block.id}: {listed(block.conditions)} differ in agreement with "
         f"{listed([f'“{texts[name]}” ({name})' for name in primary])}."
     )
-    labels = [f"{name} by {one.label}" for name, one in protocol.conditions.items() if one.label in texts]
+    labels = [
+        f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label in texts
+    ]
     if labels and protocol.analysis is not None:
         yield f"Block {block.id}: are the liquids recognised above chance ({listed(labels)})?"
 
@@ -373,17 +375,17 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     reasons = []
     for block in protocol.main_blocks:
         plan = precision_plan(protocol, block)
-        if plan is None or not (found := expected_of(plan)).measured:
+        if plan is None or not (expected := expected_of(plan)).measured:
             continue
         reached = ""
         if one.participants is not None:
-            half = 100 * found.of_group(one.participants)
+            half = 100 * expected.of_group(one.participants)
             people = number_text.counted(one.participants, "participant")
             reached = f" With {people} the expected precision is ±{half:.0f} %."
-        needed = None if one.precision is None else found.participants_for(one.precision)
+        needed = None if one.precision is None else expected.participants_for(one.precision)
         enough = "" if needed is None else f" This goal needs at least {number_text.counted(needed, 'participant')}."
         reasons.append(
-            f"- Block {block.id}: we simulated {found.trials} trials{plan.per}, with thresholds that differ between "
+            f"- Block {block.id}: we simulated {expected.trials} trials{plan.per}, with thresholds that differ between "
             f"people by a factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
         )
     if reasons:
@@ -477,10 +479,11 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
             f"one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
         )
     yield from _other_participants(study, committed.participants)
-    by_person = [one for one in study.exclusions if one.rule_or_person not in committed.rules]
-    for one in by_person[:_SHOWN]:
+    by_person = [exclusion for exclusion in study.exclusions if exclusion.rule_or_person not in committed.rules]
+    for exclusion in by_person[:_SHOWN]:
         yield (
-            f"an exclusion without a preregistered rule ({describe_exclusion(one)}; {one.reason}; {one.rule_or_person})"
+            f"an exclusion without a preregistered rule ({describe_exclusion(exclusion)}; {exclusion.reason}; "
+            f"{exclusion.rule_or_person})"
         )
     if len(by_person) > _SHOWN:
         yield f"{len(by_person) - _SHOWN} more exclusions without a preregistered rule are in report.json"

@@ -103,8 +103,8 @@ def plan(protocol: Protocol, features: _ConditionFeatures) -> Plan:
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
     every = () if protocol.analysis is None else protocol.analysis.contrasts
     items = {block.id: {item.id for item in _statements(protocol, block)} for block in asked}
-    stated = [one for one in every if all(one.measure in items.get(it, ()) for it in one.blocks)]
-    within = tuple(one for one in stated if one.groups is None)
+    stated = [contrast for contrast in every if all(contrast.measure in items.get(it, ()) for it in contrast.blocks)]
+    within = tuple(contrast for contrast in stated if contrast.groups is None)
     return Plan(
         name=protocol.study.name,
         title=text_in(protocol.study.title, language),
@@ -115,17 +115,19 @@ def plan(protocol: Protocol, features: _ConditionFeatures) -> Plan:
         participants=None if protocol.analysis is None else protocol.analysis.participants,
         contrasts=within,
         untested=len(every) - len(within),
-        between=tuple((one, shares) for one in stated if (shares := group_shares(protocol, one)) is not None),
-        untested_bounds=sum(one.bound is not None for one in every if one not in within),
+        between=tuple(
+            (contrast, shares) for contrast in stated if (shares := group_shares(protocol, contrast)) is not None
+        ),
+        untested_bounds=sum(contrast.bound is not None for contrast in every if contrast not in within),
     )
 
 
-def group_shares(protocol: Protocol, one: Contrast) -> tuple[float, float] | None:
+def group_shares(protocol: Protocol, contrast: Contrast) -> tuple[float, float] | None:
     """Return the share of all participants that each of two compared groups has; None where none are compared."""
-    if one.groups is None:
+    if contrast.groups is None:
         return None
     whole = sum(group.share for group in protocol.groups.values())
-    first, second = (protocol.groups[name].share / whole for name in one.groups)
+    first, second = (protocol.groups[name].share / whole for name in contrast.groups)
     return first, second
 
 
@@ -152,12 +154,12 @@ def _planned(protocol: Protocol, block: Block, features: _ConditionFeatures, lan
             Setting(
                 code=f"S{number}",
                 condition=name,
-                liquid=" + ".join(one.liquid_ids),
-                delay_ms=one.delay_ms,
-                label=one.label,
+                liquid=" + ".join(condition.liquid_ids),
+                delay_ms=condition.delay_ms,
+                label=condition.label,
             )
             for number, name in enumerate(names, start=1)
-            for one in (conditions[name],)
+            for condition in (conditions[name],)
         ),
         items=tuple(
             Item(id=item.id, text=text_in(item.text, language), short=text_in(item.short, language))
@@ -213,7 +215,7 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
     """Return what the participants of simulated study number ``study`` think in each block of the plan."""
     rng = np.random.default_rng([seed, study])
     slopes = np.random.default_rng([seed, study, _OF_SLOPES]).standard_normal(participants)
-    found: list[list[tuple[Array, Array, Array]]] = [[] for _ in plan.blocks]
+    people_of: list[list[tuple[Array, Array, Array]]] = [[] for _ in plan.blocks]
     bias = []
     for _ in range(participants):
         person = rater(rng.random, _STANDARD)
@@ -221,10 +223,10 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
         for place, block in enumerate(plan.blocks):
             items = [item.id for item in block.items]
             thought, noise = simulate_ratings(items, block.features, block.repetitions, person, rng)
-            found[place].append((thought, noise, rng.random(noise.shape)))
+            people_of[place].append((thought, noise, rng.random(noise.shape)))
     return tuple(
         Opinions(thought=thought, noise=noise, lapse=lapse, bias=np.array(bias), slopes=slopes)
-        for thought, noise, lapse in (map(np.array, zip(*block, strict=True)) for block in found)
+        for thought, noise, lapse in (map(np.array, zip(*block, strict=True)) for block in people_of)
     )
 
 
@@ -232,7 +234,7 @@ def together(
     studies: Sequence[tuple[Opinions, ...]], place: int, effects: Sequence[float], kind: SimulatedParticipants
 ) -> Array:
     """Return one block's answers (effects, studies, participants, settings, items) by people of a kind."""
-    return np.array([[one[place].answers(effect, kind) for one in studies] for effect in effects])
+    return np.array([[study[place].answers(effect, kind) for study in studies] for effect in effects])
 
 
 PLANNED_DRAWS: Final = 1999
@@ -243,11 +245,11 @@ _Single = NDArray[np.float32]
 
 def ranks(answers: Array) -> _Single:
     """Return (doubled) ranks among the settings of ``answers`` (…, settings, items): (…, settings, items)."""
-    found: Any = np.ones(answers.shape, dtype=np.float32)
+    doubled: Any = np.ones(answers.shape, dtype=np.float32)
     for other in range(answers.shape[-2]):
         there = answers[..., other : other + 1, :]
-        found += (there < answers) * np.float32(2) + (there == answers)
-    return np.asarray(found)
+        doubled += (there < answers) * np.float32(2) + (there == answers)
+    return np.asarray(doubled)
 
 
 def friedman(ranked: _Single, rng: np.random.Generator) -> tuple[Array, Array]:
@@ -392,7 +394,7 @@ def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: 
     for numbers in of_sizes.values() if plan.decided.looks else ():
         numbers[:] = np.logical_or.accumulate(numbers)  # a study that shows it at a look ends there
     counts = {what: np.array(numbers, np.float64).sum(axis=1) for what, numbers in of_sizes.items()}
-    means = {(one.id, "means"): here.mean(axis=2).sum(axis=1) for one, here in zip(plan.blocks, given, strict=True)}
+    means = {(block.id, "means"): here.mean(axis=2).sum(axis=1) for block, here in zip(plan.blocks, given, strict=True)}
     return counts | means
 
 
@@ -408,38 +410,42 @@ def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDA
     if not plan.contrasts:
         return {}
     blocks = {block.id: (block, answers) for block, answers in zip(plan.blocks, given, strict=True)}
-    ps, of_equal, with_bound = [], [], [one for one in plan.contrasts if one.bound is not None]
+    ps, of_equal, with_bound = [], [], [contrast for contrast in plan.contrasts if contrast.bound is not None]
     members = len(plan.contrasts) + plan.untested
-    for one in plan.contrasts:
+    for contrast in plan.contrasts:
         sides = []
         for name, condition in zip(
-            one.blocks if len(one.blocks) == 2 else one.blocks * 2, one.conditions or (None, None), strict=True
+            contrast.blocks if len(contrast.blocks) == 2 else contrast.blocks * 2,
+            contrast.conditions or (None, None),
+            strict=True,
         ):
             block, answers = blocks[name]
             rows = [place for place, it in enumerate(block.settings) if condition in (None, it.condition)]
-            sides.append(answers[:, :, :, rows, [it.id for it in block.items].index(one.measure)].mean(axis=-1))
+            sides.append(answers[:, :, :, rows, [it.id for it in block.items].index(contrast.measure)].mean(axis=-1))
         away = sides[0] - sides[1]
-        ps.append(_p_of_contrast(away, one, alpha / members).T)
-        if one.bound is not None:
+        ps.append(_p_of_contrast(away, contrast, alpha / members).T)
+        if contrast.bound is not None:
             means = means_of(away[0] - away[0].mean(), resamples=resamples_for(alpha / members))
-            of_equal.append(p_equivalent(means, one.bound, away.shape[-1], STEPS))
+            of_equal.append(p_equivalent(means, contrast.bound, away.shape[-1], STEPS))
     shown = _holm(ps, plan.untested) <= alpha
-    found = {one.described(): shown[..., place] for place, one in enumerate(plan.contrasts)}
+    shown_of = {contrast.described(): shown[..., place] for place, contrast in enumerate(plan.contrasts)}
     if with_bound:
         equal = np.repeat((_holm(of_equal, plan.untested_bounds) <= alpha)[:, None], len(given[0]), axis=1)
-        found |= {f"{one.described()}, {IF_EQUAL}": equal[..., place] for place, one in enumerate(with_bound)}
-    return found
+        shown_of |= {
+            f"{contrast.described()}, {IF_EQUAL}": equal[..., place] for place, contrast in enumerate(with_bound)
+        }
+    return shown_of
 
 
-def _p_of_contrast(away: Array, one: Contrast, strictest: float) -> Array:
+def _p_of_contrast(away: Array, contrast: Contrast, strictest: float) -> Array:
     """Return the p (effects, studies) of differences (effects, studies, participants); 1 where all are equal."""
     rows = away.reshape(-1, away.shape[-1])
     differ = np.ptp(rows, axis=-1) > 0
-    found = np.ones(len(rows))
+    p_values = np.ones(len(rows))
     if differ.any():
         means = means_of(rows[differ], resamples=resamples_for(strictest))
-        found[differ] = np.max(p_differs(means, SIDES[one.expected]), axis=0)
-    return found.reshape(away.shape[:-1])
+        p_values[differ] = np.max(p_differs(means, SIDES[contrast.expected]), axis=0)
+    return p_values.reshape(away.shape[:-1])
 
 
 def _holm(ps: Sequence[Array], others: int) -> Array:
@@ -469,8 +475,8 @@ def _delays(
 ) -> dict[str, NDArray[np.bool_]]:
     effects, studies = answers.shape[:2]
     directions = [decided.direction(item.id) for item in block.items]
-    rising = answers * np.array([-1.0 if one == "decreasing" else 1.0 for one in directions])
-    both_ways = np.array([one is None for one in directions])
+    rising = answers * np.array([-1.0 if direction == "decreasing" else 1.0 for direction in directions])
+    both_ways = np.array([direction is None for direction in directions])
     flat = rising.reshape(-1, *rising.shape[2:])
     ps = slopes(flat, block, both_ways) if decided.trends == "slopes" else trend(ranks(flat), both_ways, rng)
     found = _family(block, decided, ps) & shown[:, None]
@@ -500,13 +506,13 @@ def _step_down(
     delays are tested, without a correction.
     """
     _, _, k, items = rising.shape
-    found = np.zeros((len(shown), items, k), dtype=bool)
+    rejected = np.zeros((len(shown), items, k), dtype=bool)
     going = shown
     for longest in range(k - 1, 0, -1):
         if longest < first:
             going = going & (trend(ranks(rising[:, :, : longest + 1]), both_ways, rng) <= alpha)
-        found[:, :, longest] = going
-    return found
+        rejected[:, :, longest] = going
+    return rejected
 
 
 def _family(block: Planned, decided: Decided, ps: Array) -> NDArray[np.bool_]:
@@ -515,12 +521,12 @@ def _family(block: Planned, decided: Decided, ps: Array) -> NDArray[np.bool_]:
     Without any decision all are tested as if they were primary: planning asks what the study could show.
     """
     primary = np.array([not decided.made or decided.is_primary(item.id) for item in block.items])
-    found = np.zeros(ps.shape, dtype=bool)
+    rejected = np.zeros(ps.shape, dtype=bool)
     for members, adjusted in ((primary, holm), (~primary, false_discovery)):
         if members.any():
             of_studies = [adjusted(of_study) for of_study in ps[:, members].tolist()]
-            found[:, members] = np.array(of_studies, float) <= decided.alpha + 1e-12
-    return found
+            rejected[:, members] = np.array(of_studies, float) <= decided.alpha + 1e-12
+    return rejected
 
 
 def sweep(

@@ -78,11 +78,11 @@ class PrecisionResult:
 
     def half(self, place: int) -> float:
         """Return the median of half the group's interval at one of the sizes."""
-        return float(np.median([one[place] for one in self.halves]))
+        return float(np.median([half[place] for half in self.halves]))
 
     def within(self, place: int, precision: float) -> float:
         """Return the share of studies whose half interval is within the precision, at one of the sizes."""
-        return float(np.mean([one[place] <= precision for one in self.halves]))
+        return float(np.mean([half[place] <= precision for half in self.halves]))
 
 
 def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
@@ -90,20 +90,20 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
 
     AnalysisError says that a method cannot have so few trials.
     """
-    found = {}
+    planned = {}
     for block in protocol.main_blocks:
         plan = precision_plan(protocol, block)
         if plan is None:
             continue
-        changed: list[_Plan] = [plan.with_trials(one) for one in trials] or [plan]
+        changed: list[_Plan] = [plan.with_trials(trial) for trial in trials] or [plan]
         for asked, one in zip(trials, changed, strict=False):
             if abs(one.trials - asked) > max(1, asked / 2):
                 raise AnalysisError(
                     f"{asked} trials cannot be divided among the tracks and levels of {block.id}: give at least "
                     f"{one.trials}"
                 )
-        found[block.id] = {one.trials: one for one in changed}
-    return found
+        planned[block.id] = {one.trials: one for one in changed}
+    return planned
 
 
 def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
@@ -123,9 +123,9 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
     first = case.seed[-1] * BATCH
     kinds = [_kind_of(plan, first + place) for place in range(BATCH)]
     parts = zip(each, np.split(truth, len(each), 2), strict=True)
-    of_sizes = zip(*(_estimates(one, part, kinds, sizes, rng) for one, part in parts), strict=True)
+    of_sizes = zip(*(_estimates(plan, part, kinds, sizes, rng) for plan, part in parts), strict=True)
     by_size = [tuple(np.concatenate(it, 2) for it in zip(*of_size, strict=True)) for of_size in of_sizes]
-    found, full = PrecisionResult(), plan.measures(means).ravel().tolist()
+    precision, full = PrecisionResult(), plan.measures(means).ravel().tolist()
     errors = (by_size[-1][0] - truth) * (math.log(10) if log else 1 / truth)
     for study, measured in enumerate(full):
         halves = []
@@ -140,14 +140,14 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
             else:
                 half = (group.high - group.low) / 2
                 halves.append(10.0**half - 1 if log else half / abs(group.mean))
-        found.errors.append(errors[study] if measured else np.full_like(errors[study], math.inf))
-        found.halves.append(np.array(halves))
-    return found
+        precision.errors.append(errors[study] if measured else np.full_like(errors[study], math.inf))
+        precision.halves.append(np.array(halves))
+    return precision
 
 
 def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> PrecisionResult:
     """Return what the studies of a batch find of d′, d_a or exponents: their means have Student's interval."""
-    people, found = sizes[-1], PrecisionResult()
+    people, precision = sizes[-1], PrecisionResult()
     truth = plan.value * np.exp(math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people)))
     estimates = plan.estimates(truth.reshape(-1), rng).reshape(BATCH, people)
     for own, true in zip(estimates, truth, strict=True):
@@ -155,9 +155,9 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Pr
         for n in sizes:
             low, high = student_interval(own[:n])
             halves.append(math.nan if low is None or high is None else (high - low) / 2 / abs(own[:n].mean()))
-        found.errors.append((own - true)[:, None] / plan.value)
-        found.halves.append(np.array(halves))
-    return found
+        precision.errors.append((own - true)[:, None] / plan.value)
+        precision.halves.append(np.array(halves))
+    return precision
 
 
 def _kind_of(plan: ThresholdPlan, study: int) -> Person:
@@ -180,10 +180,12 @@ def _estimates(
     for first in range(0, len(own), at_once):
         fits = plan.fits(plan.answers(own[first : first + at_once], rng, who[first : first + at_once]))
         for n, of_size in zip(sizes, found, strict=True):
-            some = [one for start in range(0, len(fits), people) for one in fits[start : start + n]]
+            some = [fit for start in range(0, len(fits), people) for fit in fits[start : start + n]]
             of_size.append(plan.grouped(some, n))
     for of_size in found:
-        values = zip(*((one.medians, one.variances, one.shared) for one in of_size), strict=True)
+        values = zip(
+            *((estimates.medians, estimates.variances, estimates.shared) for estimates in of_size), strict=True
+        )
         yield tuple(np.concatenate(it).reshape(studies, standards, -1).transpose(0, 2, 1) for it in values)
 
 
@@ -205,12 +207,12 @@ def sweep(
     ]
     total = {key: PrecisionResult() for key in keys}
     found = executor.map(study_batch, cases, [tuple(sizes)] * len(cases))
-    for number, (case, one) in enumerate(zip(cases, found, strict=True), start=1):
+    for number, (case, precision) in enumerate(zip(cases, found, strict=True), start=1):
         done = (number - 1) // len(keys) * BATCH
         kept = min(BATCH, studies - done)
         held = total[case.block, case.plan.trials]
-        held.errors += one.errors[:kept]
-        held.halves += one.halves[:kept]
+        held.errors += precision.errors[:kept]
+        held.halves += precision.halves[:kept]
         if number % len(keys) == 0:
             yield done + kept, total
 
@@ -331,7 +333,7 @@ def threshold_markdown(precisions: Precisions) -> str:
 def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
     """Yield how wide the largest group's interval is with the most trials, over kinds of people: median and worst."""
     trials = max(trials for of_block, trials in precisions.found if of_block == block)
-    halves = [one[-1] for one in precisions.found[block, trials].halves]
+    halves = [half[-1] for half in precisions.found[block, trials].halves]
     plan = plans(precisions.protocol, (trials,))[block][trials]
     if not isinstance(plan, ThresholdPlan) or len(halves) < len(plan.kinds):
         return
@@ -353,47 +355,50 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
     if (decided := precisions.protocol.analysis) is None:
         return
     planned = plans(precisions.protocol, ())
-    for one in decided.contrasts:
-        firsts = [next(iter(planned[block].values())) for block in one.blocks if block in planned]
-        if len(firsts) < len(one.blocks) or any(_MEASURED.get(type(it)) != one.measure for it in firsts):
+    for contrast in decided.contrasts:
+        firsts = [next(iter(planned[block].values())) for block in contrast.blocks if block in planned]
+        if len(firsts) < len(contrast.blocks) or any(_MEASURED.get(type(it)) != contrast.measure for it in firsts):
             continue
-        first, ratio = firsts[0], one.measure == "threshold"
+        first, ratio = firsts[0], contrast.measure == "threshold"
         mean = 1.0 if isinstance(first, ThresholdPlan) else first.value
-        rows = [(name, words, mean * spread) for name, words, spread in _spreads(precisions, one)]
+        rows = [(name, words, mean * spread) for name, words, spread in _spreads(precisions, contrast)]
         if not rows:
             continue
-        what = one.measure.replace("d_prime", "d′")
+        what = contrast.measure.replace("d_prime", "d′")
         share = "" if isinstance(first, ThresholdPlan) else f", relative to a mean {what} of {first.value:g}"
         whose = f"one participant's {what}, from the error of the estimate and differences between people"
-        if one.groups is None:
+        if contrast.groups is None:
             whose = "one participant's difference, from the errors of both estimates and differences between people"
         yield from smallest_differences(
-            one, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,
+            contrast, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,
             f"trials{first.per}",
             f"SD{share}; {whose} by a factor of {BETWEEN_PEOPLE:g}.",
             (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
-            group_shares(precisions.protocol, one), log_bound(precisions.protocol, one) if ratio else one.bound,
+            group_shares(precisions.protocol, contrast),
+            log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
             bounds=sum(each.bound is not None for each in decided.contrasts),
         )  # fmt: skip
 
 
-def log_bound(protocol: Protocol, one: Contrast) -> float | None:
+def log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
     """Return the logarithm of the bound of equality; None: there is none, or thresholds are no ratios."""
-    stimuli = [stimulus_of(protocol, protocol.blocks[block]) for block in one.blocks]
-    if one.bound is None or any(stimulus.spacing != "log" for stimulus in stimuli):
+    stimuli = [stimulus_of(protocol, protocol.blocks[block]) for block in contrast.blocks]
+    if contrast.bound is None or any(stimulus.spacing != "log" for stimulus in stimuli):
         return None
-    return abs(math.log(one.bound))
+    return abs(math.log(contrast.bound))
 
 
-def _spreads(precisions: Precisions, one: Contrast) -> Iterator[tuple[str, str, float]]:
+def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, str, float]]:
     """Yield numbers of trials, and the standard deviation of what is compared of a participant with them."""
     protocol = precisions.protocol
-    tracks = [() if one.measure == "exponent" else tracks_of(protocol, protocol.blocks[it]) for it in one.blocks]
+    tracks = [
+        () if contrast.measure == "exponent" else tracks_of(protocol, protocol.blocks[it]) for it in contrast.blocks
+    ]
     averaged = [len({(track.standard, track.comparison) for track in of_block}) or 1 for of_block in tracks]
-    for trials in (trials for block, trials in precisions.found if block == one.blocks[0]):
-        held = [found for block in one.blocks if (found := precisions.found.get((block, trials))) is not None]
-        spreads = [found.spread / math.sqrt(count) for found, count in zip(held, averaged, strict=False)]
-        if len(held) == len(one.blocks) and all(map(math.isfinite, spreads)):
+    for trials in (trials for block, trials in precisions.found if block == contrast.blocks[0]):
+        held = [found for block in contrast.blocks if (found := precisions.found.get((block, trials))) is not None]
+        spreads = [precision.spread / math.sqrt(count) for precision, count in zip(held, averaged, strict=False)]
+        if len(held) == len(contrast.blocks) and all(map(math.isfinite, spreads)):
             spread = math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
             yield str(trials), f"{spread:.0%}", spread
 

@@ -56,19 +56,19 @@ def cards(results: Results, numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBE
 
 
 def _hypotheses(results: Results) -> Iterator[Card]:
-    for place, one in enumerate(results.contrasts, start=1):
+    for place, contrast in enumerate(results.contrasts, start=1):
         yield Card(
-            question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(one)}",
-            verdict=one.verdict,
-            sentences=(answer(one),),
-            block=one.contrast.blocks[0],
+            question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(contrast)}",
+            verdict=contrast.verdict,
+            sentences=(answer(contrast),),
+            block=contrast.contrast.blocks[0],
             figures=(f"hypothesis-{place}",),
         )
 
 
 def _statements(results: Results) -> Iterator[Card]:
-    findings = {one.key: one for one in all_findings() if one.question}
-    kinds = {found.id: found.kind for found in results.blocks}
+    findings = {finding.key: finding for finding in all_findings() if finding.question}
+    kinds = {block.id: block.kind for block in results.blocks}
     for given in answers(results):
         finding = findings[given.question]
         yield Card(
@@ -82,37 +82,37 @@ def _statements(results: Results) -> Iterator[Card]:
 
 def _levels(results: Results) -> Iterator[Card]:
     """Yield what blocks of levels measure, but for those whose numbers a hypothesis shows."""
-    shown = {(block, one.contrast.measure) for one in results.contrasts for block in one.contrast.blocks}
-    for found in results.levels:
-        estimates = estimates_of(found)
-        if not found.revealed:
+    shown = {(block, contrast.contrast.measure) for contrast in results.contrasts for block in contrast.contrast.blocks}
+    for level in results.levels:
+        estimates = estimates_of(level)
+        if not level.revealed:
             yield Card(
-                question=found.title,
+                question=level.title,
                 verdict="sealed",
                 sentences=("Standards, levels and correct answers are shown after unblinding.",),
-                block=found.block,
+                block=level.block,
                 figures=(),
             )
-        elif estimates is not None and (found.block, estimates.attribute) not in shown:
+        elif estimates is not None and (level.block, estimates.attribute) not in shown:
             yield Card(
-                question=f"{found.title}: {estimates.words}",
+                question=f"{level.title}: {estimates.words}",
                 verdict="",
-                sentences=tuple(_estimate_words(found, estimates.group, estimates.attribute, estimates.words)),
-                block=found.block,
-                figures=(f"estimates-{found.block}",),
+                sentences=tuple(_estimate_words(level, estimates.group, estimates.attribute, estimates.words)),
+                block=level.block,
+                figures=(f"estimates-{level.block}",),
             )
 
 
-def _estimate_words(found: LevelsResult, group: Sequence[Any], attribute: str, words: str) -> Iterator[str]:
+def _estimate_words(result: LevelsResult, group: Sequence[Any], attribute: str, words: str) -> Iterator[str]:
     """Yield the mean of the group at each standard, or to each comparison, with its interval."""
-    of_level, is_weber = attribute in ("threshold", "pse"), found.level_kind == "weber"
+    of_level, is_weber = attribute in ("threshold", "pse"), result.level_kind == "weber"
     before = "a Weber fraction of " if of_level and is_weber else ""
-    after = f" {found.unit}" if of_level and not is_weber and found.unit else ""
+    after = f" {result.unit}" if of_level and not is_weber and result.unit else ""
     for one in group:
         place = place_of(one)
         where = "" if place is None or len(group) == 1 else f" for {str(place).replace('_', ' ')}"
         if isinstance(place, float) and len(group) > 1:
-            unit = "" if found.level_kind == "weber" and attribute == "value" else found.unit or ""
+            unit = "" if result.level_kind == "weber" and attribute == "value" else result.unit or ""
             where = f" at {place:g} {unit}".rstrip()
         ends = "no interval" if None in (one.low, one.high) else f"95 % interval {_ends(one.low, one.high)}"
         people = f"n = {getattr(one, 'participants', one.n)}"
@@ -126,19 +126,19 @@ def _ends(low: float, high: float) -> str:
 
 def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) -> Iterator[Card]:
     """Yield the answers to questions besides statements, where these were asked, and scores in their place."""
-    levels, scores = {one.block for one in results.levels}, {one.where for one in results.scores}
-    asked_at = [one for one in results.questions if one.where not in levels]
+    levels, scores = {level.block for level in results.levels}, {score.where for score in results.scores}
+    asked_at = [result for result in results.questions if result.where not in levels]
     in_order = sorted(asked_at, key=lambda one: one.is_form + (one.is_form and one.where not in scores))
-    for where in dict.fromkeys(one.where for one in in_order):
-        asked = [one for one in results.questions if one.where == where and one.n]
+    for where in dict.fromkeys(result.where for result in in_order):
+        asked = [result for result in results.questions if result.where == where and result.n]
         numbers = numbers_at.get(where, ())
         if not asked:
             continue
         title, figures = asked[0].title, [f"answers-{where}"]
         sentences = [_number_words(one) for one in numbers[:MOST_PANELS]]
-        chosen = [one for one in asked if one.measure == "counts"]
-        sentences += [_choice_words(one) for one in chosen]
-        figures += [f"question-{where}-{one.item}" for one in chosen]
+        chosen = [result for result in asked if result.measure == "counts"]
+        sentences += [_choice_words(result) for result in chosen]
+        figures += [f"question-{where}-{result.item}" for result in chosen]
         if sentences:
             yield Card(
                 question=title,
@@ -150,10 +150,10 @@ def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) ->
             )
 
 
-def _number_words(found: Numbers) -> str:
+def _number_words(numbers: Numbers) -> str:
     """Return the means of a score or question in each setting, and of two the mean difference within people."""
-    what = f"The mean score ({found.title})" if found.is_score else f"The mean of “{found.title}”"
-    means = [(name, mean, len(held)) for name, held in found.by_setting.items() if (mean := mean_of(held.values()))]
+    what = f"The mean score ({numbers.title})" if numbers.is_score else f"The mean of “{numbers.title}”"
+    means = [(name, mean, len(held)) for name, held in numbers.by_setting.items() if (mean := mean_of(held.values()))]
     parts = [
         f"{number(mean.value)}{f' for {name.lower()}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
     ]
@@ -161,7 +161,7 @@ def _number_words(found: Numbers) -> str:
     text = f"{what} was {listed(parts)} (95 % interval{'s' * (len(parts) > 1)}, n = {n})."
     if len(means) != 2:
         return text
-    (first, second), (one, other) = found.by_setting, found.by_setting.values()
+    (first, second), (one, other) = numbers.by_setting, numbers.by_setting.values()
     away = mean_of(np.array([other[who] - one[who] for who in one if who in other]))
     if away is None or away.low is None:
         return text
@@ -180,22 +180,22 @@ class _Ends:
     high: float
 
 
-def _choice_words(found: QuestionResult) -> str:
+def _choice_words(result: QuestionResult) -> str:
     """Return how often each option was chosen."""
     parts = []
-    for group in found.groups:
+    for group in result.groups:
         n, counts = int(group.numbers["n"]), group.numbers["counts"]
         if not n:
             continue
-        option = max(counts, key=lambda one: counts[one])
+        option = max(counts, key=lambda count: counts[count])
         share = clopper_pearson(int(counts[option]), n)
-        of = f" ({group.name.lower()})" if len(found.groups) > 1 else ""
+        of = f" ({group.name.lower()})" if len(result.groups) > 1 else ""
         ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}] %"
         parts.append(
             f"{counts[option]} of {n} participants chose “{option}”{of} ({100 * counts[option] / n:.0f} %, 95 % "
             f"interval {ends})"
         )
-    return f"“{found.short}”: {'; '.join(parts)}."
+    return f"“{result.short}”: {'; '.join(parts)}."
 
 
 def first_page(
@@ -206,27 +206,27 @@ def first_page(
 ) -> Markup:
     """Return the answers beside their figures, what the study cannot show, and how often the page is wrong."""
     given = cards(results, numbers)
-    shown = [(one, one.figure_of(drawn)) for one in given]
-    claimed = any(one.n for one in results.blocks) and bool(answers(results))
+    shown = [(card, card.figure_of(drawn)) for card in given]
+    claimed = any(block.n for block in results.blocks) and bool(answers(results))
     look = results.decided.look_words(len(results.people))
     return render(
         "first_page.html",
         cards=[
             {
-                "question": one.question,
-                "verdict": one.verdict,
-                "state": one.verdict.replace(" ", "-"),
-                "small": one.is_small,
-                "sentences": list(one.sentences),
+                "question": card.question,
+                "verdict": card.verdict,
+                "state": card.verdict.replace(" ", "-"),
+                "small": card.is_small,
+                "sentences": list(card.sentences),
                 "figure": "" if figure is None else picture(figure, beside=True),
                 "caption": "" if figure is None else figure.caption,
             }
-            for one, figure in shown
+            for card, figure in shown
         ],
         sentences=[*filter(None, [look]), *(() if given else (none_found(results),))],
         limits=_limits_once(limits),
         shown=_LIMITS_SHOWN,
-        empty=empty_studies(max(found.n for found in results.blocks)) if claimed and not results.decided.looks else "",
+        empty=empty_studies(max(block.n for block in results.blocks)) if claimed and not results.decided.looks else "",
     )
 
 
@@ -244,5 +244,5 @@ def _limits_once(limits: Sequence[str]) -> list[str]:
 
 def figures_shown(given: Sequence[Card], drawn: Sequence[Picture]) -> set[str]:
     """Return the names of the figures on the first page, which its sections leave out."""
-    figures = (one.figure_of(drawn) for one in given)
-    return {one.name for one in figures if one is not None}
+    figures = (card.figure_of(drawn) for card in given)
+    return {figure.name for figure in figures if figure is not None}

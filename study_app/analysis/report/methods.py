@@ -40,7 +40,7 @@ def methods(study: Study, results: Results) -> str:
 
 
 def _sentences(study: Study, results: Results) -> Iterator[str]:
-    blocks = [found for found in results.blocks if found.n]
+    blocks = [block for block in results.blocks if block.n]
     yield _sample(study)
     yield _groups(study)
     yield _planned(study, results)
@@ -120,7 +120,7 @@ def _planned(study: Study, results: Results) -> str:
 
 def _exclusions(study: Study) -> str:
     """Return what was left out, and whether the key was sealed when it was decided."""
-    trials, sessions = sum(one.trial is not None for one in study.exclusions), len(study.excluded_sessions)
+    trials, sessions = sum(exclusion.trial is not None for exclusion in study.exclusions), len(study.excluded_sessions)
     out = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
     parts = [counted(count, noun) for count, noun in out if count]
     many = len(parts) > 1 or any(count > 1 for count, _ in out)
@@ -131,14 +131,14 @@ def _exclusions(study: Study) -> str:
         )
     if study.late:
         sentences.append(f"Decisions after the key was opened: {late_exclusions(study)}.")
-    elif study.revealed and any(one.rule_or_person not in RULES for one in study.exclusions):
+    elif study.revealed and any(exclusion.rule_or_person not in RULES for exclusion in study.exclusions):
         sentences.append("Exclusions were decided while the key was sealed.")
     return " ".join(sentences)
 
 
 def late_exclusions(study: Study) -> str:
     """Return how many exclusions were decided, and how many reversed, after the key was opened."""
-    decided = sum(one in study.exclusions for one in study.late)
+    decided = sum(exclusion in study.exclusions for exclusion in study.late)
     back = len(study.late) - decided
     parts = [f"{counted(decided, 'exclusion')} of {len(study.exclusions)}"] if decided else []
     return listed([*parts, *([f"the reversal of {counted(back, 'exclusion')}"] if back else [])])
@@ -176,9 +176,14 @@ def _apparatus(study: Study) -> str:
 
 def _liquids(study: Study) -> str:
     """Return the liquids of the main blocks with their parameters; nothing while the key is sealed."""
-    settings = [one for block in study.blocks for one in block.settings]
-    settings += [one for block in study.levels for one in block.settings]
-    held = [one.liquid for each in settings for one in (each, each.of) if one is not None and one.liquid is not None]
+    settings = [setting for block in study.blocks for setting in block.settings]
+    settings += [setting for block in study.levels for setting in block.settings]
+    held = [
+        setting.liquid
+        for each in settings
+        for setting in (each, each.of)
+        if setting is not None and setting.liquid is not None
+    ]
     names = [name for liquids in dict.fromkeys(held) for name in liquids.split(" + ")]
     words = [f"{name.replace('_', ' ')} ({_parameters(study.liquids[name])})" for name in dict.fromkeys(names)
              if name in study.liquids]  # fmt: skip
@@ -203,34 +208,36 @@ def _parameters(liquid: Mapping[str, Any]) -> str:
 def _design(study: Study, results: Results) -> Iterator[str]:
     """Yield what each block of statements presented, in which order, and how blocks followed each other."""
     blocks = {block.id: block for block in study.blocks}
-    for found in results.blocks:
-        yield _presented(study, blocks[found.id], found)
-        yield from said_of_presentations(found)
+    for result in results.blocks:
+        yield _presented(study, blocks[result.id], result)
+        yield from said_of_presentations(result)
     if results.blocks:
         opened = "Conditions were known only by codes until the key was opened."
         yield opened if study.revealed else "Conditions are known only by codes."
     yield _block_order(study)
 
 
-def _presented(study: Study, block: Block, found: BlockResult) -> str:
-    order = _ORDERS.get(study.protocol.get("blocks", {}).get(found.id, {}).get("order", ""), "")
-    noun = {"delays": "visual delay"}.get(found.kind, found.kind.removesuffix("s")) if found.revealed else "setting"
-    names = [f"{delay:g}" for delay in found.delays_ms] or [name.lower() for name in found.names]
-    unit = " ms" if found.delays_ms else ""
-    which = counted(len(names), noun) + (f" ({listed(names)}{unit})" if found.revealed else "")
-    of = sorted({one.liquid for one in block.settings if one.liquid is not None}) if found.delays_ms else []
+def _presented(study: Study, block: Block, result: BlockResult) -> str:
+    order = _ORDERS.get(study.protocol.get("blocks", {}).get(result.id, {}).get("order", ""), "")
+    noun = {"delays": "visual delay"}.get(result.kind, result.kind.removesuffix("s")) if result.revealed else "setting"
+    names = [f"{delay:g}" for delay in result.delays_ms] or [name.lower() for name in result.names]
+    unit = " ms" if result.delays_ms else ""
+    which = counted(len(names), noun) + (f" ({listed(names)}{unit})" if result.revealed else "")
+    of = (
+        sorted({setting.liquid for setting in block.settings if setting.liquid is not None}) if result.delays_ms else []
+    )
     liquid = f" in {listed(of)}".replace("_", " ") if of else ""
-    asked = counted(len(found.items), "statement")
+    asked = counted(len(result.items), "statement")
     return (
-        f"In “{found.title}”, {which}{liquid} {'was' if len(names) == 1 else 'were'} presented"
+        f"In “{result.title}”, {which}{liquid} {'was' if len(names) == 1 else 'were'} presented"
         f"{f' {order}' if order and len(names) > 1 else ''}; participants rated {asked} after each."
     )
 
 
 def _block_order(study: Study) -> str:
     """Return the order of the main blocks, of each group if these differ; nothing with one block."""
-    titles = {one.id: one.title for one in study.blocks}
-    titles |= {one.id: one.title for one in study.levels if one.phase == "main"}
+    titles = {block.id: block.title for block in study.blocks}
+    titles |= {level.id: level.title for level in study.levels if level.phase == "main"}
     if len(titles) < 2:
         return ""
     order = study.protocol.get("study", {}).get("block_order", "fixed")
@@ -238,25 +245,31 @@ def _block_order(study: Study) -> str:
     orders = {
         group: [titles[step] for step in table.get("sequence", ()) if step in titles] for group, table in groups.items()
     }
-    if order == "fixed" and len({tuple(one) for one in orders.values()}) > 1:
-        by_group = [f"{listed([f'“{title}”' for title in one])} in the group {group}" for group, one in orders.items()]
+    if order == "fixed" and len({tuple(order) for order in orders.values()}) > 1:
+        by_group = [
+            f"{listed([f'“{title}”' for title in order])} in the group {group}" for group, order in orders.items()
+        ]
         return f"The order of the blocks was {'; '.join(by_group)}."
     return f"The blocks were presented {_BLOCK_ORDERS[order]}."
 
 
 def _delays(study: Study, results: Results) -> Iterator[str]:
     """Yield requested and achieved delays of each block of delays whose key is open."""
-    for found in results.blocks:
-        rows = [one for one in results.delivered if one.block == found.id and one.delay_ms is not None]
-        if not found.n or not found.delays_ms or not rows:
+    for block in results.blocks:
+        rows = [
+            delivered
+            for delivered in results.delivered
+            if delivered.block == block.id and delivered.delay_ms is not None
+        ]
+        if not block.n or not block.delays_ms or not rows:
             continue
-        known = [one for one in rows if one.achieved_ms is not None]
+        known = [row for row in rows if row.achieved_ms is not None]
         if not known:
-            yield f"The delays achieved in “{found.title}” were not measured."
+            yield f"The delays achieved in “{block.title}” were not measured."
             continue
-        pairs = [f"{number(one.achieved_ms, 1)} ms ({ms(one.delay_ms or 0.0)})" for one in known]
+        pairs = [f"{number(delivered.achieved_ms, 1)} ms ({ms(delivered.delay_ms or 0.0)})" for delivered in known]
         yield (
-            f"The mean delays achieved in “{found.title}” (and requested) were {listed(pairs)}, by the program's clock "
+            f"The mean delays achieved in “{block.title}” (and requested) were {listed(pairs)}, by the program's clock "
             "and without the latency of the display."
         )
 
@@ -280,23 +293,26 @@ def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) ->
         f"quartiles ({quartiles})."
     )
     yield from _means(results, blocks)
-    for found in blocks:
-        of_findings = [sentence for finding in all_findings() for sentence in finding(found, results).methods()]
+    for block in blocks:
+        of_findings = [sentence for finding in all_findings() for sentence in finding(block, results).methods()]
         if of_findings and len(blocks) > 1:
-            yield f"{lead(found)}:"
+            yield f"{lead(block)}:"
         yield from of_findings
     yield from _common(results, blocks)
 
 
 def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     """Yield which means are shown, and in which tests they are."""
-    if any(Effects.of(found) for found in blocks):
+    if any(Effects.of(block) for block in blocks):
         yield "Mean differences from the first setting are shown with Student's 95 % intervals."
     tested = [
-        ("the hypotheses", any(one.contrast.blocks[0] in {found.id for found in blocks} for one in results.contrasts)),
-        ("the equivalence tests", any(ContrastsWithControl.of(found) for found in blocks)),
-        ("the trend tests", results.decided.trends == "slopes" and any(DelayTrend.of(found) for found in blocks)),
-        ("the exploratory tests of means", any(MeanTests.tested(found) for found in blocks)),
+        (
+            "the hypotheses",
+            any(contrast.contrast.blocks[0] in {block.id for block in blocks} for contrast in results.contrasts),
+        ),
+        ("the equivalence tests", any(ContrastsWithControl.of(block) for block in blocks)),
+        ("the trend tests", results.decided.trends == "slopes" and any(DelayTrend.of(block) for block in blocks)),
+        ("the exploratory tests of means", any(MeanTests.tested(block) for block in blocks)),
     ]
     where = [what for what, applies in tested if applies]
     yield f"Means were tested in {listed(where)}." if where else "Means were not tested."
@@ -304,7 +320,7 @@ def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
 
 def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     decided = results.decided
-    gated = [found for found in blocks if (overall := OverAll.of(found)) is not None and overall.p is not None]
+    gated = [block for block in blocks if (overall := OverAll.of(block)) is not None and overall.p is not None]
     if gated:
         holm = f", adjusted by Holm over {counted(len(gated), 'block')}" if len(gated) > 1 else ""
         yield (
@@ -326,7 +342,7 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
         yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
     for finding in all_findings():
         yield from finding.common_methods(blocks)
-    if gone := sorted({person for found in blocks for people in found.incomplete.values() for person in people}):
+    if gone := sorted({person for block in blocks for people in block.incomplete.values() for person in people}):
         yield (
             f"Missing answers were not replaced: {number_text.counted(len(gone), 'participant')} with a missing "
             "answer to a statement were excluded from its tests over all conditions, and from comparisons of "

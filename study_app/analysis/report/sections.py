@@ -51,7 +51,7 @@ from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit
 
 def of_levels(results: Results) -> tuple[str, ...]:
     """Return what was found in blocks of levels, a sentence each."""
-    return tuple(line for found in results.levels for line in level_findings(found))
+    return tuple(line for level in results.levels for line in level_findings(level))
 
 
 def none_found(results: Results) -> str:
@@ -67,26 +67,26 @@ def none_found(results: Results) -> str:
 def limits(study: Study, results: Results) -> tuple[str, ...]:
     """Return what cannot be shown, a sentence each."""
     lines = list(_in_general(study, results))
-    for found in results.blocks:
-        if not found.n:
-            lines.append(f"{lead(found)}: no answers are included yet.")
+    for result in results.blocks:
+        if not result.n:
+            lines.append(f"{lead(result)}: no answers are included yet.")
             continue
-        lines += [f"{lead(found)}: {sentence}" for sentence in missing(found)]
-        decisive = [one for finding in all_findings() if finding.statements for one in finding.of(found)]
-        out = [f"“{short(found, one.item)}”" for one in decisive if one.verdict == "out of reach"]
+        lines += [f"{lead(result)}: {sentence}" for sentence in missing(result)]
+        decisive = [one for finding in all_findings() if finding.statements for one in finding.of(result)]
+        out = [f"“{short(result, one.item)}”" for one in decisive if one.verdict == "out of reach"]
         if out:
             lines.append(
-                f"{lead(found)}: the tests of {listed(out)} could not have been significant with so few participants: "
+                f"{lead(result)}: the tests of {listed(out)} could not have been significant with so few participants: "
                 "no rearrangement of the answers within participants gives an adjusted p that is small enough."
             )
         untested: dict[str, list[str]] = {}
         for one in decisive:
             if one.verdict == "not tested":
-                untested.setdefault(one.outcome.note, []).append(f"“{short(found, one.item)}”")
-        lines += [f"{lead(found)}: {listed(items)} could not be tested ({why})." for why, items in untested.items()]
-        lines += _mixed_up(found, results)
-        lines += [sentence for finding in all_findings() for sentence in finding(found, results).limits()]
-    lines += [sentence for found in results.levels for sentence in level_limits(found)]
+                untested.setdefault(one.outcome.note, []).append(f"“{short(result, one.item)}”")
+        lines += [f"{lead(result)}: {listed(items)} could not be tested ({why})." for why, items in untested.items()]
+        lines += _mixed_up(result, results)
+        lines += [sentence for finding in all_findings() for sentence in finding(result, results).limits()]
+    lines += [sentence for level in results.levels for sentence in level_limits(level)]
     return tuple(lines)
 
 
@@ -120,7 +120,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
             "first session are used."
         )
-    if len({one.contrast.groups is None for one in results.contrasts}) == 2:
+    if len({contrast.contrast.groups is None for contrast in results.contrasts}) == 2:
         yield "Interactions between groups and blocks or conditions are not tested."
     if results.questions and not (results.blocks or results.levels):
         yield (
@@ -148,16 +148,16 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         )
 
 
-def _mixed_up(found: BlockResult, results: Results) -> Iterator[str]:
+def _mixed_up(result: BlockResult, results: Results) -> Iterator[str]:
     """Name the settings that were in the same position for all participants, if several orders were expected."""
-    counts = results.orders.get(found.id)
+    counts = results.orders.get(result.id)
     if counts is None or counts.orders < 2 or len(counts.codes) < 2:
         return
     for place, line in enumerate(counts.positions, start=1):
         for code, count in zip(counts.codes, line, strict=True):
             if count == counts.orders:
                 yield (
-                    f"{lead(found)}: {name(found, code)} was in position {place} for all participants, so its effect "
+                    f"{lead(result)}: {name(result, code)} was in position {place} for all participants, so its effect "
                     "cannot be distinguished from the effect of that position."
                 )
 
@@ -169,9 +169,11 @@ answer model and by the ordinal probit model: ``liquid-study validate-report --s
 
 def conclusions(results: Results) -> list[tuple[str, ...]]:
     """Return the conclusions: part, question, verdict and what can be said."""
-    asked = {one.key: one.question for one in all_findings() if one.question}
-    kinds = {found.id: found.kind for found in results.blocks}
-    hypotheses = [("Hypothesis", question(one), one.verdict, answer(one)) for one in results.contrasts]
+    asked = {finding.key: finding.question for finding in all_findings() if finding.question}
+    kinds = {result.id: result.kind for result in results.blocks}
+    hypotheses = [
+        ("Hypothesis", question(contrast), contrast.verdict, answer(contrast)) for contrast in results.contrasts
+    ]
     return hypotheses + [
         (one.title, asked[one.question].format(kind=kinds[one.block]), one.verdict, one.text)
         for one in answers(results)
@@ -185,10 +187,10 @@ def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
     yield heading(2, "Planned exclusions")
     yield table_of(
         planned.proposals,
-        ("Session", lambda one: f"{one.participant}, session {one.session}"),
-        ("rule", lambda one: one.rule.replace("_", " ")),
-        ("because", lambda one: one.why),
-        ("decision", lambda one: ", ".join(filter(None, [one.decision, one.by]))),
+        ("Session", lambda proposal: f"{proposal.participant}, session {proposal.session}"),
+        ("rule", lambda proposal: proposal.rule.replace("_", " ")),
+        ("because", lambda proposal: proposal.why),
+        ("decision", lambda proposal: ", ".join(filter(None, [proposal.decision, proposal.by]))),
         words=4,
     )
     included, left_out = map(_conclusions_by_question, (planned.included, planned.left_out))
@@ -206,9 +208,9 @@ def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
 
 
 def _conclusions_by_question(results: Results) -> dict[str, str]:
-    found = {f"{part}: {asked}": f"{verdict}: {text}" for part, asked, verdict, text in conclusions(results)}
+    by_question = {f"{part}: {asked}": f"{verdict}: {text}" for part, asked, verdict, text in conclusions(results)}
     sentences = (sentence.partition(": ") for sentence in of_levels(results))
-    return found | {about: text for about, _, text in sentences}
+    return by_question | {about: text for about, _, text in sentences}
 
 
 def answers(results: Results) -> tuple[Answer, ...]:
@@ -218,10 +220,10 @@ def answers(results: Results) -> tuple[Answer, ...]:
     gate of every verdict of the block.
     """
     return tuple(
-        _answer(finding(found, results))
-        for found in results.blocks
+        _answer(finding(result, results))
+        for result in results.blocks
         for finding in all_findings()
-        if found.n and finding.question and found.kind in finding.kinds
+        if result.n and finding.question and result.kind in finding.kinds
     )
 
 
@@ -245,36 +247,36 @@ def empty_studies(participants: int) -> str:
 
 
 def block(
-    found: BlockResult, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
+    result: BlockResult, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
 ) -> Iterator[str]:
     """Yield the section of one block; a part that fails is said in its place, and kept in ``failures``."""
-    yield heading(2, lead(found))
-    if not found.n:
-        untested = any(one.block == found.id for one in results.failures)
+    yield heading(2, lead(result))
+    if not result.n:
+        untested = any(failure.block == result.id for failure in results.failures)
         none = paragraph("No answers are included yet.")
-        yield bullets(missing(found)) if untested else none
+        yield bullets(missing(result)) if untested else none
         return
     held = Failures() if failures is None else failures
-    pictures = {one.name.split("-")[0]: one for one in drawn if one.block == found.id}
-    for what, make in _parts(found, results, pictures):
-        yield from attempted(held, what, heading(3, what.capitalize()), make, block=found.id)
+    pictures = {picture.name.split("-")[0]: picture for picture in drawn if picture.block == result.id}
+    for what, make in _parts(result, results, pictures):
+        yield from attempted(held, what, heading(3, what.capitalize()), make, block=result.id)
 
 
 def _parts(
-    found: BlockResult, results: Results, pictures: Mapping[str, Picture]
+    result: BlockResult, results: Results, pictures: Mapping[str, Picture]
 ) -> Iterator[tuple[str, Callable[[], Iterable[str]]]]:
     """Yield what the parts of a block's section are, and how each is made."""
-    if said := said_of_presentations(found):
+    if said := said_of_presentations(result):
         yield "presentations", lambda: [paragraph(" ".join(said))]
-    if found.incomplete:
-        yield "missing answers", lambda: [paragraph(incomplete_words(found), "soft")]
+    if result.incomplete:
+        yield "missing answers", lambda: [paragraph(incomplete_words(result), "soft")]
     effects, *others = all_findings()
-    yield effects.what, effects(found, results, pictures).section
-    yield "figure of answers", lambda: drawn(pictures, found.kind)
+    yield effects.what, effects(result, results, pictures).section
+    yield "figure of answers", lambda: drawn(pictures, result.kind)
     for finding in others:
-        yield finding.what or finding.figure_title, finding(found, results, pictures).section
-    if found.absent:
-        lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(found)]
+        yield finding.what or finding.figure_title, finding(result, results, pictures).section
+    if result.absent:
+        lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(result)]
         yield "missing parts", lambda: (heading(3, "What could not be computed, and why"), bullets(lines))
 
 
@@ -291,18 +293,18 @@ def counts_of_answers(results: Results) -> Iterator[str]:
     if not results.blocks:
         return
     yield heading(2, "Answers, counted")
-    for found in results.blocks:
-        if found.measures:
-            yield heading(3, lead(found))
-            yield _measures(found)
+    for result in results.blocks:
+        if result.measures:
+            yield heading(3, lead(result))
+            yield _measures(result)
 
 
-def _measures(found: BlockResult) -> str:
-    order = [item.id for item in found.items]
+def _measures(result: BlockResult) -> str:
+    order = [item.id for item in result.items]
     return table_of(
-        sorted(found.measures, key=lambda row: order.index(str(row["item"]))),
-        ("Statement", lambda row: short(found, str(row["item"]))),
-        (settings_noun(found).capitalize(), lambda row: name(found, str(row["code"]))),
+        sorted(result.measures, key=lambda row: order.index(str(row["item"]))),
+        ("Statement", lambda row: short(result, str(row["item"]))),
+        (settings_noun(result).capitalize(), lambda row: name(result, str(row["code"]))),
         *((str(level), lambda row, level=level: str(row[f"count_{level}"])) for level in range(1, 8)),
         ("n", lambda row: str(row["n"])),
         ("missing", lambda row: str(row["missing"] + row["cannot_judge"])),
@@ -315,42 +317,44 @@ def _measures(found: BlockResult) -> str:
 
 def places(results: Results) -> dict[str, str]:
     """Return where questions were asked: id → title of the section, in the order of the session."""
-    levels = {one.block for one in results.levels}
+    levels = {level.block for level in results.levels}
 
-    def kind(one: QuestionResult) -> str:
-        return "form" if one.is_form else "levels" if one.where in levels else "other questions"
+    def kind(result: QuestionResult) -> str:
+        return "form" if result.is_form else "levels" if result.where in levels else "other questions"
 
-    return {one.where: f"{one.title}: {kind(one)}" for one in results.questions}
+    return {result.where: f"{result.title}: {kind(result)}" for result in results.questions}
 
 
 def question_section(where: str, study: Study, results: Results, drawn_: Sequence[Picture]) -> Iterator[str]:
     """Yield the section of a form, or of a block's other questions."""
     yield heading(2, places(results)[where])
-    asked = {(one.where.id, one.id): one for one in study.others.questions}
-    levels = [one for one in results.levels if one.block == where]
-    yield from _scores([one for one in results.scores if one.where == where])
-    for found in results.questions:
-        if found.where != where:
+    asked = {
+        (placed_question.where.id, placed_question.id): placed_question for placed_question in study.others.questions
+    }
+    levels = [level for level in results.levels if level.block == where]
+    yield from _scores([score for score in results.scores if score.where == where])
+    for result in results.questions:
+        if result.where != where:
             continue
-        yield heading(3, "Answers" if levels else found.short)
-        yield paragraph(found.text)
-        if any(one.summary == "settings" for one in levels):
+        yield heading(3, "Answers" if levels else result.short)
+        yield paragraph(result.text)
+        if any(level.summary == "settings" for level in levels):
             continue  # each from another start
-        if not found.n:
+        if not result.n:
             yield paragraph("No answers count yet.")
             continue
-        measure = by_name(MEASURES, found.measure)
+        measure = by_name(MEASURES, result.measure)
         if measure.cells is None:
-            for group in found.groups:
-                if len(found.groups) > 1:
+            for group in result.groups:
+                if len(result.groups) > 1:
                     yield paragraph(f"{group.name}:")
                 yield bullets(group.numbers["texts"])
             continue
-        rows = [(group.name, measure.cells(asked[where, found.item], group.numbers)) for group in found.groups]
+        rows = [(group.name, measure.cells(asked[where, result.item], group.numbers)) for group in result.groups]
         yield table(("Answers", *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
-        yield from drawn({one.name: one for one in drawn_}, f"question-{where}-{found.item}")
-    for one in levels:
-        yield from level_section(one, drawn_, study.estimator)
+        yield from drawn({picture.name: picture for picture in drawn_}, f"question-{where}-{result.item}")
+    for level in levels:
+        yield from level_section(level, drawn_, study.estimator)
 
 
 def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
@@ -364,15 +368,15 @@ def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
 
     yield table_of(
         [(score.name, group.name, group.numbers) for score in scores for group in score.groups],
-        ("Score", lambda one: one[0]),
-        ("Answers", lambda one: one[1]),
-        ("n", lambda one: str(one[2]["n"])),
-        ("mean", lambda one: number(one[2]["mean"], 1)),
-        ("SD", lambda one: number(one[2]["sd"], 1)),
-        ("range", lambda one: ends(one[2])),
+        ("Score", lambda row: row[0]),
+        ("Answers", lambda row: row[1]),
+        ("n", lambda row: str(row[2]["n"])),
+        ("mean", lambda row: number(row[2]["mean"], 1)),
+        ("SD", lambda row: number(row[2]["sd"], 1)),
+        ("range", lambda row: ends(row[2])),
         words=2,
     )
-    yield from (paragraph(source, "soft") for source in dict.fromkeys(one.source for one in scores) if source)
+    yield from (paragraph(source, "soft") for source in dict.fromkeys(score.source for score in scores) if source)
 
 
 _UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
@@ -401,9 +405,9 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         yield paragraph(f"Motors masked: {listed(answers)}.")
     yield heading(3, "Exclusions")
     gone = [
-        f"{describe_exclusion(one)}: {one.reason} ({one.rule_or_person}, {one.excluded_at}"
-        f"{', after the key was opened' if one in study.late else ''})"
-        for one in study.exclusions
+        f"{describe_exclusion(exclusion)}: {exclusion.reason} ({exclusion.rule_or_person}, {exclusion.excluded_at}"
+        f"{', after the key was opened' if exclusion in study.late else ''})"
+        for exclusion in study.exclusions
     ]
     if study.left_out:
         gone.append(f"{counted(study.left_out, 'session')} not completed and not analysed")
@@ -426,13 +430,13 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
     yield heading(2, f"{by.capitalize()}s")
     yield table((by.capitalize(), "participants"), [[group, str(count)] for group, count in counts.items()])
     means = group_means(study, by)
-    for found in results.blocks:
-        if rows := [one for one in means if one.block == found.id]:
-            yield heading(3, found.title)
-            yield _means(found, rows, by)
+    for result in results.blocks:
+        if rows := [mean for mean in means if mean.block == result.id]:
+            yield heading(3, result.title)
+            yield _means(result, rows, by)
     if not results.blocks:
         return
-    compared = by == "group" and any(one.contrast.groups for one in results.contrasts)
+    compared = by == "group" and any(contrast.contrast.groups for contrast in results.contrasts)
     tested = (
         f"Differences between {by}s are tested only in the hypotheses."
         if compared
@@ -446,15 +450,15 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
     )
 
 
-def _means(found: BlockResult, rows: Sequence[Any], by: By) -> str:
+def _means(result: BlockResult, rows: Sequence[Any], by: By) -> str:
     return table_of(
         rows,
-        ("Statement", lambda one: short(found, one.item)),
-        (settings_noun(found).capitalize(), lambda one: name(found, one.code)),
-        (by.capitalize(), lambda one: one.group),
-        ("n", lambda one: str(one.n)),
-        ("mean", lambda one: number(one.mean, 2)),
-        ("SD", lambda one: number(number_or_none(one.sd), 2)),
+        ("Statement", lambda row: short(result, row.item)),
+        (settings_noun(result).capitalize(), lambda row: name(result, row.code)),
+        (by.capitalize(), lambda row: row.group),
+        ("n", lambda row: str(row.n)),
+        ("mean", lambda row: number(row.mean, 2)),
+        ("SD", lambda row: number(number_or_none(row.sd), 2)),
         words=3,
     )
 
@@ -481,11 +485,21 @@ def _missing(study: Study) -> Iterator[str]:
     if rows:
         yield table_of(
             rows[:_SHOWN],
-            ("Session", lambda one: one.session),
-            ("missing", lambda one: f"{one.missing.count} of {one.missing.asked}"),
-            ("of which", lambda one: listed([f"{_track(study, *of)}: {n}" for of, n in one.missing.tracks.items()])),
-            ("because", lambda one: listed([limit_reason(limit, one.missing.limits) for limit in one.missing.reasons])),
-            ("session", lambda one: "counted" if one.counted else "not counted"),
+            ("Session", lambda lost_trials: lost_trials.session),
+            ("missing", lambda lost_trials: f"{lost_trials.missing.count} of {lost_trials.missing.asked}"),
+            (
+                "of which",
+                lambda lost_trials: listed(
+                    [f"{_track(study, *of)}: {n}" for of, n in lost_trials.missing.tracks.items()]
+                ),
+            ),
+            (
+                "because",
+                lambda lost_trials: listed(
+                    [limit_reason(limit, lost_trials.missing.limits) for limit in lost_trials.missing.reasons]
+                ),
+            ),
+            ("session", lambda lost_trials: "counted" if lost_trials.counted else "not counted"),
             words=5,
         )
     else:
@@ -503,7 +517,7 @@ def _missing(study: Study) -> Iterator[str]:
 
 def _track(study: Study, block: str, code: str) -> str:
     """Return the name of a setting of a block of levels, or its code while the key is sealed."""
-    titles = {one.id: one.title for one in study.levels}
+    titles = {level.id: level.title for level in study.levels}
     setting = study.settings.get((block, code))
     return f"{titles.get(block, block)}, {code if setting is None or setting.condition is None else setting.condition}"
 
@@ -517,23 +531,26 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
     if not results.delivered:
         return
     yield heading(3, "Were delays displayed as specified?")
-    blocks = {found.id: found for found in results.blocks}
+    blocks = {result.id: result for result in results.blocks}
 
     def shown(cell: Callable[[Delivered], str]) -> Callable[[Delivered], str]:
         return cell if study.revealed else lambda _one: "sealed"
 
-    def trials(one: Delivered) -> str:
-        whole = one.measured == one.trials or not study.revealed
-        return str(one.trials) if whole else f"{one.trials}, {one.measured} measured"
+    def trials(delivered: Delivered) -> str:
+        whole = delivered.measured == delivered.trials or not study.revealed
+        return str(delivered.trials) if whole else f"{delivered.trials}, {delivered.measured} measured"
 
     yield table_of(
         results.delivered,
-        ("Block", lambda one: blocks[one.block].title),
-        ("Setting", lambda one: "all" if one.code is None else name(blocks[one.block], one.code)),
+        ("Block", lambda delivered: blocks[delivered.block].title),
+        (
+            "Setting",
+            lambda delivered: "all" if delivered.code is None else name(blocks[delivered.block], delivered.code),
+        ),
         ("requested", shown(lambda one: "–" if one.delay_ms is None else ms(one.delay_ms))),
         ("achieved", shown(lambda one: "–" if one.achieved_ms is None else f"{number(one.achieved_ms, 1)} ms")),
-        ("mean error", shown(lambda one: _signed_ms(one.error_mean_ms))),
-        ("worst trial", shown(lambda one: _signed_ms(one.error_worst_ms))),
+        ("mean error", shown(lambda delivered: _signed_ms(delivered.error_mean_ms))),
+        ("worst trial", shown(lambda delivered: _signed_ms(delivered.error_worst_ms))),
         ("trials", trials),
         ("within limits", _within),
         words=2,
@@ -569,8 +586,8 @@ def _limit(what: str, limit: float) -> str:
     return f"{words.replace('_', ' ')} {most}" if words else most
 
 
-def _within(one: Delivered) -> str:
-    return f"{one.valid} of {one.judged}" if one.judged else "not measured"
+def _within(delivered: Delivered) -> str:
+    return f"{delivered.valid} of {delivered.judged}" if delivered.judged else "not measured"
 
 
 def _signed_ms(value: float | None) -> str:
@@ -578,14 +595,14 @@ def _signed_ms(value: float | None) -> str:
 
 
 def _orders(results: Results) -> Iterator[str]:
-    several = [(found, counts) for found in results.blocks if (counts := results.orders.get(found.id)) is not None]
-    several = [(found, counts) for found, counts in several if counts.orders and len(counts.codes) >= 2]
+    several = [(result, counts) for result in results.blocks if (counts := results.orders.get(result.id)) is not None]
+    several = [(result, counts) for result, counts in several if counts.orders and len(counts.codes) >= 2]
     if not several:
         return
     yield heading(3, "Orders that were run")
-    for found, counts in several:
-        names = [name(found, code) if found.revealed else code for code in counts.codes]
-        yield paragraph(f"{found.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
+    for result, counts in several:
+        names = [name(result, code) if result.revealed else code for code in counts.codes]
+        yield paragraph(f"{result.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
         lines = enumerate(counts.positions, start=1)
         yield table(("Position", *names), [[str(place), *map(str, line)] for place, line in lines])
     yield paragraph("Number of times that each condition was in each position of its block.", "soft")
@@ -609,20 +626,20 @@ def motion(results: Results) -> Iterator[str]:
     if measured is None:
         yield paragraph("Shown after unblinding, because force and motion reveal liquids and delays.")
         return
-    for found in results.blocks:
-        measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_of(measured, found, measure=one))]
-        rows = _motion_rows(found, measured, measures, results.delivered)
+    for result in results.blocks:
+        measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_of(measured, result, measure=one))]
+        rows = _motion_rows(result, measured, measures, results.delivered)
         if rows:
-            yield heading(3, found.title)
-            head = (settings_noun(found).capitalize(), "n", *map(_label, measures), "trials within limits")
+            yield heading(3, result.title)
+            head = (settings_noun(result).capitalize(), "n", *map(_label, measures), "trials within limits")
             yield table(head, rows)
-            if found.id not in measured.reaching:
+            if result.id not in measured.reaching:
                 yield paragraph(
                     "This block does not contain a reaching task, so there are no movement times, overshoots "
                     "or submovements.",
                     "soft",
                 )
-            elif not measured.recorded_in(found.id):
+            elif not measured.recorded_in(result.id):
                 yield paragraph(
                     "The recordings of this block could not be read, so there are no measures of reaches.", "soft"
                 )
@@ -638,30 +655,30 @@ def motion(results: Results) -> Iterator[str]:
     )
 
 
-def _of(measured: Performance, found: BlockResult, **wanted: str) -> Iterator[Moved]:
+def _of(measured: Performance, result: BlockResult, **wanted: str) -> Iterator[Moved]:
     """Yield the measures of a block, by code or by name."""
-    for one in measured.moved:
-        if one.block == found.id and all(getattr(one, field) == value for field, value in wanted.items()):
-            yield one
+    for moved in measured.moved:
+        if moved.block == result.id and all(getattr(moved, field) == value for field, value in wanted.items()):
+            yield moved
 
 
 def _motion_rows(
-    found: BlockResult, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
+    result: BlockResult, measured: Performance, measures: Sequence[str], delivered: Sequence[Delivered]
 ) -> list[list[str]]:
-    kept = {one.code: _within(one) for one in delivered if one.block == found.id}
+    kept = {one.code: _within(one) for one in delivered if one.block == result.id}
     rows = []
-    for setting in found.settings:
-        here = {one.measure: one for one in _of(measured, found, code=setting.code) if one.n}
+    for setting in result.settings:
+        here = {moved.measure: moved for moved in _of(measured, result, code=setting.code) if moved.n}
         if here:
-            n = max(one.n for one in here.values())
+            n = max(moved.n for moved in here.values())
             cells = [_quartiles(here[measure]) if measure in here else "–" for measure in measures]
-            rows.append([name(found, setting.code), str(n), *cells, kept[setting.code]])
+            rows.append([name(result, setting.code), str(n), *cells, kept[setting.code]])
     return rows
 
 
-def _quartiles(one: Moved) -> str:
-    digits = 2 if one.measure.endswith(("_s", "_n", "_m", "percent")) else 1
-    return f"{number(one.median, digits)} ({number(one.q1, digits)}–{number(one.q3, digits)})"
+def _quartiles(moved: Moved) -> str:
+    digits = 2 if moved.measure.endswith(("_s", "_n", "_m", "percent")) else 1
+    return f"{number(moved.median, digits)} ({number(moved.q1, digits)}–{number(moved.q3, digits)})"
 
 
 def _label(measure: str) -> str:

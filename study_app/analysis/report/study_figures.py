@@ -33,18 +33,20 @@ def pictures(
 def _of_blocks(
     study: Study, results: Results, forms: Sequence[str]
 ) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
-    for block, found in zip(study.blocks, results.blocks, strict=True):
-        if not found.n:
+    for block, result in zip(study.blocks, results.blocks, strict=True):
+        if not result.n:
             continue
-        lowest = {one.item: one.over_all_ms for one in LowestDelay.of(found) if one.over_all_ms is not None}
+        lowest = {
+            lowest.item: lowest.over_all_ms for lowest in LowestDelay.of(result) if lowest.over_all_ms is not None
+        }
         name = block_name(study, block)
         yield block.id, name, partial(answer_figures.answers_picture, study, block, name, forms, lowest)
         for finding in all_findings():
             if finding.figure_name:
                 several = len(finding.kinds) > 1 and len(study.blocks) > 1
                 name = f"{finding.figure_name}-{block.id}" if several else block_name(study, block, finding.figure_name)
-                drawing = Drawing(study, block, found, results, name, forms)
-                yield block.id, name, partial(finding(found, results).figure, drawing)
+                drawing = Drawing(study, block, result, results, name, forms)
+                yield block.id, name, partial(finding(result, results).figure, drawing)
 
 
 def block_name(study: Study, block: Block, what: str = "") -> str:

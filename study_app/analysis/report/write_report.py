@@ -83,16 +83,16 @@ def plain(value: Any) -> Any:
     return value
 
 
-def _entries(found: BlockResult) -> Iterator[tuple[str, Any]]:
+def _entries(result: BlockResult) -> Iterator[tuple[str, Any]]:
     """Yield a block's fields, with its findings in their midst."""
-    for field in fields(found):
+    for field in fields(result):
         if field.name != "findings":
-            if field.name != "incomplete" or found.incomplete:
-                yield field.name, getattr(found, field.name)
+            if field.name != "incomplete" or result.incomplete:
+                yield field.name, getattr(result, field.name)
             continue
         for finding in all_findings():
             if finding.what:
-                yield from finding.entries(found).items()
+                yield from finding.entries(result).items()
 
 
 _FORMAT: Final = 1
@@ -116,7 +116,7 @@ _MOTION: Final = (
 def tests(results: Results) -> list[dict[str, Any]]:
     """Return a row for every test."""
     in_order = sorted(all_findings(), key=lambda finding: finding.row_place)
-    of_blocks = (finding(found, results).rows() for found in results.blocks for finding in in_order)
+    of_blocks = (finding(block, results).rows() for block in results.blocks for finding in in_order)
     return [*contrast_rows(results), *chain.from_iterable(of_blocks)]
 
 
@@ -128,8 +128,8 @@ def tests_csv(results: Results) -> bytes:
 def motion_csv(results: Results) -> bytes:
     """Return a table with a row for every measure of motion and force under every setting."""
     moved = () if results.performance is None else results.performance.moved
-    blocks = {found.id: found for found in results.blocks}
-    kept = {(one.block, one.code): one for one in results.delivered}
+    blocks = {block.id: block for block in results.blocks}
+    kept = {(delivered.block, delivered.code): delivered for delivered in results.delivered}
     return csv_bytes(
         _MOTION,
         [
@@ -154,7 +154,9 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
             "key_opened": list(reveals_of(study.folder)),
         },
         "sessions": lambda: sessions(study),
-        "exclusions": lambda: [{**asdict(one), "after_unblinding": one in study.late} for one in study.exclusions],
+        "exclusions": lambda: [
+            {**asdict(exclusion), "after_unblinding": exclusion in study.late} for exclusion in study.exclusions
+        ],
         "doubts": lambda: [{"file": _path_in_study(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
         "files": lambda: files(study),
         **{what: partial(plain, text) for what, text in texts.items()},
@@ -166,7 +168,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
     content = {
         "format": _FORMAT,
         "program": f"liquid-study {__version__}",
-        "failures": [{**asdict(one), "why": one.why} for one in failures.found],
+        "failures": [{**asdict(failure), "why": failure.why} for failure in failures.found],
         **{name: None if isinstance(part, Failure) else part for name, part in held.items()},
     }
     return f"{json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False)}\n".encode()
@@ -185,9 +187,9 @@ def plug_ins(study: Study) -> dict[str, list[str]]:
     """Return the plug-ins that the sessions used, and those of this report: kinds and names by package and version."""
     places = map(StudyFolder, folders_of(study.folder).values())
     found = recorded_plug_ins(session.receipt for place in places for session in place.sessions())
-    for one in FINDINGS.plug_ins:
-        if not one.fault:
-            found.setdefault(f"{one.package} {one.version}", []).append(f"{one.kind} {one.name}")
+    for plug_in in FINDINGS.plug_ins:
+        if not plug_in.fault:
+            found.setdefault(f"{plug_in.package} {plug_in.version}", []).append(f"{plug_in.kind} {plug_in.name}")
     return found
 
 
@@ -204,13 +206,13 @@ def sessions(study: Study) -> list[dict[str, Any]]:
 
 def files(study: Study) -> dict[str, str]:
     """Return the SHA-256 of every file that the numbers come from; recordings are in their session's checksums."""
-    found = [study.folder / MANIFEST]
+    paths = [study.folder / MANIFEST]
     for place in map(StudyFolder, folders_of(study.folder).values()):
-        found += [place.exclusions, place.key, place.reveals, place.path / PREREGISTRATION]
+        paths += [place.exclusions, place.key, place.reveals, place.path / PREREGISTRATION]
         for session in place.sessions():
             tables = [session.table(study.name, name) for name in ("responses", "trials")]
-            found += [session.receipt, session.journal, session.checksums, *tables]
-    return {_path_in_study(study, path): sha256(path) for path in found if path.is_file()}
+            paths += [session.receipt, session.journal, session.checksums, *tables]
+    return {_path_in_study(study, path): sha256(path) for path in paths if path.is_file()}
 
 
 def _path_in_study(study: Study, path: Any) -> str:
@@ -286,9 +288,9 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
     drawn = []
-    for one in _drawn(study, results, failures):
-        drawn.append(one)
-        progress(f"drawing: {one.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
+    for picture in _drawn(study, results, failures):
+        drawn.append(picture)
+        progress(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
 
     texts: dict[str, Any] = {
         "findings": failures.value("texts: findings", lambda: sections.of_levels(results), ()),
@@ -297,9 +299,9 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
     }
     planned = failures.value("planned exclusions", lambda: planned_exclusions(study, results), None)
     if planned is not None:
-        open_ones = [one for one in planned.proposals if one.decision == "undecided"]
+        open_ones = [proposal for proposal in planned.proposals if proposal.decision == "undecided"]
         texts["limits"] = (*_proposed(open_ones), *texts["limits"])
-        texts["planned_exclusions"] = [asdict(one) for one in planned.proposals]
+        texts["planned_exclusions"] = [asdict(proposal) for proposal in planned.proposals]
     files: dict[str, bytes] = {}
     for file, make in (
         ("report.R", lambda: r_script(study).encode()),
@@ -330,7 +332,12 @@ def _drawn(study: Study, results: Results, failures: Failures) -> Iterator[Pictu
 def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
     """Yield the sentence on sessions for which a person has to decide."""
     if proposals:
-        who = listed([f"{one.participant}, session {one.session} ({one.rule.replace('_', ' ')})" for one in proposals])
+        who = listed(
+            [
+                f"{proposal.participant}, session {proposal.session} ({proposal.rule.replace('_', ' ')})"
+                for proposal in proposals
+            ]
+        )
         yield f"Proposed for exclusion, not decided: {who}. See “Planned exclusions”."
 
 
@@ -344,10 +351,10 @@ def _page(
 ) -> str:
     numbers = failures.value("numbers of participants", lambda: numbers_of(study), {})
     on_first = failures.value("first page, figures", lambda: figures_shown(cards(results, numbers), drawn), set())
-    others = [one for one in drawn if one.name not in on_first]
+    others = [picture for picture in drawn if picture.name not in on_first]
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("Hypotheses", lambda: contrast_section(results)),
-        *((found.title, partial(sections.block, found, results, others, failures)) for found in results.blocks),
+        *((block.title, partial(sections.block, block, results, others, failures)) for block in results.blocks),
         *(
             (title, partial(sections.question_section, where, study, results, others))
             for where, title in sections.places(results).items()
@@ -382,7 +389,7 @@ def _page(
             for title, html, is_open in made
             if html
         ],
-        failures=[str(one) for one in failures.found],
+        failures=[str(failure) for failure in failures.found],
         first=Markup().join(first),
     )
     fonts = [(weight, font_face(name)) for weight, name in (("400", "Regular"), ("500 800", "Bold"))]

@@ -97,8 +97,8 @@ def tost(
         )
     array = checked(differences, "participants")
     kept = np.sort(array[~np.isnan(array)])
-    found = _compared(tuple(kept.tolist()), float(bound), alpha, seed, largest)
-    return replace(found, dropped=len(array) - len(kept))
+    equivalence = _compared(tuple(kept.tolist()), float(bound), alpha, seed, largest)
+    return replace(equivalence, dropped=len(array) - len(kept))
 
 
 def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> Array:
@@ -107,7 +107,7 @@ def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> A
     ``n`` is the number of participants, of two groups that of the smaller one.
     """
     both = (means, means.opposite())
-    ps = [p for one in both for p in (one.p_t(-bound), one.p_bootstrap(-bound))]
+    ps = [p for means in both for p in (means.p_t(-bound), means.p_bootstrap(-bound))]
     return np.asarray(np.maximum(np.max(ps, axis=0), p_unseen(n, bound, largest)))
 
 
@@ -133,24 +133,24 @@ def fewest(alpha: float, bound: float, largest: float | None = STEPS) -> int:
 def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: int, largest: float) -> Equivalence:
     """Return the comparison of ascending ``differences``: answers in whole points repeat."""
     kept = np.array(differences)
-    found = _described(kept, bound, alpha, largest)
-    if found.n < 2:
-        return found
+    equivalence = _described(kept, bound, alpha, largest)
+    if equivalence.n < 2:
+        return equivalence
     means = means_of(kept[None], seed=seed, resamples=resamples_for(alpha))
     both = (means, means.opposite())
-    p_lower, p_upper = (float(one.p_t(-bound)[0]) for one in both)
-    by_bootstrap = max(float(one.p_bootstrap(-bound)[0]) for one in both)
-    unseen = p_unseen(found.n, bound, largest)
-    found = replace(found, p=by_bootstrap, p_bootstrap=by_bootstrap, p_unseen=unseen)
-    if found.sd is not None and found.sd > SAME:
+    p_lower, p_upper = (float(means.p_t(-bound)[0]) for means in both)
+    by_bootstrap = max(float(means.p_bootstrap(-bound)[0]) for means in both)
+    unseen = p_unseen(equivalence.n, bound, largest)
+    equivalence = replace(equivalence, p=by_bootstrap, p_bootstrap=by_bootstrap, p_unseen=unseen)
+    if equivalence.sd is not None and equivalence.sd > SAME:
         level = 1 - 2 * alpha
         low, high = means.interval(level)
         t_lower, t_upper = (float(means.t(side * bound)[0]) for side in (-1, 1))
-        found = replace(
-            found,
+        equivalence = replace(
+            equivalence,
             statistic=min(t_lower, -t_upper),
             p=max(p_lower, p_upper),
-            method=f"t({found.n - 1}), bound ±{bound:g} points",
+            method=f"t({equivalence.n - 1}), bound ±{bound:g} points",
             interval=Interval(low=float(low[0]), high=float(high[0]), level=level, method="t"),
             no_interval="",
             t_lower=t_lower,
@@ -159,32 +159,34 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             p_upper=p_upper,
         )
     else:
-        found = replace(found, method=f"bootstrap, bound ±{bound:g} points: all differences are equal")
+        equivalence = replace(equivalence, method=f"bootstrap, bound ±{bound:g} points: all differences are equal")
     by_tests = max(p_lower, p_upper, by_bootstrap) <= alpha
-    beyond = is_beyond(found, bound, alpha)
-    if found.interval is not None:
-        further = means if found.interval.low > 0 else means.opposite()
+    beyond = is_beyond(equivalence, bound, alpha)
+    if equivalence.interval is not None:
+        further = means if equivalence.interval.low > 0 else means.opposite()
         agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
-        found = replace(found, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
+        equivalence = replace(equivalence, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
     verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
     few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)} are needed"
     note = "" if verdict == "equivalent" else few if by_tests else "equivalence is not shown"
     return replace(
-        found,
+        equivalence,
         verdict="not equivalent" if beyond else verdict,
         note="the mean differs by more than the bound" if beyond else note,
     )
 
 
-def is_beyond(found: Outcome, bound: float, alpha: float) -> bool:
+def is_beyond(outcome: Outcome, bound: float, alpha: float) -> bool:
     """Return whether the whole interval of an effect is further than ``bound`` from 0.
 
     Without an interval, because all participants differ equally, so many must be beyond it that a sign test shows it.
     """
-    if found.effect is None:
+    if outcome.effect is None:
         return False
-    few = found.interval is None and 0.5**found.n > alpha
-    low, high = (found.effect, found.effect) if found.interval is None else (found.interval.low, found.interval.high)
+    few = outcome.interval is None and 0.5**outcome.n > alpha
+    low, high = (
+        (outcome.effect, outcome.effect) if outcome.interval is None else (outcome.interval.low, outcome.interval.high)
+    )
     return not few and (low > bound + SAME or high < -bound - SAME)
 
 

@@ -129,14 +129,14 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     if spending == "obrien-fleming":
         spent = 4 * norm.sf(norm.isf(alpha / 4) / np.sqrt(shares))
     nodes, of_nodes = np.polynomial.legendre.leggauss(_NODES)
-    found, places, weights, before = [], np.zeros(1), np.ones(1), 0.0
+    alphas, places, weights, before = [], np.zeros(1), np.ones(1), 0.0
     for share, due in zip(shares, np.diff(spent, prepend=0.0), strict=True):
         end = float(brentq(_excess, 0.0, 40.0, (places, weights, math.sqrt(share - before), due)))
         inside = end * nodes
         density = norm.pdf(inside[:, None], places, math.sqrt(share - before)) @ weights
         places, weights, before = inside, density * end * of_nodes, share
-        found.append(float(2 * norm.sf(end / math.sqrt(share))))
-    return tuple(found)
+        alphas.append(float(2 * norm.sf(end / math.sqrt(share))))
+    return tuple(alphas)
 
 
 _MOST_REPORTS: Final = 200
@@ -213,12 +213,12 @@ def p_of_draws(drawn: NDArray[np.floating], seen: NDArray[np.floating]) -> Array
     Where none is, p is at most that of one, and follows from a Pearson distribution of type III with the first three
     moments of those drawn: the verdict at a small alpha does not depend on the number of draws.
     """
-    found = np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(drawn)))
-    if (alone := found * (1 + len(drawn)) < 1.5).any():
+    p = np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(drawn)))
+    if (alone := p * (1 + len(drawn)) < 1.5).any():
         few = drawn[:, alone].astype(np.float64)
         tail = pearson3.sf(seen[alone], skew(few), few.mean(axis=0), few.std(axis=0))
-        found[alone] = np.fmin(found[alone], tail)
-    return found
+        p[alone] = np.fmin(p[alone], tail)
+    return p
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,7 +56,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     rows, dropped = complete(values, at_least=2, why=" for a test of means")
     design = _design(rows.shape[1], columns)
     n, several = len(rows), design.shape[1]
-    found = SlopeTest(
+    test = SlopeTest(
         test=T_TEST if several == 1 else HOTELLING,
         n=n,
         dropped=dropped,
@@ -71,7 +71,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         few = f"no test of means below {fewest} participants: slopes of so few would have to be normal"
         note = few if n < fewest else _NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
-        return replace(found, no_interval=note, note=note)
+        return replace(test, no_interval=note, note=note)
     means, errors = own.mean(axis=0), np.sqrt(np.diag(covariance) / n)
     if several == 1:
         statistic = float(means[0] / errors[0])
@@ -86,7 +86,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     sides = f"one-sided ({direction})" if direction else "two-sided"
     freedom = f"t({n - 1}), {sides}" if several == 1 else f"F({several}, {n - several})"
     return replace(
-        found,
+        test,
         statistic=statistic,
         p=p,
         method=freedom,

@@ -165,41 +165,45 @@ def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, 
         lapse_prior=equal,
         guesses=_RATES,
     )
-    found = fit(levels, yes.sum(axis=0), (asked - yes).sum(axis=0), grid)
+    posterior = fit(levels, yes.sum(axis=0), (asked - yes).sum(axis=0), grid)
     if people < 2:
-        return found, 1.0, _ends(found, 1.0)
-    dispersion = _dispersion(found, levels, yes, asked)
-    return found, dispersion, _ends(found, dispersion * float(student.ppf((1 + _SURE) / 2, people - 1) / Z_95) ** 2)
+        return posterior, 1.0, _ends(posterior, 1.0)
+    dispersion = _dispersion(posterior, levels, yes, asked)
+    return (
+        posterior,
+        dispersion,
+        _ends(posterior, dispersion * float(student.ppf((1 + _SURE) / 2, people - 1) / Z_95) ** 2),
+    )
 
 
-def _dispersion(found: Posterior, levels: Array, yes: Array, asked: Array) -> float:
+def _dispersion(posterior: Posterior, levels: Array, yes: Array, asked: Array) -> float:
     """Return the variance of the participants' scores over the information that independent answers would have.
 
     A score is the difference of a participant's log-likelihood between the best curves at the ends of the interval of
     independent answers, over their distance: it exists for a curve that is as steep as the grid allows.
     """
-    _, log_yes, log_no = tables(found.grid, tuple(levels.tolist()))
-    thresholds = found.grid.thresholds
-    first, last = (int(np.searchsorted(np.cumsum(found.marginal), share)) for share in (0.025, 0.975))
+    _, log_yes, log_no = tables(posterior.grid, tuple(levels.tolist()))
+    thresholds = posterior.grid.thresholds
+    first, last = (int(np.searchsorted(np.cumsum(posterior.marginal), share)) for share in (0.025, 0.975))
     first = min(first, len(thresholds) - 2)
     last = min(max(last, first + 1), len(thresholds) - 1)
     at_ends = []
     for place in (first, last):
-        best = (slice(None), place, *np.unravel_index(found.weights[place].argmax(), found.grid.shape[1:]))
+        best = (slice(None), place, *np.unravel_index(posterior.weights[place].argmax(), posterior.grid.shape[1:]))
         at_ends.append(yes @ log_yes[best] + (asked - yes) @ log_no[best])
     scores = (at_ends[1] - at_ends[0]) / (thresholds[last] - thresholds[first])
-    low, high = found.interval
+    low, high = posterior.interval
     return max(1.0, float(scores.var(ddof=1)) * len(scores) * ((high - low) / (2 * Z_95)) ** 2)
 
 
-def _ends(found: Posterior, scale: float) -> tuple[float | None, float | None]:
+def _ends(posterior: Posterior, scale: float) -> tuple[float | None, float | None]:
     """Return the ends of the interval; None where the threshold may lie beyond that end of the grid.
 
     The density of the threshold there is exp(−scale z²/2) of the highest, as that of a normal distribution whose
     variance is ``scale`` times larger.
     """
-    thresholds = np.array(found.grid.thresholds)
-    heights = np.log(np.maximum(found.marginal, 1e-300)) - float(np.log(found.marginal.max()))
+    thresholds = np.array(posterior.grid.thresholds)
+    heights = np.log(np.maximum(posterior.marginal, 1e-300)) - float(np.log(posterior.marginal.max()))
     cut = -scale * Z_95**2 / 2
     inside = np.flatnonzero(heights >= cut)
     ends: list[float | None] = []
@@ -255,8 +259,8 @@ def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
     ``successes`` of ``n`` answers have shape (…, k), the function's shares (k,) lie strictly between 0 and 1.
     """
     y, m, psi = np.asarray(successes, float), np.asarray(n, float), np.asarray(expected, float)
-    found = 2.0 * (xlogy(y, y / (m * psi)) + xlogy(m - y, (m - y) / (m * (1.0 - psi))))
-    return np.asarray(np.maximum(found, 0.0), float)
+    terms = 2.0 * (xlogy(y, y / (m * psi)) + xlogy(m - y, (m - y) / (m * (1.0 - psi))))
+    return np.asarray(np.maximum(terms, 0.0), float)
 
 
 def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
@@ -264,8 +268,8 @@ def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
     draw = np.random.default_rng(SEED)
     drawn = draw.binomial(np.asarray(n, np.int64), np.asarray(expected, float), (SETS, np.size(expected)))
     simulated = deviances(drawn, n, expected).sum(axis=-1)
-    found = float(deviances(successes, n, expected).sum())
-    return float(1 + np.count_nonzero(simulated >= found - 1e-9)) / (SETS + 1)
+    observed = float(deviances(successes, n, expected).sum())
+    return float(1 + np.count_nonzero(simulated >= observed - 1e-9)) / (SETS + 1)
 
 
 def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:

@@ -51,14 +51,14 @@ _LOOKS: Final[dict[str, dict[str, Any]]] = {
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(found: Accuracy) -> Figure:
+def draw(accuracy: Accuracy) -> Figure:
     """Draw the results: a panel for each kind of reference, the legend below."""
     kinds: tuple[Kind, ...] = ("numerical", "physical")
-    panels = [_Panel(found, kind) for kind in kinds if found.of(kind)]
-    key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in found.notes), _LETTERS)
+    panels = [_Panel(accuracy, kind) for kind in kinds if accuracy.of(kind)]
+    key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in accuracy.notes), _LETTERS)
     height_pt = sum(panel.height_pt for panel in panels) + _FOOT_PT + _LINE_PT * len(key)
     figure = Figure(figsize=(_WIDTH_PT / 72, height_pt / 72), facecolor="white")
-    least, most = _span(found)
+    least, most = _span(accuracy)
     down_pt = 0.0
     for panel in panels:
         panel.draw(figure, down_pt, height_pt, (least, most), last=panel is panels[-1])
@@ -82,27 +82,29 @@ _KEY: Final = (
 )
 
 
-def _span(found: Accuracy) -> tuple[float, float]:
+def _span(accuracy: Accuracy) -> tuple[float, float]:
     """Return the least and the greatest time on the axis [ns]."""
-    times = [row.ns_per_ms for row in found.rows] + [it.computing_s * 1e6 for it in found.truths if it.computing_s]
+    times = [row.ns_per_ms for row in accuracy.rows] + [
+        it.computing_s * 1e6 for it in accuracy.truths if it.computing_s
+    ]
     return min(times) / 2, max(*times, _BUDGET_NS) * 4
 
 
 class _Panel:
     """All candidates against one kind of reference."""
 
-    def __init__(self, found: Accuracy, kind: Kind) -> None:
-        rows = found.of(kind)
+    def __init__(self, accuracy: Accuracy, kind: Kind) -> None:
+        rows = accuracy.of(kind)
         self._points = worst(rows)
         self._rows = rows
         self._front = [self._points[candidate] for candidate in front(self._points)]
-        self._solved = [it.computing_s * 1e6 for it in found.truths if it.computing_s]
+        self._solved = [it.computing_s * 1e6 for it in accuracy.truths if it.computing_s]
         self._numerical = kind == "numerical"
         self._strip = [row for row in self._points.values() if row.error.rms < _ROUNDED]
         names = ", ".join(dict.fromkeys(row.truth for row in rows))
         if self._numerical:
             self._heading = "Numerical error: compared with the exact sums"
-            text = f"{rows[0].liquid}, {found.motion}; drag{' and wake' if self._strip[1:] else ''} summed exactly"
+            text = f"{rows[0].liquid}, {accuracy.motion}; drag{' and wake' if self._strip[1:] else ''} summed exactly"
         else:
             self._heading = "Physical error: compared with references"
             text = f"{rows[0].liquid}; {names}"
@@ -147,8 +149,8 @@ class _Panel:
         axes.axvline(_BUDGET_NS, color=style.TEXT, linewidth=0.8, linestyle=(0, (1, 1.5)))
         if lowest and last:
             axes.set_xlabel("Computation time of 1 ms of motion (one tick at 1 kHz)", fontsize=_SMALL + 0.4, labelpad=2)
-        for one, other in zip(self._front, self._front[1:], strict=False):
-            times, errors = (one.ns_per_ms, other.ns_per_ms), (100 * one.error.rms, 100 * other.error.rms)
+        for row, other in zip(self._front, self._front[1:], strict=False):
+            times, errors = (row.ns_per_ms, other.ns_per_ms), (100 * row.error.rms, 100 * other.error.rms)
             axes.plot(times, errors, color=style.ZERO, linewidth=1.2, zorder=2)
 
     def _main(self, axes: Axes) -> None:
@@ -279,18 +281,18 @@ def _values(row: Row) -> tuple[str | float, ...]:
     )
 
 
-def evidence(found: Accuracy) -> Evidence:
+def evidence(accuracy: Accuracy) -> Evidence:
     """Return the tables, as Markdown with the source of each reference and as CSV, and the figure."""
-    parts = [f"Machine: {found.machine}.", f"Motion: {found.motion}.", _WHAT]
-    parts += [f"**{truth.name}**: {truth.source}." for truth in found.truths]
-    parts += [f"Note: {note}." for note in found.notes]
-    for truth in found.truths:
-        rows = [row for row in found.rows if row.truth == truth.name]
+    parts = [f"Machine: {accuracy.machine}.", f"Motion: {accuracy.motion}.", _WHAT]
+    parts += [f"**{truth.name}**: {truth.source}." for truth in accuracy.truths]
+    parts += [f"Note: {note}." for note in accuracy.notes]
+    for truth in accuracy.truths:
+        rows = [row for row in accuracy.rows if row.truth == truth.name]
         parts.append(f"## Against the {truth.name} ({rows[0].kind}), {rows[0].liquid}\n\n" + _markdown_table(rows))
     text = "\n\n".join(parts) + "\n"
-    cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in found.rows]
+    cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in accuracy.rows]
     files = {"accuracy.csv": Table(COLUMNS, cells).csv(), "accuracy.md": text}
-    return Evidence(text, files, plot_files("accuracy", "Accuracy and computation time", draw, found))
+    return Evidence(text, files, plot_files("accuracy", "Accuracy and computation time", draw, accuracy))
 
 
 _WHAT: Final = (

@@ -194,13 +194,13 @@ class _UnsteadyDrag(Candidate):
         """Return the forces; by the equations where a motion is left out of the fit."""
         if truth.left_out is None:
             return super().forces_against(truth)
-        found = []
+        forces = []
         for case in truth.cases:
             self.begin(case.motion)
             w, interval_s = self._motion[2], np.full(self.ticks, 1 / self.rate_hz)
             dw = np.diff(w, axis=0, prepend=w[:1]) * self.rate_hz
-            found.append(unsteady_n(self.scene, w, dw, interval_s, truth.left_out))
-        return found
+            forces.append(unsteady_n(self.scene, w, dw, interval_s, truth.left_out))
+        return forces
 
 
 class _LinearViscosity(Candidate):

@@ -233,11 +233,11 @@ def _race(
 
 def worst(rows: Sequence[Row]) -> dict[Candidate, Row]:
     """Return each candidate's row against the reference with its greatest error."""
-    found: dict[Candidate, Row] = {}
+    largest: dict[Candidate, Row] = {}
     for row in rows:
-        if row.candidate not in found or row.error.rms > found[row.candidate].error.rms:
-            found[row.candidate] = row
-    return found
+        if row.candidate not in largest or row.error.rms > largest[row.candidate].error.rms:
+            largest[row.candidate] = row
+    return largest
 
 
 def front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:

@@ -76,14 +76,14 @@ class Surveyed:
 
 def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
     """Measure every liquid with a viscosity of a file, by name; thicker ones first."""
-    found = []
+    surveyed = []
     for name, scene in scenes.items():
         liquid = scene.liquids[0]
         if liquid.viscosity_pa_s is None or liquid.drag.law == "linear":
             continue
         progress(name)
-        found.append(_surveyed(name, scene, liquid, liquid.viscosity_pa_s))
-    return tuple(sorted(found, key=lambda it: it.reynolds))
+        surveyed.append(_surveyed(name, scene, liquid, liquid.viscosity_pa_s))
+    return tuple(sorted(surveyed, key=lambda it: it.reynolds))
 
 
 def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:

@@ -91,14 +91,14 @@ class Fitted:
 
 def fit_all(tables: Sequence[SolvedTable], progress: Callable[[str], None] = lambda _: None) -> tuple[Fitted, ...]:
     """Return every model fitted to every table, each tried on the others of the same liquid."""
-    found = []
+    fits = []
     for table in tables:
         progress(f"fitting {len(MODELS)} models to {table.case.liquid_id}, {table.notes['title']} ...")
         others = [it for it in tables if it.case.liquid_id == table.case.liquid_id and it is not table]
         for model in MODELS:
             values, warnings = fit_one(model, table)
-            found.append(judge(model, table, values, others, warnings))
-    return tuple(found)
+            fits.append(judge(model, table, values, others, warnings))
+    return tuple(fits)
 
 
 def fit_one(model: Model, table: SolvedTable) -> tuple[dict[str, float], tuple[str, ...]]:
@@ -370,7 +370,11 @@ _HEADINGS: Final = (
 
 def _row(it: Fitted) -> tuple[str, ...]:
     ranges = find_parameters(_scene_of(it.model, it.case), it.case.liquid_id, it.model.free) if it.model.free else ()
-    within = {one.name for one in ranges if one.least * (1 + _EDGE) < it.values[one.name] < one.most * (1 - _EDGE)}
+    within = {
+        parameter.name
+        for parameter in ranges
+        if parameter.least * (1 + _EDGE) < it.values[parameter.name] < parameter.most * (1 - _EDGE)
+    }
     fitted = ", ".join(f"{name} {value:.3g}{'' if name in within else '*'}" for name, value in it.values.items())
     return (
         *(it.model.name, fitted or "nothing", f"{it.rms_n:.2g} N ({it.share:.1%})", f"{it.worst_n:.2g} N"),

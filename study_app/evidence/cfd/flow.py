@@ -83,7 +83,7 @@ class Flow:
         ng = self._ng
         flow, residual, step = ng.GridFunction(self._space), self._zeros(), self._zeros()
         flow.vec.data = self._stream
-        found = []
+        forces = []
         for value in reynolds:
             form = ng.BilinearForm(self._space)
             form += self._integral(self._stokes(1 / value) + self._convection(*self._trial[:2]))
@@ -97,8 +97,8 @@ class Flow:
             else:
                 raise StudyError(f"no steady flow was found at Re = {value:g}: take smaller steps up to it")
             form.Apply(flow.vec, residual)
-            found.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (math.pi / 8))
-        return found
+            forces.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (math.pi / 8))
+        return forces
 
     def unsteady(
         self, reynolds: float, times: Floats, speed: Callable[[float], float], *, convection: bool = True

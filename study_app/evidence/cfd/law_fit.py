@@ -146,10 +146,10 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
         constants = Constants._make(np.exp(logs).tolist())
         return np.concatenate([it.residuals(constants) for it in solved])
 
-    found = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
-    if not found.success:
-        raise StudyError(f"no constants were found: {found.message}")
-    return Constants._make(np.exp(found.x).tolist())
+    solution = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
+    if not solution.success:
+        raise StudyError(f"no constants were found: {solution.message}")
+    return Constants._make(np.exp(solution.x).tolist())
 
 
 def evidence(found: Refit) -> Evidence:
@@ -157,9 +157,9 @@ def evidence(found: Refit) -> Evidence:
     values = zip(Constants._fields, found.constants, CONSTANTS, strict=True)
     constants = [(name, f"{fitted:.3g}", f"{own:g}") for name, fitted, own in values]
     motions = []
-    for it in sorted(found.errors, key=lambda one: one.table.case.reynolds):
+    for it in sorted(found.errors, key=lambda error: error.table.case.reynolds):
         errors = (it.fitted, it.left_out, it.program)
-        shares = ["held out" if one is None else f"{one[0]:.1%} ({one[1]:.1%})" for one in errors]
+        shares = ["held out" if error is None else f"{error[0]:.1%} ({error[1]:.1%})" for error in errors]
         case = it.table.case
         motions.append((case.title, case.liquid_id, f"{case.reynolds:.3g}", *shares))
     headings = ("motion", "liquid", "Re", "fitted to all", "left out of the fit", "program, 1 kHz")

@@ -115,16 +115,16 @@ def motions(folder: Path | None = None, only: str = "") -> tuple[Motion, ...]:
     folder = folder or Path(__file__).resolve().parent
     lines = (folder / SUMS).read_text("utf-8").splitlines()
     sums = {line[66:]: line[:64] for line in lines if not line.startswith("#")}
-    found = []
+    records = []
     for place, fitted in _FOLDERS.items():
         for path in sorted(it for it in (folder / place).glob("*mmps.csv") if only in it.stem):
             content = path.read_bytes()
             if hashlib.sha256(content).hexdigest() != sums.get(path.relative_to(folder).as_posix()):
                 raise _EngineError(f"{path} is not the published table: its checksum is not in {SUMS}")
-            found.append(_motion(path.stem, content.decode("utf-8"), fitted=fitted))
-    if not found:
+            records.append(_motion(path.stem, content.decode("utf-8"), fitted=fitted))
+    if not records:
         raise _EngineError(f"{folder} does not contain a motion with '{only}' in its name")
-    return tuple(found)
+    return tuple(records)
 
 
 def _motion(name: str, text: str, *, fitted: bool) -> Motion:
@@ -224,10 +224,10 @@ def releases(engine: _Engine, motion: Motion, delays: Sequence[int] = DELAYS) ->
     given_j, borne = 0.0, -1
     for delay in delays:
         cases = itertools.product(HANDLES_KG, _PHASES)
-        found = [release(engine, motion.setup, handle_kg, phase, delay) for handle_kg, phase in cases]
+        measured = [release(engine, motion.setup, handle_kg, phase, delay) for handle_kg, phase in cases]
         if delay <= 1:
-            given_j = max(given_j, *(one_j for one_j, _ in found))
-        if any(fails for _, fails in found):
+            given_j = max(given_j, *(one_j for one_j, _ in measured))
+        if any(fails for _, fails in measured):
             break
         borne = delay
     return Releases(motion.notes["liquid"], given_j, borne)
@@ -372,10 +372,10 @@ def _engine_of(words: Sequence[str], function: str) -> Iterator[_Engine]:
     module, _, name = function.partition(":")
     sys.path.insert(0, "")
     try:
-        found: Any = getattr(importlib.import_module(module), name)
+        engine: Any = getattr(importlib.import_module(module), name)
     except (ImportError, AttributeError, ValueError) as error:
         raise _EngineError(f"--function {function}: {error}; write MODULE:FUNCTION") from error
-    yield found
+    yield engine
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -249,20 +249,20 @@ class Case:
 
 def cases() -> tuple[Case, ...]:
     """Return each liquid at the greatest speed of its protocol, in the scene and, as at scale 1, of the hand."""
-    found = []
+    all_cases = []
     for liquid_id in LIQUIDS:
         scene = load_scene(shipped_file(_PROTOCOL), liquid_id)
         fastest_mps = scene.motion_in(scene.liquids[0]).speed_mps or math.nan
-        found += [_case(liquid_id, speed_mps) for speed_mps in (fastest_mps / scene.scale, fastest_mps)]
-    return tuple(found)
+        all_cases += [_case(liquid_id, speed_mps) for speed_mps in (fastest_mps / scene.scale, fastest_mps)]
+    return tuple(all_cases)
 
 
 def cases_of(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple[Case, ...]:
     """Return the cases of motions by profile, liquid and Reynolds number."""
     found = []
     for profile, liquid_id, reynolds in motions:
-        one = _case(liquid_id, 1e-3)
-        found.append(_case(liquid_id, 1e-3 * reynolds / one.reynolds, profile))
+        case = _case(liquid_id, 1e-3)
+        found.append(_case(liquid_id, 1e-3 * reynolds / case.reynolds, profile))
     return tuple(found)
 
 

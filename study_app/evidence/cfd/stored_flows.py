@@ -157,7 +157,7 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
     more = (*training(), *held_out()) if folder is None else ()
     tables = (*stored(folder), *more)
     without = left_out() if folder is None else {}
-    found = []
+    truths = []
     for table in tables:
         notes = table.notes
         *of, computing_s = (float(notes[name]) for name in _OF_THE_MODEL)
@@ -175,7 +175,7 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
         source = f"fluid solver: {notes.get('command', 'unknown command')}"
         title = notes.get("title", "a solved flow")
         constants = without.get(table.case.name) if without else None
-        found.append(
+        truths.append(
             Truth(
                 name=title,
                 source=source,
@@ -185,4 +185,4 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
                 left_out=constants,
             )
         )
-    return tuple(found)
+    return tuple(truths)

@@ -62,14 +62,14 @@ class YieldFlow(Flow):
         form += self._integral(self._stokes(viscosity))
         for value in bingham:
             yield_stress.Set(value)
-            found = []
+            forces = []
             for small in SMOOTHING:
                 smoothing.Set(small * math.sqrt(1 + value))
                 if not self._settles(form, flow):
                     raise StudyError(f"no steady flow was found at n = {flow_index:g}, Bi = {value:g}")
                 form.Apply(flow.vec, residual)
-                found.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (3 * math.pi))
-            yield found[-1], found[-2]
+                forces.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (3 * math.pi))
+            yield forces[-1], forces[-2]
 
     def _settles(self, form: Any, flow: Any) -> bool:
         """Solve by Newton's method, with steps shortened until the residual falls; return whether it converged."""

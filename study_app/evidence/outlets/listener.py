@@ -28,10 +28,10 @@ _QUIET_S: Final = 1.0
 
 def opened(lsl: Any, name: str) -> Any:
     """Return an open inlet of a stream."""
-    found = lsl.resolve_byprop("name", name, 1, _FOUND_WITHIN_S)
-    if not found:
+    streams = lsl.resolve_byprop("name", name, 1, _FOUND_WITHIN_S)
+    if not streams:
         sys.exit(f"no stream is called {name!r}")
-    inlet = lsl.StreamInlet(found[0])
+    inlet = lsl.StreamInlet(streams[0])
     inlet.open_stream(_FOUND_WITHIN_S)
     return inlet
 
@@ -86,12 +86,12 @@ def read(file: int) -> list[tuple[int, int]]:
     clock.now_ns()
     sys.stdout.write("ready\n")
     sys.stdout.flush()
-    found: list[tuple[int, int]] = []
+    events: list[tuple[int, int]] = []
     with suppress(OSError):  # a virtual port whose other end is closed
         while came := os.read(file, 64):
             now_ns = clock.now_ns()
-            found += [(byte, now_ns) for byte in came]
-    return found
+            events += [(byte, now_ns) for byte in came]
+    return events
 
 
 if __name__ == "__main__":

@@ -258,29 +258,29 @@ def _ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int
     )
 
 
-def evidence(found: Streamed, ratios: Sequence[Ratio]) -> Evidence:
+def evidence(streams: Streamed, ratios: Sequence[Ratio]) -> Evidence:
     """Return the results as text."""
     p50_us, p50_ms, p99_ms = (
         float(np.percentile(values, share)) if len(values) else math.nan
-        for values, share in ((found.errors_us, 50), (found.arrivals_ms, 50), (found.arrivals_ms, 99))
+        for values, share in ((streams.errors_us, 50), (streams.arrivals_ms, 50), (streams.arrivals_ms, 99))
     )
     lines = [
-        f"streams received by another process for {found.seconds:g} s",
-        f"  samples of 10 channels: {found.samples_sent} sent, {found.samples_lost} lost, "
-        f"{'intact' if found.intact else 'NOT intact'}",
-        f"  longest gap between their times: {found.worst_gap_ms:.2f} ms",
-        f"  markers: {found.markers_sent} sent, {found.markers_lost} lost",
-        f"  marker's time against the servo's clock: p50 {p50_us:.1f} us, p99 {1e3 * found.error_p99_ms:.1f} us, "
+        f"streams received by another process for {streams.seconds:g} s",
+        f"  samples of 10 channels: {streams.samples_sent} sent, {streams.samples_lost} lost, "
+        f"{'intact' if streams.intact else 'NOT intact'}",
+        f"  longest gap between their times: {streams.worst_gap_ms:.2f} ms",
+        f"  markers: {streams.markers_sent} sent, {streams.markers_lost} lost",
+        f"  marker's time against the servo's clock: p50 {p50_us:.1f} us, p99 {1e3 * streams.error_p99_ms:.1f} us, "
         f"limit {1e3 * _MOST_ERROR_MS:g} us",
         f"  from event to arrival: p50 {p50_ms:.2f} ms, p99 {p99_ms:.2f} ms",
-        f"  {'met' if found.met else 'missed'}",
+        f"  {'met' if streams.met else 'missed'}",
         "lateness of the servo, with both streams and without, alternating every 0.25 s",
     ]
     lines += [
-        f"  p{one.percentile}: {one.with_us:.0f} us with, {one.without_us:.0f} us without, ratio {one.ratio:.3f} "
-        f"({one.low:.3f} to {one.high:.3f}), limit {_MOST_RATIO:g}: {one.verdict}"
-        for one in ratios
+        f"  p{ratio.percentile}: {ratio.with_us:.0f} us with, {ratio.without_us:.0f} us without, ratio "
+        f"{ratio.ratio:.3f} ({ratio.low:.3f} to {ratio.high:.3f}), limit {_MOST_RATIO:g}: {ratio.verdict}"
+        for ratio in ratios
     ]
     text = "\n".join(lines) + "\n"
-    missed = not found.met or any(one.percentile == 50 and one.verdict == "missed" for one in ratios)
+    missed = not streams.met or any(ratio.percentile == 50 and ratio.verdict == "missed" for ratio in ratios)
     return Evidence(text, {"streams.txt": text}, missed=missed)

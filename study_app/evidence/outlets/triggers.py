@@ -132,20 +132,20 @@ def _send(
     return sent, sink
 
 
-def evidence(found: TriggerDelays) -> Evidence:
+def evidence(delays: TriggerDelays) -> Evidence:
     """Return the results as text."""
     lines = [
-        f"{len(found.written_us)} events, twenty a second, on {found.port}",
-        f"  from event to the byte being written: {_spread(found.written_us)} us",
+        f"{len(delays.written_us)} events, twenty a second, on {delays.port}",
+        f"  from event to the byte being written: {_spread(delays.written_us)} us",
     ]
-    if found.read_us is not None and found.high_ms is not None:
+    if delays.read_us is not None and delays.high_ms is not None:
         lines += [
-            f"  from event to the byte being read by another process: {_spread(found.read_us)} us",
-            f"  from the code to 0: {_spread(found.high_ms)} ms, nominal {1e3 * HIGH_S:g} ms",
-            f"  wrong or missing bytes: {found.wrong}",
+            f"  from event to the byte being read by another process: {_spread(delays.read_us)} us",
+            f"  from the code to 0: {_spread(delays.high_ms)} ms, nominal {1e3 * HIGH_S:g} ms",
+            f"  wrong or missing bytes: {delays.wrong}",
         ]
     text = "\n".join(lines) + "\n"
-    return Evidence(text, {"triggers.txt": text}, missed=bool(found.wrong))
+    return Evidence(text, {"triggers.txt": text}, missed=bool(delays.wrong))
 
 
 def _spread(values: NDArray[np.float64]) -> str:

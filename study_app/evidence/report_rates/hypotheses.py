@@ -104,8 +104,11 @@ def _compares_thresholds(n: int, ratio: float) -> Trial:
             for shift in (math.log10(ratio), 0.0)
             for fit in plan.fits(plan.answers(own + spread * rng.normal(size=n) + shift, rng))
         ]
-        found = plan.grouped(fits, 2 * n)  # both blocks have a width in common
-        values, variances = found.medians[:n] - found.medians[n:], found.variances[:n] + found.variances[n:]
+        estimates = plan.grouped(fits, 2 * n)  # both blocks have a width in common
+        values, variances = (
+            estimates.medians[:n] - estimates.medians[n:],
+            estimates.variances[:n] + estimates.variances[n:],
+        )
         sample = tuple(Measured(value=values[k], variance=variances[k]) for k in np.argsort(values))
         means = Compared(samples=(sample,), left_out={}).means(_ALPHA)
         return means is not None and max(float(p[0]) for p in p_differs(means, "two-sided")) <= _ALPHA

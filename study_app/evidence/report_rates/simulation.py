@@ -73,7 +73,9 @@ def answers(
     if generator == "answer model":
         thought = people(simulation, participants, seed, study)
         rng = np.random.default_rng([seed, study, participants])
-        return tuple(_opined(block, one, extent, rng) for block, one in zip(simulation.blocks, thought, strict=True))
+        return tuple(
+            _opined(block, opinions, extent, rng) for block, opinions in zip(simulation.blocks, thought, strict=True)
+        )
     rng = np.random.default_rng([seed, study])
     leaning, slope = _LEANING * rng.normal(size=participants), 1 + _SLOPE * rng.normal(size=participants)
     return tuple(_probit(simulation, block, extent, leaning, slope, rng) for block in simulation.blocks)
@@ -133,13 +135,13 @@ def _effects(simulation: Plan, block: Block) -> Array:
 
 def _true_differences(simulation: Plan, generator: Generator, extent: _Extent) -> tuple[Array, ...]:
     """Return the true differences of mean answers to the first setting (settings, items), block by block."""
-    found = []
+    differences = []
     for block, given in zip(simulation.blocks, answers(simulation, generator, extent, TRUTH, 0, 0), strict=True):
         means = given.mean(axis=0)
         for place, other in alike(block, extent).items():
             means[place] = means[other]
-        found.append(np.asarray(means - means[0]))
-    return tuple(found)
+        differences.append(np.asarray(means - means[0]))
+    return tuple(differences)
 
 
 _Limit: TypeAlias = Literal["none", "at most 5 %", "at least 93 %", "60 to 80 %", "counted"]
@@ -219,7 +221,7 @@ class Rate:
 def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
     """Return the rates, each with its Wilson interval and whether its limit holds, as Markdown and as CSV."""
     rows = []
-    for rate in sorted(rates, key=lambda one: (one.cell, one.what, one.participants)):
+    for rate in sorted(rates, key=lambda rate: (rate.cell, rate.what, rate.participants)):
         low, high = (f"{100 * end:.1f}" for end in rate.interval)
         share = (f"{100 * rate.share:.1f} %", f"{low} to {high} %", rate.studies)
         rows.append((rate.cell, rate.participants, rate.what, *share, rate.limit, rate.holds))
@@ -227,15 +229,15 @@ def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
     text = f"{heading}\n\n{table.markdown()}\n"
     cells = [
         (
-            *(one.cell, one.participants, one.what, one.limit, one.hits, one.studies),
-            *(f"{number:.6f}" for number in (one.share, *one.interval)),
-            one.holds,
+            *(rate.cell, rate.participants, rate.what, rate.limit, rate.hits, rate.studies),
+            *(f"{number:.6f}" for number in (rate.share, *rate.interval)),
+            rate.holds,
         )
-        for one in rates
+        for rate in rates
     ]
     names = ("studies", "participants", "what", "limit", "hits", "of", "share", "low", "high", "holds")
-    beyond, undecided = (sum(one.holds == verdict for one in rates) for verdict in ("no", "too few studies"))
-    limited = sum(one.holds != "counted" for one in rates)
+    beyond, undecided = (sum(rate.holds == verdict for rate in rates) for verdict in ("no", "too few studies"))
+    limited = sum(rate.holds != "counted" for rate in rates)
     closing = "every rate is within its limit"
     if not limited:
         closing = "no rate was counted"
@@ -307,23 +309,23 @@ def _study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, study: int) -
         return {(f"{_ANYWHERE}, at any look", "at most 5 %"): claimed, LOST: bool(failures.found)}
     decided = simulation.decided if cell.extent != "partial" else replace(simulation.decided, noticed=None)
     asked, results = report(simulation, decided, given, study, failures)
-    found: dict[Event, bool] = {}
+    events: dict[Event, bool] = {}
     for place, (block, result) in enumerate(zip(simulation.blocks, results, strict=True)):
         judged = _in_delays if block.kind == "delays" else _in_liquids
         for (what, at_most), hit in judged(asked[place], result, cell, truth[place]):
-            found[f"{what} ({block.kind})", at_most] = hit
+            events[f"{what} ({block.kind})", at_most] = hit
         if cell.extent == "empty":
             overall = OverAll.of(result)
             differs = overall is not None and (overall.p or 1.0) <= simulation.decided.alpha
-            found[f"test over all statements ({block.kind})", "at most 5 %"] = differs
-    found[LOST] = bool(failures.found)
+            events[f"test over all statements ({block.kind})", "at most 5 %"] = differs
+    events[LOST] = bool(failures.found)
     if cell.extent != "partial":
         people = asked[0].people
         whole = Results(simulation.decided, people, results, delivered=(), orders={}, performance=None, seed=1)
         limit: _Limit = "counted" if cell.extent == "full" else "at most 5 %"
-        found[CLAIMED, limit] = any(one.claims for one in answered(whole))
-        found[_ANYWHERE, limit] = any(map(_claims, results))
-    return found
+        events[CLAIMED, limit] = any(answer.claims for answer in answered(whole))
+        events[_ANYWHERE, limit] = any(map(_claims, results))
+    return events
 
 
 def report(
@@ -347,38 +349,40 @@ def report(
     return asked, tuple(evaluate_block(None, answers) for answers in asked)
 
 
-def _claims(found: BlockResult) -> bool:
+def _claims(result: BlockResult) -> bool:
     """Return whether anything in the section of a block says that settings differ or that a delay is noticed."""
-    pairs = [pair.tested for pair in Pairs.of(found)]
-    tests = [*SettingsDiffer.of(found), *DelayTrend.of(found), *MeanTests.of(found), *pairs]
-    low = any(one.over_all_ms is not None for one in LowestDelay.of(found))
-    return any(one.verdict in FOUND for one in tests) or low or _recognised(found) or _printed(found)
+    pairs = [pair.tested for pair in Pairs.of(result)]
+    tests = [*SettingsDiffer.of(result), *DelayTrend.of(result), *MeanTests.of(result), *pairs]
+    low = any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result))
+    return any(test.verdict in FOUND for test in tests) or low or _recognised(result) or _printed(result)
 
 
-def _modelled(found: BlockResult) -> Iterator[tuple[Event, bool]]:
+def _modelled(result: BlockResult) -> Iterator[tuple[Event, bool]]:
     """Yield whether the test of means finds anything in a statement."""
-    yield ("found by the test of means", "at most 5 %"), any(one.verdict in FOUND for one in MeanTests.of(found))
+    yield ("found by the test of means", "at most 5 %"), any(test.verdict in FOUND for test in MeanTests.of(result))
 
 
-def _in_liquids(asked: BlockAnswers, found: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
+def _in_liquids(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent in _NO_EFFECT:
         yield (
             ("settings differ in a statement", "at most 5 %"),
-            any(one.verdict in FOUND for one in SettingsDiffer.of(found)),
+            any(test.verdict in FOUND for test in SettingsDiffer.of(result)),
         )
-        yield ("liquids recognised", "at most 5 %"), _recognised(found)
-        yield from _modelled(found)
+        yield ("liquids recognised", "at most 5 %"), _recognised(result)
+        yield from _modelled(result)
     equal = _equal_pairs(asked.block, cell.extent)
     if equal:
-        found_equal = any(one.tested.verdict in FOUND and (one.first, one.second) in equal for one in Pairs.of(found))
+        found_equal = any(
+            pair.tested.verdict in FOUND and (pair.first, pair.second) in equal for pair in Pairs.of(result)
+        )
         yield ("equal liquids distinguished", "at most 5 %"), found_equal
     if cell.extent == "full":
-        yield ("some liquids distinguished", "counted"), any(one.tested.verdict in FOUND for one in Pairs.of(found))
-        yield ("liquids recognised", "counted"), _recognised(found)
+        yield ("some liquids distinguished", "counted"), any(pair.tested.verdict in FOUND for pair in Pairs.of(result))
+        yield ("liquids recognised", "counted"), _recognised(result)
 
 
-def _recognised(found: BlockResult) -> bool:
-    recognition = LiquidRecognition.of(found)
+def _recognised(result: BlockResult) -> bool:
+    recognition = LiquidRecognition.of(result)
     return recognition is not None and recognition.verdict in FOUND
 
 
@@ -394,32 +398,37 @@ def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
     }
 
 
-def _in_delays(asked: BlockAnswers, found: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
+def _in_delays(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
     null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
     if cell.extent in _NO_EFFECT:
-        yield ("trend in a statement", "at most 5 %"), any(one.verdict in FOUND for one in DelayTrend.of(found))
-        yield ("detection threshold printed", "at most 5 %"), _printed(found)
-        yield from _modelled(found)
+        yield ("trend in a statement", "at most 5 %"), any(test.verdict in FOUND for test in DelayTrend.of(result))
+        yield ("detection threshold printed", "at most 5 %"), _printed(result)
+        yield from _modelled(result)
     if null:
-        low = any(one.over_all_ms is not None and one.over_all_ms <= max(null) for one in LowestDelay.of(found))
+        low = any(
+            lowest.over_all_ms is not None and lowest.over_all_ms <= max(null) for lowest in LowestDelay.of(result)
+        )
         yield ("lowest delay stated too low", "at most 5 %"), low
     if cell.extent not in _NO_EFFECT:
-        yield from _equivalence(asked, found, truth)
+        yield from _equivalence(asked, result, truth)
     if cell.extent == "full":
-        yield ("lowest delay stated", "counted"), any(one.over_all_ms is not None for one in LowestDelay.of(found))
-        yield ("detection threshold printed", "counted"), _printed(found)
+        yield (
+            ("lowest delay stated", "counted"),
+            any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result)),
+        )
+        yield ("detection threshold printed", "counted"), _printed(result)
 
 
-def _printed(found: BlockResult) -> bool:
-    threshold = DetectionThreshold.of(found)
+def _printed(result: BlockResult) -> bool:
+    threshold = DetectionThreshold.of(result)
     return threshold is not None and threshold.effect is not None
 
 
-def _equivalence(asked: BlockAnswers, found: BlockResult, truth: Array) -> Iterator[tuple[Event, bool]]:
+def _equivalence(asked: BlockAnswers, result: BlockResult, truth: Array) -> Iterator[tuple[Event, bool]]:
     """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
     bound = asked.decided.equivalence_bound
-    if bound is None or not ContrastsWithControl.of(found):
+    if bound is None or not ContrastsWithControl.of(result):
         return
     beyond = {
         (item.id, setting.delay_ms or 0.0): float(away)
@@ -430,9 +439,11 @@ def _equivalence(asked: BlockAnswers, found: BlockResult, truth: Array) -> Itera
     if not beyond:
         return
     nearest = min(beyond, key=beyond.__getitem__)
-    called = {(one.item, one.delay_ms): one.verdict == "equivalent" for one in ContrastsWithControl.of(found)}
+    called = {
+        (tested.item, tested.delay_ms): tested.verdict == "equivalent" for tested in ContrastsWithControl.of(result)
+    }
     yield ("nearest beyond the bound called equivalent", "at most 5 %"), called[nearest]
-    up_to = common_ms(found)
+    up_to = common_ms(result)
     too_far = up_to is not None and any(delay <= up_to for _, delay in beyond)
     yield ("“unchanged up to” too long", "at most 5 %"), too_far
 
@@ -458,10 +469,10 @@ _LAPSE: Final = 0.02
 @cache
 def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
     """Return all cases: the limit of their rate, what is counted, and how one study is simulated."""
-    found: dict[_Case, tuple[_Limit, str, Trial]] = {}
+    tests: dict[_Case, tuple[_Limit, str, Trial]] = {}
     for n in (5, 12, 24):
         for words, most in (("-1, 0, 1", (-1.0, 0.0, 1.0)), ("0", (0.0,))):
-            found[f"one in five differs by 5 points, the others by {words}", n] = (
+            tests[f"one in five differs by 5 points, the others by {words}", n] = (
                 "at most 5 %",
                 "called equivalent",
                 _leaning(n, most),
@@ -473,12 +484,12 @@ def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
         (12, 60.0, 0.0, "thresholds of people, SD 60 ms"),
         (12, 15.0, 1 / 6, "one in six never agrees"),
     ):
-        found[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
-    for one in false_claims():
-        found[one.name, one.participants] = ("at most 5 %", one.claim, one.trial)
-    for one in powers():
-        found[one.name, one.participants] = ("counted", one.claim, one.trial)
-    return found
+        tests[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
+    for claim in false_claims():
+        tests[claim.name, claim.participants] = ("at most 5 %", claim.claim, claim.trial)
+    for power in powers():
+        tests[power.name, power.participants] = ("counted", power.claim, power.trial)
+    return tests
 
 
 def count_single(case: _Case, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
@@ -486,15 +497,15 @@ def count_single(case: _Case, seed: int, batch: int, studies: int) -> tuple[Rate
     limit, what, trial = _single_tests()[case]
     number = list(_single_tests()).index(case)
     rng = np.random.default_rng([seed, number, batch])
-    found = [one for _ in range(studies) if (one := trial(rng)) is not None]
+    p_values = [one for _ in range(studies) if (one := trial(rng)) is not None]
     rate = partial(Rate, cell=case[0], participants=case[1])
     if what != COVERS:
-        return (rate(what=what, limit=limit, hits=sum(map(bool, found)), studies=len(found)),)
+        return (rate(what=what, limit=limit, hits=sum(map(bool, p_values)), studies=len(p_values)),)
     half: _Limit = "counted" if case[1] == _SIZES[0] else "60 to 80 %"  # of five people intervals are wide by t
     return (
-        rate(what=PRINTED, limit="at least 93 %", hits=len(found), studies=studies),
-        rate(what=what, limit=limit, hits=sum(one <= 1.0 for one in found), studies=len(found)),
-        rate(what=HALF, limit=half, hits=sum(one <= 0.5 for one in found), studies=len(found)),
+        rate(what=PRINTED, limit="at least 93 %", hits=len(p_values), studies=studies),
+        rate(what=what, limit=limit, hits=sum(one <= 1.0 for one in p_values), studies=len(p_values)),
+        rate(what=HALF, limit=half, hits=sum(one <= 0.5 for one in p_values), studies=len(p_values)),
     )
 
 
@@ -507,12 +518,12 @@ def _leaning(n: int, most: tuple[float, ...]) -> Trial:
 
 def _covered(n: int, spread_ms: float, never: float) -> Trial:
     def trial(rng: np.random.Generator) -> float | None:
-        found = noticed(_people(rng, n, spread_ms, never), _LEVELS_MS.tolist())
-        if found.interval is None or found.effect is None:
+        threshold = noticed(_people(rng, n, spread_ms, never), _LEVELS_MS.tolist())
+        if threshold.interval is None or threshold.effect is None:
             return None
-        error = _TRUE_MS - found.effect
-        end = found.interval.high if error > 0 else found.interval.low
-        return abs(error) / abs(end - found.effect)
+        error = _TRUE_MS - threshold.effect
+        end = threshold.interval.high if error > 0 else threshold.interval.low
+        return abs(error) / abs(end - threshold.effect)
 
     return trial
 

@@ -46,8 +46,8 @@ def wake_of(scene: Scene) -> Wake | None:
     liquid: Liquid = scene.liquids[0]
     if "wake" not in liquid.effects or "current" in liquid.effects or not isinstance(liquid.region, Everywhere):
         return None
-    found: Wake | None = liquid.wake
-    return found
+    wake: Wake | None = liquid.wake
+    return wake
 
 
 class Ledger:

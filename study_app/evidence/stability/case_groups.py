@@ -127,10 +127,10 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     releases = tuple(_releases(f"{seed} releases", PLANTS, _HANDLES_KG))
 
     def changed(name: str, change: Callable[[Case], Case | None], cases: Iterable[Case]) -> Group:
-        found = tuple(case for case in map(change, cases) if case is not None)
-        return Group(name, tuple(_drawn(f"{seed} {name}", some(found, min(_CASES, count or _CASES)), light)))
+        listed = tuple(case for case in map(change, cases) if case is not None)
+        return Group(name, tuple(_drawn(f"{seed} {name}", some(listed, min(_CASES, count or _CASES)), light)))
 
-    found = [
+    listed = [
         Group(
             name,
             tuple(
@@ -142,38 +142,38 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
         for name, cases in (("second plant, held", held), ("second plant, let go", released))
     ]
     for name, change in _CHANGES.items():
-        found.append(changed(name, change, both))
-    found += [
+        listed.append(changed(name, change, both))
+    listed += [
         Group(name, tuple(map(change, _drawn(f"{seed} {name}", some(both, min(_CASES, count or _CASES)), light))))
         for name, change in _MASSES.items()
     ]
     for name, own in _DISTURBED.items():
         cases = some(both, min(_CASES, count or _CASES))
-        found.append(Group(name, tuple(_drawn(f"{seed} {name}", cases, {**light, **own}))))
-    found.append(Group("let go in mid-stroke", some(releases, count)))
+        listed.append(Group(name, tuple(_drawn(f"{seed} {name}", cases, {**light, **own}))))
+    listed.append(Group("let go in mid-stroke", some(releases, count)))
     in_gap = tuple(_in_gap(f"{seed} let go in a gap", releases))
-    found.append(Group("let go in a gap of samples", some(in_gap, min(_CASES, count or _CASES))))
+    listed.append(Group("let go in a gap of samples", some(in_gap, min(_CASES, count or _CASES))))
     for name in (*_MISJUDGED, *_MASSES):
         cases = tuple(case for case in map({**_CHANGES, **_MASSES}[name], releases) if case is not None)
-        found.append(Group(f"let go in mid-stroke, {name}", some(cases, min(_CASES, count or _CASES))))
+        listed.append(Group(f"let go in mid-stroke, {name}", some(cases, min(_CASES, count or _CASES))))
     driven = "through the Falcon's driver"
     driven_held = some(tuple(_grid(("light", "middle", "firm"), (FALCON,), _FALCONS_HZ, (1,))), count)
     driven_held = tuple(_drawn(f"{seed} {driven}", driven_held, _FALCONS))
-    found.append(Group(f"{driven}, held", driven_held))
+    listed.append(Group(f"{driven}, held", driven_held))
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), _FALCONS_KG))
-    found.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
-    found += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
-    found += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
-    found.append(_half_damper("late forces", min(_LATE_CASES, count or _LATE_CASES), seed, {**light, **_LINKS}))
+    listed.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
+    listed += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
+    listed += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
+    listed.append(_half_damper("late forces", min(_LATE_CASES, count or _LATE_CASES), seed, {**light, **_LINKS}))
     devices = min(_DEVICE_CASES, count or _DEVICE_CASES)
     by_device = _half_damper("velocity measured by the device", devices, seed, {**light, **_MEASURED})
     fewer = min(_KALMAN_CASES, count or _KALMAN_CASES)
-    again = (Group("first plant", sweep(seed)), *found)
+    again = (Group("first plant", sweep(seed)), *listed)
     by_kalman = [
         Group(f"kalman: {name}", tuple(dataclasses.replace(case, estimator="kalman") for case in some(cases, fewer)))
         for name, cases in again
     ]
-    return (*found, by_device, *by_kalman)
+    return (*listed, by_device, *by_kalman)
 
 
 def _of_liquids(

@@ -120,13 +120,13 @@ class Delivered(NamedTuple):
 @cache
 def _shipped_liquids() -> Mapping[str, tuple[str, ...]]:
     """Return the liquids of all shipped studies, those of the same force once, with the names of the others."""
-    found: dict[str, list[str]] = {}
+    liquids: dict[str, list[str]] = {}
     for name, scene in scenes().items():
         if name not in {"dense", DAMPER}:
             alone = without_buoyancy(scene).model_dump(include={"scale", "rate_hz", "body", "knee", "liquids"})
             alone["liquids"][0].pop("id")
-            found.setdefault(str(alone), []).append(name)
-    return {first: tuple(others) for first, *others in found.values()}
+            liquids.setdefault(str(alone), []).append(name)
+    return {first: tuple(others) for first, *others in liquids.values()}
 
 
 def measure(
@@ -157,7 +157,7 @@ def _measured(device: str, estimator: str, liquid: str, delay: int) -> Delivered
         believed_kg=of_device.least_kg,
         plant=SECOND,
     )
-    unstable = tuple(one for one in _strokes(case) if not judge(one, safe=True).stable)
+    unstable = tuple(stroke for stroke in _strokes(case) if not judge(stroke, safe=True).stable)
     return Delivered(
         liquid=liquid, estimator=estimator, delay=delay, device=device, **errors(case)._asdict(), unstable=unstable
     )
@@ -197,7 +197,7 @@ def _strokes(case: Case) -> Iterator[Case]:
 def evidence(found: Sequence[Delivered]) -> Evidence:
     """Return the table, and whether each limit is met."""
     lines = tuple(_lines(found))
-    missed = any("not met" in line for line in lines) or any(one.unstable for one in found)
+    missed = any("not met" in line for line in lines) or any(delivered.unstable for delivered in found)
     text = "\n".join(lines) + "\n"
     return Evidence(text, {"delivered.txt": text}, missed=missed)
 

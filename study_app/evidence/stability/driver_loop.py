@@ -227,12 +227,12 @@ def _given_out(case: Case, trace: Any) -> float:
 
 def _restlessness(case: Case, trace: Any, others: list[Any]) -> tuple[float, float]:
     """Return the force's fast part, and the scripted device's greatest, where they differ most."""
-    found = []
+    swings = []
     for window_s in windows(case):
         begins, ends = np.searchsorted(trace.t_s, window_s)
         fast_n, *others_n = (
             fast_part(one.sent_n, case.rate_hz, FAST_HZ, begins, min(ends, len(one)), ONCE_S)
             for one in (trace, *others)
         )
-        found.append((fast_n, max(others_n)))
-    return max(found, key=lambda pair: pair[0] - pair[1])
+        swings.append((fast_n, max(others_n)))
+    return max(swings, key=lambda pair: pair[0] - pair[1])

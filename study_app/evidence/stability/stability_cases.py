@@ -237,26 +237,26 @@ def liquids() -> Mapping[str, Scene]:
     Every liquid of the shipped studies, tar among them, one far denser, and the strongest linear damper that a file may
     ask for.
     """
-    found: dict[str, Scene] = {}
+    named: dict[str, Scene] = {}
     for protocol, prefix in _OF_SWEEP.items():
         study = load(shipped_file(protocol))
-        found |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
+        named |= {f"{prefix}{name}": study.scene_of(name) for name in study.liquids}
     damper = Liquid(id=DAMPER, density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=DAMPING_NSPM[1]))
     for liquid in (Liquid(id="dense", density_kg_m3=10_000), damper):
-        found[liquid.id] = Scene(liquids=(liquid,))
-    return found
+        named[liquid.id] = Scene(liquids=(liquid,))
+    return named
 
 
 @cache
 def scenes() -> Mapping[str, Scene]:
     """Return what a case may present: what the sweep does, and the liquids of all other shipped studies."""
-    found = dict(liquids())
+    named = dict(liquids())
     for protocol in shipped():
         if protocol in _OF_SWEEP:
             continue
         study = load(shipped_file(protocol))
-        found |= {f"{protocol}_{name}": study.scene_of(name) for name in study.liquids}
-    return found
+        named |= {f"{protocol}_{name}": study.scene_of(name) for name in study.liquids}
+    return named
 
 
 @cache

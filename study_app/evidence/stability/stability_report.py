@@ -204,7 +204,7 @@ def fidelities(
 def _worst_fidelity(liquid: str, loop: tuple[float, int]) -> Fidelity:
     """Return the fidelity of the motion that is furthest off its target."""
     measured = list(_motions(liquid, *loop))
-    beyond = max(one.beyond for one in measured)
+    beyond = max(fidelity.beyond for fidelity in measured)
     return max(measured, key=lambda one: one.difference_n / one.target_n)._replace(beyond=beyond)
 
 
@@ -270,7 +270,7 @@ class Swept:
     @property
     def unstable(self) -> tuple[Verdict, ...]:
         """Those that are unstable although safety is on."""
-        return tuple(verdict for one in self.groups for verdict in one.unstable)
+        return tuple(verdict for group in self.groups for verdict in group.unstable)
 
     @property
     def groups(self) -> tuple[_Judged, ...]:
@@ -328,7 +328,7 @@ def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
 
 
 def _counts(swept: Swept) -> Iterator[str]:
-    cases, others = len(swept.on), sum(len(one.verdicts) for one in swept.others)
+    cases, others = len(swept.on), sum(len(other.verdicts) for other in swept.others)
     yield f"{cases} cases with safety off and on, {others} others with safety on, {swept.took_s:.0f} s"
     yield f"{'':24} safety off   safety on"
     reasons = [collections.Counter(r for v in verdicts for r in v.reasons) for verdicts in (swept.off, swept.on)]
@@ -344,16 +344,16 @@ def group_table(swept: Swept) -> str:
 
 
 def _group_lines(swept: Swept) -> Iterator[str]:
-    width = max(len(one.name) for one in swept.groups)
+    width = max(len(group.name) for group in swept.groups)
     yield f"{'with safety on':{width + 2}}   cases  unstable   given out   beyond the bound, at most [mJ]"
-    for one in swept.groups:
-        finite = [verdict for verdict in one.verdicts if math.isfinite(verdict.balance_j)]
+    for group in swept.groups:
+        finite = [verdict for verdict in group.verdicts if math.isfinite(verdict.balance_j)]
         given_j = max((-verdict.balance_j for verdict in finite), default=math.nan)
         beyond_j = max((max(verdict.permitted_j - verdict.balance_j, 0.0) for verdict in finite), default=math.nan)
-        counts = f"{len(one.verdicts):7} {len(one.unstable):9} {1e3 * given_j:11.2f} {1e3 * beyond_j:11.2f}"
-        reasons = collections.Counter(reason for verdict in one.unstable for reason in verdict.reasons)
+        counts = f"{len(group.verdicts):7} {len(group.unstable):9} {1e3 * given_j:11.2f} {1e3 * beyond_j:11.2f}"
+        reasons = collections.Counter(reason for verdict in group.unstable for reason in verdict.reasons)
         why = ", ".join(f"{reason} {count}" for reason, count in reasons.items())
-        yield f"  {one.name:{width}} {counts}   {why}".rstrip()
+        yield f"  {group.name:{width}} {counts}   {why}".rstrip()
 
 
 def _limiters(swept: Swept) -> Iterator[str]:
@@ -376,7 +376,7 @@ def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
     )
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
     for liquid, row in itertools.groupby(fidelities, key=lambda one: one.liquid):
-        cells = (f"{f'{one.share:.1%}' + ' *'[not one.within]} {one.beyond:6.1%}" for one in row)
+        cells = (f"{f'{fidelity.share:.1%}' + ' *'[not fidelity.within]} {fidelity.beyond:6.1%}" for fidelity in row)
         yield f"  {liquid:20}" + "".join(f"{cell:>16}" for cell in cells)
 
 

@@ -108,7 +108,7 @@ def _error(velocity: Velocity, stroke: Stroke) -> float:
 
 def noise_mmps(velocity: Velocity) -> Mapping[float, float]:
     """Return the velocity above 20 Hz [mm/s, RMS of an axis] at constant speeds [m/s], at rest with tremor."""
-    found = {}
+    noise = {}
     t_s = np.arange(5000) / _RATE_HZ
     for speed_mps in _NOISE_MPS:
         tremor_m = _TREMOR_M * np.sin(2 * math.pi * _TREMOR_HZ * t_s) * (speed_mps == 0)
@@ -118,8 +118,8 @@ def noise_mmps(velocity: Velocity) -> Mapping[float, float]:
             v_mps = estimated(velocity, t_s, place_m + speed_mps * t_s + tremor_m)
             axes_mps = np.column_stack([v_mps, 0 * v_mps, 0 * v_mps])
             squares.append(fast_part(axes_mps, _RATE_HZ, _NOISE_HZ, 1000, len(t_s)) ** 2)
-        found[speed_mps] = 1e3 * math.sqrt(statistics.mean(squares))
-    return found
+        noise[speed_mps] = 1e3 * math.sqrt(statistics.mean(squares))
+    return noise
 
 
 def estimated(velocity: Velocity, t_s: Floats, x_m: Floats) -> Floats:
@@ -278,11 +278,11 @@ class Row(NamedTuple):
 
 def measure(progress: _Progress) -> tuple[Row, ...]:
     """Measure everything; ``progress`` is called with the name of each part before it is measured."""
-    found: list[Row] = []
+    rows: list[Row] = []
     for name, part in PARTS.items():
         progress(name)
-        found += part()
-    return tuple(found)
+        rows += part()
+    return tuple(rows)
 
 
 def evidence(rows: Sequence[Row]) -> Evidence:

@@ -180,10 +180,10 @@ def _resting_swing(trace: Any, case: Case, end_s: float) -> float:
 def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> float:
     """Return the least swing above a frequency [m/s] over the stretches between times [s]; 0 if it tires."""
     rows = np.searchsorted(trace.t_s, times_s)
-    found = [
+    swings = [
         fast_part(trace.velocity_mps, case.rate_hz, corner_hz, first, last) for first, last in itertools.pairwise(rows)
     ]
-    return min(found) if found[-1] > _TIRED * found[0] else 0.0
+    return min(swings) if swings[-1] > _TIRED * swings[0] else 0.0
 
 
 def _restlessness(
@@ -195,7 +195,7 @@ def _restlessness(
     calm_mps = np.gradient(calm_m, trace.t_s, axis=0)
     undecided_m = case.quantum_um * 1e-6 * (np.random.default_rng(1).random(calm_m.shape) - 0.5)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
-    found = []
+    swings = []
     for window_s, (first, bench) in zip(windows(case), before, strict=True):
         begins, ends = np.searchsorted(trace.t_s, window_s)
         played = [passive] if passive is not None and len(passive) >= ends else []
@@ -210,8 +210,8 @@ def _restlessness(
             fast_part(one.sent_n, case.rate_hz, FAST_HZ, begins, min(ends, len(one)), ONCE_S)
             for one in (trace, *played)
         )
-        found.append((fast_n, max(others_n)))
-    return max(found, key=lambda pair: pair[0] - pair[1])
+        swings.append((fast_n, max(others_n)))
+    return max(swings, key=lambda pair: pair[0] - pair[1])
 
 
 def _passive(case: Case, safe: bool, limits: DampingLimits | None) -> Any | None:

@@ -122,7 +122,7 @@ def measure(
 def evidence(found: Sequence[Withheld]) -> Evidence:
     """Return the table of shares in percent, and whether each goal is met."""
     text = "\n".join(_lines(found)) + "\n"
-    return Evidence(text, {"withheld.txt": text}, missed=not all(one.met for one in found))
+    return Evidence(text, {"withheld.txt": text}, missed=not all(withheld.met for withheld in found))
 
 
 def _lines(found: Sequence[Withheld]) -> Iterator[str]:
@@ -137,11 +137,11 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
             goals = "no goal" if row.liquid in _EXEMPT else "met" if row.met else "not met"
             strokes = "".join(f"{100 * share:11.1f}" for share in row.strokes)
             yield f"  {row.liquid:19}{strokes}  {after}{100 * row.lasting:10.1f}   {goals}"
-    counted = [one for one in found if one.liquid not in _EXEMPT]
-    lasting = max(one.lasting for one in counted)
+    counted = [withheld for withheld in found if withheld.liquid not in _EXEMPT]
+    lasting = max(withheld.lasting for withheld in counted)
     yield ""
-    for most in sorted({one.most for one in counted}):
-        quick = max(one.quick for one in counted if one.most == most)
+    for most in sorted({withheld.most for withheld in counted}):
+        quick = max(withheld.quick for withheld in counted if withheld.most == most)
         which = "tar aside" if most == _MOST else " with ".join(_REVERSED)
         yield f"at most {most:.0%} in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
     met = _goal(lasting < MOST_AFTER)

@@ -141,7 +141,7 @@ class Measure:
 
 def verdicts_on(measures: Sequence[Measure]) -> list[Verdict]:
     """Return the verdicts: that any limit is exceeded by chance has a probability of at most `_FAMILY_ERROR`."""
-    return [one.judged(1.0 - _FAMILY_ERROR / len(measures)) for one in measures]
+    return [measure.judged(1.0 - _FAMILY_ERROR / len(measures)) for measure in measures]
 
 
 def mean_interval(values: ArrayLike) -> Callable[[float], tuple[float, float]]:
@@ -220,9 +220,9 @@ class _KnownValue(ABC):
     def spread(self, studies: Sequence[StudyFound], people: int) -> float:
         """Return the standard deviation of the error over studies of so many participants, beyond their own values."""
         errors = [
-            self.error([one.value for one in some]) - self.error([one.truth for one in some])
-            for found in studies
-            for some in ([one for own in found.own[:people] for one in own],)
+            self.error([estimate.value for estimate in some]) - self.error([one.truth for one in some])
+            for study in studies
+            for some in ([estimate for own in study.own[:people] for estimate in own],)
         ]
         return float(np.std(errors, ddof=1))
 
@@ -278,8 +278,8 @@ class KnownThreshold(_KnownValue):
 
     def simulate(self, number: int, seed: int, kind: str = "", observers: Sequence[Observer] = ()) -> StudyFound:
         """Return what a study finds of ``observers``, by default of `people`."""
-        people = [(one, self._threshold(one)) for one in observers] or [*self.people(number, seed, kind)]
-        rows = self._simulated([one for one, _ in people], seed, number)
+        people = [(observer, self._threshold(observer)) for observer in observers] or [*self.people(number, seed, kind)]
+        rows = self._simulated([observer for observer, _ in people], seed, number)
         frame = rows.assign(session=1, level_delivered=rows["level"], analysed=True)
         frame = frame.astype({"level_delivered": "Float64", "success": "boolean"})
         protocol, block = self.protocol, self.block
@@ -305,8 +305,8 @@ class KnownThreshold(_KnownValue):
 
     def errors(self, studies: Sequence[StudyFound]) -> Array:
         """Return the error of the group's ln threshold in each study, beyond that of the people in it."""
-        truths = [[one.truth for person in found.own for one in person] for found in studies]
-        of_groups = [self.error([one.value for one in found.group]) for found in studies]
+        truths = [[estimate.truth for person in study.own for estimate in person] for study in studies]
+        of_groups = [self.error([estimate.value for estimate in study.group]) for study in studies]
         return np.array(of_groups) - [self.error(of_people) for of_people in truths]
 
     def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
@@ -328,8 +328,8 @@ class KnownThreshold(_KnownValue):
             return
         unit = standards if stimulus_of(self.protocol, self.block).level_kind == "weber" else 1.0
         slopes = [
-            [jnd_slope(standards, np.array([one.value for one in person]) * unit) for person in found.own]
-            for found in studies
+            [jnd_slope(standards, np.array([estimate.value for estimate in person]) * unit) for person in study.own]
+            for study in studies
         ]
         of_studies, true = np.mean(slopes, axis=1), 0.0 if self._of_delay else 1.0  # a constant JND, or Weber's law
         yield Measure(
@@ -393,9 +393,9 @@ class KnownExponent(_KnownValue):
         """Return what a study finds; observers estimate what would reach the hand at the pace."""
         reached = dict(zip(_levels(self.protocol, self.block), self.resistances, strict=True))
         truths = [EXPONENT * (1 + one) for one in self._apart(people, seed, number)[0]]
-        observers = [self._observer(one) for one in truths]
+        observers = [self._observer(truth) for truth in truths]
         frame = self._simulated(observers, seed, number, lambda presented: reached.get(presented.value, math.nan))
-        own = np.array([estimate_slope(one["level"], one["answer"]) for _, one in frame.groupby("participant")])
+        own = np.array([estimate_slope(rows["level"], rows["answer"]) for _, rows in frame.groupby("participant")])
         low, high = student_interval(own)
         assert low is not None and high is not None  # noqa: S101, PT018 - several participants have an interval
         each = tuple((Estimated(one, truth=truth),) for one, truth in zip(own.tolist(), truths, strict=True))
@@ -403,7 +403,7 @@ class KnownExponent(_KnownValue):
 
     def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         """Yield the mean exponent."""
-        of_studies = [found.group[0].value for found in studies]
+        of_studies = [study.group[0].value for study in studies]
         yield Measure(
             study=self.name,
             what=f"exponent over {stimulus_of(self.protocol, self.block).vary}",
@@ -416,7 +416,11 @@ class KnownExponent(_KnownValue):
         )
 
     def values_of(self, block: LevelBlock, rows: pd.DataFrame) -> Iterator[float]:
-        return (found.exponent for found in estimated_exponents(block, rows) if found.participant is not None)
+        return (
+            estimated_exponent.exponent
+            for estimated_exponent in estimated_exponents(block, rows)
+            if estimated_exponent.participant is not None
+        )
 
     def recovered(self, values: Sequence[float], spread: float) -> Measure:
         """Return the mean exponent of rehearsed people; ``spread`` is that over studies of as many."""
@@ -444,7 +448,11 @@ def known_value(name: str, protocol: Protocol) -> Known:
     ValueError
         Nothing is known of any main block.
     """
-    blocks = [one for one in protocol.main_blocks if one.stimulus is not None and one.design is not None]
+    blocks = [
+        main_block
+        for main_block in protocol.main_blocks
+        if main_block.stimulus is not None and main_block.design is not None
+    ]
     for block in blocks:
         stimulus, task = stimulus_of(protocol, block), protocol.tasks[block.task]
         if design_of(protocol, block).reply == "number" and stimulus.vary not in DELAYS and isinstance(task, Follow):
@@ -454,7 +462,7 @@ def known_value(name: str, protocol: Protocol) -> Known:
             return KnownExponent(name, protocol, block, tuple(_resistance(it, fastest_mps) for it in of_levels))
     for block in blocks:
         standards = standards_of(protocol, block)
-        if stimulus_of(protocol, block).level_kind != "value" and not all(one is None for one in standards):
+        if stimulus_of(protocol, block).level_kind != "value" and not all(standard is None for standard in standards):
             return KnownThreshold(name, protocol, block, _SHIPPED.get(name, OBSERVER))
     raise ValueError(
         f"{name} has no main block with levels above a standard, or with magnitude estimation of a liquid at a pace: "
@@ -474,21 +482,21 @@ def _resistance(scene: Any, fastest_mps: float) -> float:
     return mean_n / (fastest_mps / math.sqrt(2))
 
 
-def rehearsed(one: Known, source: bytes, seed: int) -> Rehearsed:
+def rehearsed(known: Known, source: bytes, seed: int) -> Rehearsed:
     """Rehearse `REHEARSED` participants in a temporary folder, from the source of a protocol; return what they show."""
     with tempfile.TemporaryDirectory() as place:
-        file, folder = Path(place) / f"{one.name}.toml", Path(place) / "study"
+        file, folder = Path(place) / f"{known.name}.toml", Path(place) / "study"
         file.write_bytes(source)
-        rehearse(str(file), participants=REHEARSED, seed=seed, results=folder, observer=one.observer)
+        rehearse(str(file), participants=REHEARSED, seed=seed, results=folder, observer=known.observer)
         sessions = StudyFolder(folder).sessions()
         findings = len(verify_study(folder, None).errors)
         findings += sum(len(reproduce_session(session.path).differences) for session in sessions)
         findings += sum(not replay(session.path).proved for session in sessions)
         unblind(folder, "validate", "to compare with what is known")
         study = load_study(folder)
-        intervals = study.intervals[study.intervals["block"] == one.block.id]
-        block = next(block for block in study.levels if block.id == one.block.id)
-        values = tuple(one.values_of(block, tracks(study)))
+        intervals = study.intervals[study.intervals["block"] == known.block.id]
+        block = next(block for block in study.levels if block.id == known.block.id)
+        values = tuple(known.values_of(block, tracks(study)))
         return Rehearsed(float(intervals["invalid_reasons"].isna().mean()), findings, values)
 
 
@@ -519,9 +527,10 @@ def _error_measure(study: str, errors: Array) -> Measure:
 
 def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
     """Yield in how many cases the 95 % intervals of groups and of participants hold the truth."""
-    of_groups = [[one.covered for one in found.group] for found in studies]
+    of_groups = [[estimate.covered for estimate in study.group] for study in studies]
     of_people = [
-        [one.covered for person in found.own for one in person if not math.isnan(one.low)] for found in studies
+        [estimate.covered for person in study.own for estimate in person if not math.isnan(estimate.low)]
+        for study in studies
     ]
     for whose, covered, most in (("the group's", of_groups, 1.0), ("participants'", of_people, _OWN_COVERAGE_MOST)):
         shares = [float(np.mean(of_study)) for of_study in covered if of_study]
@@ -539,10 +548,10 @@ def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         )
 
 
-def rehearsed_measures(one: Known, found: Rehearsed, spread: float) -> Iterator[Measure]:
+def rehearsed_measures(known: Known, found: Rehearsed, spread: float) -> Iterator[Measure]:
     """Yield what rehearsed participants show; ``spread`` is that of studies of as many."""
     yield Measure(
-        study=one.name,
+        study=known.name,
         what="intervals delivered as requested",
         value=found.delivered,
         interval=lambda _confidence: (found.delivered, found.delivered),
@@ -551,7 +560,7 @@ def rehearsed_measures(one: Known, found: Rehearsed, spread: float) -> Iterator[
         written=percent,
     )
     yield Measure(
-        study=one.name,
+        study=known.name,
         what="findings of verify, reproduce and replay",
         value=found.findings,
         interval=lambda _confidence: (found.findings, found.findings),
@@ -559,7 +568,7 @@ def rehearsed_measures(one: Known, found: Rehearsed, spread: float) -> Iterator[
         limit="0",
         written=str,
     )
-    yield one.recovered(found.values, spread)
+    yield known.recovered(found.values, spread)
 
 
 def validate(
@@ -596,9 +605,11 @@ def validate(
     cases = cases[:: max(1, min(_KIND_SHARE, len(cases) // 2))]
     for kind in (*KINDS, MIXED) if of_thresholds else ():
         progress(f"people: {kind}", None)
-        found_of = [run(one.simulate, [(*it, kind) for it in cases], executor) for one in of_thresholds]
-        errors = np.concatenate([one.errors(found) for one, found in zip(of_thresholds, found_of, strict=True)])
-        measures += [_error_measure(kind, errors), *coverage(kind, [one for found in found_of for one in found])]
+        found_of = [run(threshold.simulate, [(*it, kind) for it in cases], executor) for threshold in of_thresholds]
+        errors = np.concatenate(
+            [threshold.errors(found) for threshold, found in zip(of_thresholds, found_of, strict=True)]
+        )
+        measures += [_error_measure(kind, errors), *coverage(kind, [study for found in found_of for study in found])]
         say(f"people, {kind}: {len(errors)} studies")
     return verdicts_on(measures)
 

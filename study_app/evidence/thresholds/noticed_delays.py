@@ -103,9 +103,9 @@ def compare(count: int, seed: int) -> Compared:
 
 def detected(people: Sequence[Person], seed: int) -> Detected:
     """Return the group's threshold in `FORCED_CHOICE` with the ends of its 95 % interval [ms]."""
-    one = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
-    assert isinstance(one, KnownThreshold)  # noqa: S101 - it has forced choices alone
-    (group,) = one.simulate(0, seed, observers=[person.observer for person in people]).group
+    known = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
+    assert isinstance(known, KnownThreshold)  # noqa: S101 - it has forced choices alone
+    (group,) = known.simulate(0, seed, observers=[person.observer for person in people]).group
     return Detected(value=group.value, low=group.low, high=group.high)
 
 
@@ -115,7 +115,7 @@ def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: 
     People keep their distances from the mean criterion [s]; the noise is the same for every criterion.
     """
     protocol = load(LIKERT)
-    (block,) = (one for one in protocol.main_blocks if protocol.compared_in(one.id) == "delays")
+    (block,) = (main_block for main_block in protocol.main_blocks if protocol.compared_in(main_block.id) == "delays")
     delays_ms = sorted(protocol.conditions[name].delay_ms for name in block.conditions)
     answers = []
     for number, person in enumerate(people, start=1):
@@ -136,18 +136,18 @@ TITLE: Final = "Which delay is noticed? Two questions to the same people"
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(found: Compared) -> Figure:
+def draw(comparison: Compared) -> Figure:
     """Draw both panels."""
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 3.6), layout="constrained")
-    figure.suptitle(f"{TITLE}: SIMULATED participants, n = {found.people}", fontsize=7.5)
+    figure.suptitle(f"{TITLE}: SIMULATED participants, n = {comparison.people}", fontsize=7.5)
     shares, thresholds = figure.subplots(1, 2)
     shares.set(title="Answers at each delay", xlabel="Delay, ms", xticks=[0, 50, 75, 100, 125, 150, 200])
     shares.set(ylim=(-0.03, 1.03), yticks=[0.0, 0.5, 0.75, 1.0])
     shares.yaxis.set_major_formatter(PercentFormatter(1.0))
-    criteria = [1000 * one.criterion_s for one in found.rated if not one.adapted_s]
+    criteria = [1000 * rating.criterion_s for rating in comparison.rated if not rating.adapted_s]
     thresholds.set(title="Threshold, ms", xlabel="Mean criterion of the ratings, ms", xlim=(50, 175), xticks=criteria)
     thresholds.set(ylim=(0, 205), yticks=[0, 50, 100, 150, 200])
-    delays, (middle, low, high) = np.linspace(1.0, 200.0, 200), found.detected_ms
+    delays, (middle, low, high) = np.linspace(1.0, 200.0, 200), comparison.detected_ms
     correct = success("weibull", np.log10(delays), np.log10(middle), LINEAR_WIDTH, GUESS, LAPSE)
     shares.plot(delays, correct, color=style.TEXT, dashes=(4, 2), label=f"correct in {FORCED_CHOICE}")
     shares.plot([middle], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT)
@@ -156,16 +156,18 @@ def draw(found: Compared) -> Figure:
     thresholds.axhline(
         _THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="“125 ms” of the thesis"
     )
-    for one, colour in zip(found.rated, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
-        test, at = one.found, 1000 * one.criterion_s + (5 if one.adapted_s else 0)
+    for rating, colour in zip(comparison.rated, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
+        test, at = rating.found, 1000 * rating.criterion_s + (5 if rating.adapted_s else 0)
         if test.effect is None or test.width is None or test.guess is None or test.lapse is None:
             continue
         if test.lower is not None and test.upper is not None:
             thresholds.plot([at, at], [test.lower, test.upper], color=colour, linewidth=1.0)
-        name = f"{LIKERT}, adapted to {1000 * one.adapted_s:.0f} ms" if one.adapted_s else f"{LIKERT}, by criterion"
-        label = name if one.adapted_s or at == criteria[0] else None
-        thresholds.plot([at], [test.effect], "D" if one.adapted_s else "o", markersize=4, color=colour, label=label)
-        if not one.adapted_s:
+        name = (
+            f"{LIKERT}, adapted to {1000 * rating.adapted_s:.0f} ms" if rating.adapted_s else f"{LIKERT}, by criterion"
+        )
+        label = name if rating.adapted_s or at == criteria[0] else None
+        thresholds.plot([at], [test.effect], "D" if rating.adapted_s else "o", markersize=4, color=colour, label=label)
+        if not rating.adapted_s:
             shares.plot(test.levels, np.array(test.yes) / test.asked, "o", markersize=3, color=colour)
             agree = success("logistic", delays, test.effect, test.width, test.guess, test.lapse)
             shares.plot(delays, agree, color=colour, label=f"agree in {LIKERT}, criterion {at:.0f} ms")
@@ -184,24 +186,24 @@ _CAPTION: Final = (
 )
 
 
-def evidence(found: Compared) -> Evidence:
+def evidence(comparison: Compared) -> Evidence:
     """Return both thresholds as a table, and the figure (PNG, SVG, PDF) with its caption."""
-    middle, low, high = found.detected_ms
+    middle, low, high = comparison.detected_ms
     rows = [(f"{FORCED_CHOICE}: forced choice, 75 % correct", "–", f"{middle:.0f} ms", f"{low:.0f} to {high:.0f} ms")]
-    for one in found.rated:
-        adapted = f", adapted to {1000 * one.adapted_s:.0f} ms" if one.adapted_s else ""
+    for rating in comparison.rated:
+        adapted = f", adapted to {1000 * rating.adapted_s:.0f} ms" if rating.adapted_s else ""
         name = f"{LIKERT}: rating of “{_STATEMENT}”, half agree{adapted}"
-        effect, threshold = one.found.effect, one.found
+        effect, threshold = rating.found.effect, rating.found
         value = "none" if effect is None else f"{effect:.0f} ms"
         known = threshold.lower is not None and threshold.upper is not None
         ends = f"{threshold.lower:.0f} to {threshold.upper:.0f} ms" if known else "–"
-        rows.append((name, f"{1000 * one.criterion_s:.0f} ms", value, ends))
+        rows.append((name, f"{1000 * rating.criterion_s:.0f} ms", value, ends))
     table = Table(("procedure", "criterion", "threshold", "95 % interval"), rows, left=1)
-    head = f"**SIMULATED.** The same {found.people} people in both procedures, seed {found.seed}."
+    head = f"**SIMULATED.** The same {comparison.people} people in both procedures, seed {comparison.seed}."
     text = f"{head}\n\n{table.markdown()}\n"
 
     def figures() -> dict[str, bytes]:
-        figure = draw(found)
+        figure = draw(comparison)
         return {
             f"delay-thresholds.{form}": style.file_bytes(figure, form, TITLE, style.PLOT_SETTINGS)
             for form in style.FORMATS

@@ -111,15 +111,15 @@ class Delayed:
 
     @property
     def screens(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(one.screen for one in self.shown))
+        return tuple(dict.fromkeys(column.screen for column in self.shown))
 
     @property
     def loads(self) -> tuple[LoadName, ...]:
-        return tuple(dict.fromkeys(one.load for one in self.shown))
+        return tuple(dict.fromkeys(column.load for column in self.shown))
 
     def on(self, screen: str, load: LoadName) -> tuple[Shown, ...]:
         """Return the trials on a screen under a load, from the shortest delay to the longest."""
-        here = (one for one in self.shown if (one.screen, one.load) == (screen, load))
+        here = (column for column in self.shown if (column.screen, column.load) == (screen, load))
         return tuple(sorted(here, key=lambda one: one.delay_s))
 
     def limits(self) -> tuple[str, ...]:
@@ -128,14 +128,14 @@ class Delayed:
 
     def _of(self, screen: str, load: LoadName) -> str:
         trials = self.on(screen, load)
-        mean = max(abs(one.mean_ms) / one.frame_ms for one in trials)
-        tail = max(one.percentile_ms(_TAIL_PERCENT) / one.frame_ms for one in trials)
-        means_ms = [one.mean_ms for one in trials]
+        mean = max(abs(trial.mean_ms) / trial.frame_ms for trial in trials)
+        tail = max(trial.percentile_ms(_TAIL_PERCENT) / trial.frame_ms for trial in trials)
+        means_ms = [trial.mean_ms for trial in trials]
         return (
             f"{screen}, {BESIDE[load]}: mean error at most {mean:.2f} of a frame (limit {_MEAN_FRAMES:g}), "
             f"99th percentile at most {tail:.2f} (limit {_TAIL_FRAMES:g}), "
             f"means within {max(means_ms) - min(means_ms):.2f} ms of each other: "
-            f"{'met' if all(one.held for one in trials) else 'missed'}"
+            f"{'met' if all(trial.held for trial in trials) else 'missed'}"
         )
 
 
@@ -151,31 +151,31 @@ _LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(found: Delayed) -> Figure:
+def draw(delays: Delayed) -> Figure:
     """Draw what was found."""
-    width, height = found.size_px
+    width, height = delays.size_px
     caption = (
         f"Marks: mean of all frames; lines reach up to the {_TAIL_PERCENT:g}th percentile, which is written if it is "
-        f"off the scale. {found.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from the "
-        f"sample that is drawn to the end of its painting. {found.machine}."
+        f"off the scale. {delays.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from the "
+        f"sample that is drawn to the end of its painting. {delays.machine}."
     )
     handles = [
         Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **_LOOKS[load])
-        for load in found.loads
+        for load in delays.loads
     ]
-    figure, panels = panels_abreast(_LAYOUT, len(found.screens), handles, 2.6, caption)
-    for axes, screen in zip(panels, found.screens, strict=True):
-        _panel(axes, found, screen, first=axes is panels[0])
+    figure, panels = panels_abreast(_LAYOUT, len(delays.screens), handles, 2.6, caption)
+    for axes, screen in zip(panels, delays.screens, strict=True):
+        _panel(axes, delays, screen, first=axes is panels[0])
     return figure
 
 
-def _panel(axes: Axes, found: Delayed, screen: str, *, first: bool) -> None:
+def _panel(axes: Axes, delays: Delayed, screen: str, *, first: bool) -> None:
     """Draw every trial on a screen: a sign at the mean, a line from there to the 99th percentile."""
-    frame_ms = found.on(screen, found.loads[0])[0].frame_ms
+    frame_ms = delays.on(screen, delays.loads[0])[0].frame_ms
     top_ms = _MOST_FRAMES * frame_ms
-    for number, load in enumerate(found.loads):
-        aside = _APART * (number - (len(found.loads) - 1) / 2)
-        for place, trial in enumerate(found.on(screen, load)):
+    for number, load in enumerate(delays.loads):
+        aside = _APART * (number - (len(delays.loads) - 1) / 2)
+        for place, trial in enumerate(delays.on(screen, load)):
             _trial(axes, trial, place + aside, top_ms)
     for share, words in ((0.5, "½ frame"), (1.0, "1 frame")):
         axes.axhline(share * frame_ms, color=style.ZERO, linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
@@ -188,7 +188,7 @@ def _panel(axes: Axes, found: Delayed, screen: str, *, first: bool) -> None:
             va="center",
             fontsize=6.6,
         )
-    delays_ms = [1e3 * trial.delay_s for trial in found.on(screen, found.loads[0])]
+    delays_ms = [1e3 * trial.delay_s for trial in delays.on(screen, delays.loads[0])]
     axes.set_xticks(range(len(delays_ms)), [f"{delay_ms:g}" for delay_ms in delays_ms])
     axes.set_xlim(-0.6, len(delays_ms) - 0.4)
     axes.set_ylim(0, top_ms)
@@ -196,7 +196,7 @@ def _panel(axes: Axes, found: Delayed, screen: str, *, first: bool) -> None:
     axes.set_xlabel("requested delay [ms]", fontsize=7, labelpad=2)
     if first:
         axes.set_ylabel("later than requested [ms]", fontsize=7, labelpad=2)
-    paced = found.on(screen, found.loads[0])[0].paced
+    paced = delays.on(screen, delays.loads[0])[0].paced
     axes.set_title(f"{screen[0].upper()}{screen[1:]}, {paced}", pad=13, color=style.TEXT)
 
 
@@ -232,28 +232,28 @@ _HEADINGS: Final = (
 )  # fmt: skip
 
 
-def evidence(found: Delayed) -> Evidence:
+def evidence(delays: Delayed) -> Evidence:
     """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
-    width, height = found.size_px
+    width, height = delays.size_px
     head = (
-        f"{found.seconds:g} s of reaching at each delay, the tank at {width} × {height}; error: achieved minus "
+        f"{delays.seconds:g} s of reaching at each delay, the tank at {width} × {height}; error: achieved minus "
         "requested delay, from the sample drawn to the end of its painting; late: by more than a frame. "
-        f"{found.machine}."
+        f"{delays.machine}."
     )
     lines = [head]
-    for screen, load in itertools.product(found.screens, found.loads):
-        trials = found.on(screen, load)
+    for screen, load in itertools.product(delays.screens, delays.loads):
+        trials = delays.on(screen, load)
         lines += ["", f"{screen} ({trials[0].paced}), {BESIDE[load]}: errors in ms, then in frames", ""]
         lines.append(Table(_HEADINGS, [_row(trial) for trial in trials]).text())
-    text = "\n".join((*lines, "", *found.limits())) + "\n"
+    text = "\n".join((*lines, "", *delays.limits())) + "\n"
     abreast = [
         trials
-        for screen in found.screens
-        for trials in zip(*(found.on(screen, load) for load in found.loads), strict=True)
+        for screen in delays.screens
+        for trials in zip(*(delays.on(screen, load) for load in delays.loads), strict=True)
     ]
     heads = [
         f"{BESIDE[load]}: mean" if name == "mean" else name
-        for load in found.loads
+        for load in delays.loads
         for name in ("mean", "p95", "p99", "worst", "late")
     ]
     rows = [
@@ -265,13 +265,13 @@ def evidence(found: Delayed) -> Evidence:
         for trials in abreast
     ]
     table = Table(("screen", "requested", *heads), rows, left=1).markdown()
-    limits = "\n".join(f"- {limit}" for limit in found.limits())
+    limits = "\n".join(f"- {limit}" for limit in delays.limits())
     files = {
         "delays.txt": text,
         "delays.md": f"{head} Errors in ms.\n\n{table}\n\n{limits}\n",
-        "delays.csv": Table(COLUMNS, [_values(trial) for trial in found.shown]).csv(),
+        "delays.csv": Table(COLUMNS, [_values(trial) for trial in delays.shown]).csv(),
     }
-    return Evidence(text, files, plot_files("delays", "Accuracy of visual delays", draw, found))
+    return Evidence(text, files, plot_files("delays", "Accuracy of visual delays", draw, delays))
 
 
 def _values(trial: Shown) -> tuple[object, ...]:

@@ -117,8 +117,12 @@ def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rou
 def evidence(found: Sequence[DeviceLateness]) -> Evidence:
     """Return the table as text."""
     lines = [f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {_REFERENCE} (95 % interval)"]
-    for one in found:
-        ratio = f"   {one.ratio:.2f} ({one.low:.2f} to {one.high:.2f}): {one.verdict}" if one.name != _REFERENCE else ""
-        lines.append(f"{one.name:<28}{one.ticks:>8}{one.p50_us:>9.0f}{one.p99_us:>9.0f}{ratio}")
+    for lateness in found:
+        ratio = (
+            f"   {lateness.ratio:.2f} ({lateness.low:.2f} to {lateness.high:.2f}): {lateness.verdict}"
+            if lateness.name != _REFERENCE
+            else ""
+        )
+        lines.append(f"{lateness.name:<28}{lateness.ticks:>8}{lateness.p50_us:>9.0f}{lateness.p99_us:>9.0f}{ratio}")
     text = "\n".join((*lines, f"limit: {_MOST_RATIO:g}; missed where the whole interval is above it")) + "\n"
-    return Evidence(text, {"devices.txt": text}, missed=any(one.missed for one in found))
+    return Evidence(text, {"devices.txt": text}, missed=any(lateness.missed for lateness in found))

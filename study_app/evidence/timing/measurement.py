@@ -483,7 +483,7 @@ def timing(
     def measured() -> Timed:
         frames, began_s = windows.frames if windows else 0, time.monotonic()
         arms = {loop: partial(_run_loop, loop, ticks) for loop in loops}
-        found = take_turns(arms, rounds, ending=ending or threading.Event(), progress=progress)
+        rounds_of = take_turns(arms, rounds, ending=ending or threading.Event(), progress=progress)
         frames_hz = ((windows.frames if windows else 0) - frames) / (time.monotonic() - began_s)
         each_ns = rounds * ticks * PERIOD_NS
         return Timed(
@@ -493,7 +493,7 @@ def timing(
             spin_us=servos[0].clock.spin_us,
             spun_share=sum(servo.clock.spun_ns for servo in servos) / (len(servos) * each_ns),
             frames_hz=frames_hz if load != "none" else None,
-            loops=tuple(_loop_timing(loop.kind, loop.grant, parts) for loop, parts in found.items()),
+            loops=tuple(_loop_timing(loop.kind, loop.grant, parts) for loop, parts in rounds_of.items()),
             notes=tuple(notes),
         )
 

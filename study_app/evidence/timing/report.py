@@ -78,33 +78,33 @@ _LOADS: Final = {
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(found: Timed) -> Figure:
+def draw(timing: Timed) -> Figure:
     """Draw what was found."""
     caption = (
         f"Share of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom: the 99th percentile of each. "
-        f"{found.seconds:g} s of each loop at 1 kHz alternating every quarter second, {_LOADS[found.load]}. "
-        f"{found.machine}."
+        f"{timing.seconds:g} s of each loop at 1 kHz alternating every quarter second, {_LOADS[timing.load]}. "
+        f"{timing.machine}."
     )
     handles = []
-    for kind in (kind for kind in NAMES if any(loop.kind == kind for loop in found.loops)):
+    for kind in (kind for kind in NAMES if any(loop.kind == kind for loop in timing.loops)):
         face = _LOOKS[kind]["color"] if kind in {"servo", "thread"} else "white"
         look = {name: value for name, value in _LOOKS[kind].items() if name != "zorder"}
         handles.append(
             Line2D([], [], marker=_MARKS[kind], markersize=4, markerfacecolor=face, label=NAMES[kind], **look)
         )
-    figure, panels = panels_abreast(_LAYOUT, len(found.levels), handles, 3.4, caption)
-    highest_us = float(10 ** np.ceil(np.log10(max(2e3, *(loop.late_us(100) for loop in found.loops)))))
-    for axes, level in zip(panels, found.levels, strict=True):
-        _panel(axes, found, level, highest_us, first=axes is panels[0])
+    figure, panels = panels_abreast(_LAYOUT, len(timing.levels), handles, 3.4, caption)
+    highest_us = float(10 ** np.ceil(np.log10(max(2e3, *(loop.late_us(100) for loop in timing.loops)))))
+    for axes, level in zip(panels, timing.levels, strict=True):
+        _panel(axes, timing, level, highest_us, first=axes is panels[0])
     return figure
 
 
-def _panel(axes: Axes, found: Timed, level: Level, highest_us: float, *, first: bool) -> None:
+def _panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, first: bool) -> None:
     """Draw the loops of a class as steps, each with a mark at its 99th percentile."""
     decades = np.log10(highest_us / _LOWEST_US)
     edges = np.logspace(np.log10(_LOWEST_US), np.log10(highest_us), round(BINS_A_DECADE * decades) + 1)
-    loops = [loop for loop in found.loops if loop.grant.level == level]
-    least = 1 / max(loop.ticks for loop in found.loops)
+    loops = [loop for loop in timing.loops if loop.grant.level == level]
+    least = 1 / max(loop.ticks for loop in timing.loops)
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(_LOWEST_US, highest_us)
@@ -153,38 +153,38 @@ _HEADINGS: Final = (
 )  # fmt: skip
 
 
-def evidence(found: Timed) -> Evidence:
+def evidence(timing: Timed) -> Evidence:
     """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
     head = (
-        f"{found.seconds:g} s of each loop at 1 kHz, alternating every quarter second; {_LOADS[found.load]}"
-        f"{'' if found.frames_hz is None else f', {found.frames_hz:.0f} frames per second'}. {found.machine}."
+        f"{timing.seconds:g} s of each loop at 1 kHz, alternating every quarter second; {_LOADS[timing.load]}"
+        f"{'' if timing.frames_hz is None else f', {timing.frames_hz:.0f} frames per second'}. {timing.machine}."
     )
-    notes = found.notes
-    if found.spin_us > 0:
-        notes += (f"a spin of {found.spin_us:g} µs before each deadline took {found.spun_share:.1%} of a core",)
-    table = Table(_HEADINGS, [_row(found, loop) for loop in found.loops], left=2)
+    notes = timing.notes
+    if timing.spin_us > 0:
+        notes += (f"a spin of {timing.spin_us:g} µs before each deadline took {timing.spun_share:.1%} of a core",)
+    table = Table(_HEADINGS, [_row(timing, loop) for loop in timing.loops], left=2)
     what = "lateness in µs; skipped: deadlines that passed during a longer tick"
-    text = "\n".join((head, what, "", table.text(), "", *map(str, found.limits()), "", *notes)) + "\n"
-    limits = "\n".join(f"- {limit}" for limit in found.limits())
+    text = "\n".join((head, what, "", table.text(), "", *map(str, timing.limits()), "", *notes)) + "\n"
+    limits = "\n".join(f"- {limit}" for limit in timing.limits())
     said = " ".join(f"{note[0].upper()}{note[1:]}." for note in notes)
     markdown = f"{head} Lateness in µs.\n\n{table.markdown()}\n\n{limits}\n\n{said}\n"
-    csv = Table(COLUMNS, [_values(found, loop) for loop in found.loops]).csv()
+    csv = Table(COLUMNS, [_values(timing, loop) for loop in timing.loops]).csv()
     files = {"timing.txt": text, "timing.md": markdown, "timing.csv": csv}
-    return Evidence(text, files, plot_files("timing", "Lateness of ticks", draw, found))
+    return Evidence(text, files, plot_files("timing", "Lateness of ticks", draw, timing))
 
 
-def _values(found: Timed, loop: LoopTiming) -> tuple[object, ...]:
+def _values(timing: Timed, loop: LoopTiming) -> tuple[object, ...]:
     return (
         *(loop.grant.level, loop.grant.how, loop.name, loop.ticks, loop.overruns, loop.late),
         *(f"{loop.late_us(percent):.3f}" for percent in (*PERCENTILES, 100.0)),
-        *(f"{found.ratio(loop, percent):.4g}" for percent in (50.0, 99.0)),
+        *(f"{timing.ratio(loop, percent):.4g}" for percent in (50.0, 99.0)),
         *(f"{loop.busy_us(percent):.3f}" if len(loop.busy_ns) else "n/a" for percent in (50, 99)),
     )
 
 
-def _row(found: Timed, loop: LoopTiming) -> tuple[str, ...]:
+def _row(timing: Timed, loop: LoopTiming) -> tuple[str, ...]:
     ratios = (
-        ("1", "1") if loop.kind == "bare" else tuple(_ratio(found.ratio(loop, percent)) for percent in (50.0, 99.0))
+        ("1", "1") if loop.kind == "bare" else tuple(_ratio(timing.ratio(loop, percent)) for percent in (50.0, 99.0))
     )
     return (
         loop.grant.level,

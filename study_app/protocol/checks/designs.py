@@ -82,7 +82,7 @@ def _missing_for(protocol: Protocol, rule: ExclusionRule) -> str | None:
     blocks = [block for block in protocol.main_blocks if block.design is not None]
     if rule.rule == "constant_answers":
         asked = filter(None, (protocol.questionnaire_of(block.id) for block in protocol.main_blocks))
-        return None if any(found.statements for found in asked) else "no main block asks statements"
+        return None if any(questionnaire.statements for questionnaire in asked) else "no main block asks statements"
     if rule.rule == "threshold_beyond_levels":
         return None if any(block.stimulus is not None for block in blocks) else "no main block has levels"
     stimuli = {block.id: None if block.stimulus is None else protocol.stimuli[block.stimulus] for block in blocks}

@@ -67,7 +67,7 @@ class SensitivityPlan:
         design, count = self.design, len(self.design.arrangements)
         trials = [self.trials // count + (place < self.trials % count) for place in range(count)]
         correct = [str(design.correct(place)) for place in range(count)]
-        wrong = [next(one for one in design.answers if one != right) for right in correct]
+        wrong = [next(answer for answer in design.answers if answer != right) for right in correct]
         found = []
         for d_prime in truth:
             rights = random.binomial(trials, design.proportion_correct(float(d_prime), roving=self.roving)).tolist()
@@ -151,7 +151,9 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
         levels = tuple(sorted({one for one in method.levels_of(stimulus) if one > 0}))
         repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
         decided = () if protocol.analysis is None else protocol.analysis.published
-        exponents = (one.value for one in decided if (one.block, one.measure) == (block.id, "exponent"))
+        exponents = (
+            published.value for published in decided if (published.block, published.measure) == (block.id, "exponent")
+        )
         return EstimationPlan(levels, repetitions, next(exponents, _EXPONENT)) if len(levels) > 1 else None
     if isinstance(design, Rated) and len(method.levels_of(stimulus)) > 1 and len(standards_of(protocol, block)) == 1:
         repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
@@ -255,7 +257,7 @@ class ThresholdPlan:
         own = self.clipping
         if own is None or not own.others:
             return (self,)
-        of_others = (replace(own, standard=one) for one in own.others)
+        of_others = (replace(own, standard=other) for other in own.others)
         return tuple(replace(self, clipping=one) for one in (own, *of_others))
 
     def measures(self, thresholds: Floats) -> NDArray[np.bool_]:
@@ -323,7 +325,7 @@ class ThresholdPlan:
         Of each track the first ``most`` are taken, if that is given, without catch trials.
         """
         low, high = self.stimulus.domain
-        parts = [*(one.first(most) for one in answered.tracks), answered.noise, *([] if most else [answered.catch])]
+        parts = [*(track.first(most) for track in answered.tracks), answered.noise, *([] if most else [answered.catch])]
         joined = {name: np.concatenate([getattr(it, name) for it in parts], axis=1) for name in Answers._fields}
         answers = Answers(**joined)
         presented = np.unique(answers.levels[~np.isnan(answers.levels)])
@@ -387,17 +389,17 @@ def expected(plan: ThresholdPlan) -> Expected:
     observers = observers // together * together
     low, high = plan.stimulus.domain
     own = low + (high - low) * (0.25 + 0.5 * (np.arange(observers) + 0.5) / observers)  # the middle half
-    truth, people = np.tile(own, len(kinds)), [one for one in kinds.values() for _ in own]
+    truth, people = np.tile(own, len(kinds)), [kind for kind in kinds.values() for _ in own]
     halves, variances, shared = [], [], []
     for one in simulated.each_standard():
-        found = one.simulate(truth, np.random.default_rng(SEED), people, together)
+        estimates = one.simulate(truth, np.random.default_rng(SEED), people, together)
         full = one.measures(own)
-        ends = ((found.highs - found.lows) / 2).reshape(len(kinds), -1)[:, full]
-        errors = (found.medians - truth).reshape(len(kinds), -1)[:, full]
+        ends = ((estimates.highs - estimates.lows) / 2).reshape(len(kinds), -1)[:, full]
+        errors = (estimates.medians - truth).reshape(len(kinds), -1)[:, full]
         measured = full.mean() > 0.5
         halves.append(ends if measured else np.full((len(kinds), 1), math.inf))
         variances.append(errors.var(axis=1, ddof=1) if measured else np.full(len(kinds), math.inf))
-        shared.append(together * found.shared.reshape(len(kinds), -1).mean(axis=1))
+        shared.append(together * estimates.shared.reshape(len(kinds), -1).mean(axis=1))
     shrunk = (simulated.trials / plan.trials) ** 0.5
     return Expected(
         spacing=plan.stimulus.spacing,

@@ -329,7 +329,9 @@ def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Itera
     for name in block.conditions:
         pair = [protocol.conditions[condition] for condition in (name, standard)]
         differing = [
-            words for words, keys in ways.items() if len({tuple(getattr(one, key) for key in keys) for one in pair}) > 1
+            words
+            for words, keys in ways.items()
+            if len({tuple(getattr(condition, key) for key in keys) for condition in pair}) > 1
         ]
         if len(differing) > 1:
             yield (

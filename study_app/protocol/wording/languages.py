@@ -147,7 +147,7 @@ def _slots(text: str) -> set[str]:
 
 def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
     """Return the languages in a folder by code, and why the others are refused."""
-    found: dict[str, Words] = {}
+    languages: dict[str, Words] = {}
     refused: dict[str, str] = {}
     try:
         files = sorted(folder.glob("[a-z][a-z].toml"))
@@ -158,10 +158,10 @@ def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
             refused[file.stem] = f"{file}: the program contains this language; remove the file"
             continue
         try:
-            found[file.stem] = read_language(file)
+            languages[file.stem] = read_language(file)
         except StudyError as error:
             refused[file.stem] = str(error)
-    return found, refused
+    return languages, refused
 
 
 SHIPPED: Final = {code: read_language(_FOLDER / f"{code}.toml") for code in ("en", "nl", "de", "fr", "ar")}
