@@ -95,7 +95,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
         n=n,
         dropped=dropped,
         statistic_name="L",
-        effect_name="mean rank correlation with the order",
+        effect_name="mean rank correlation with the order, not corrected for ties",
         direction=direction,
     )
     if not n or (ranks == k + 1).all():

@@ -59,6 +59,15 @@ def test_the_effect_is_the_mean_rank_correlation() -> None:
     assert trend([[1, 2, 3]] * 12).no_interval == "no interval: all participants have the same correlation"
 
 
+def test_ties_lower_the_effect_and_its_name_says_so() -> None:
+    answers = [[1, 1, 2, 4], [2, 3, 3, 3], [1, 2, 5, 4]]
+    result = trend(answers)
+    # Sums of (rank - 2.5) (place - 2.5): 4.5, 3 and 4, of at most 5.
+    assert result.effect == pytest.approx((4.5 + 3 + 4) / 15)
+    assert result.effect < np.mean([spearmanr(row, range(4)).statistic for row in answers])
+    assert result.effect_name.endswith("not corrected for ties")
+
+
 def test_many_people_are_approximated_as_scipy_does() -> None:
     rng = np.random.default_rng(2)
     values = np.argsort(rng.random((trend_module.EXACT_UP_TO + 1, 5)), axis=1).astype(float)
