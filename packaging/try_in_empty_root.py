@@ -116,7 +116,7 @@ def furnish(root: Path, bundle: Path) -> None:
         shutil.copyfile(path, library / name)
     shutil.copytree("/usr/lib/locale/C.utf8", root / "usr" / "lib" / "locale" / "C.utf8")
     shutil.copytree("/etc/fonts", root / "etc" / "fonts")
-    (root / "etc" / "passwd").write_text("someone:x:0:0::/home:/none\n")
+    (root / "etc" / "passwd").write_text("someone:x:0:0::/home:/none\n", encoding="utf-8", newline="\n")
     shutil.copytree(bundle, root / "opt" / "liquid-study", symlinks=True)
     for name, minor in (("null", 3), ("zero", 5), ("random", 8), ("urandom", 9)):
         os.mknod(root / "dev" / name, 0o20666, os.makedev(1, minor))

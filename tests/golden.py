@@ -71,7 +71,7 @@ def compare(
     if config.getoption("regenerate"):
         note_changed_texts(kept.read_text(encoding="utf-8").splitlines() if kept.exists() else [], found)
         kept.parent.mkdir(parents=True, exist_ok=True)
-        kept.write_text("\n".join(found) + "\n", encoding="utf-8")
+        kept.write_text("\n".join(found) + "\n", encoding="utf-8", newline="\n")
     expected = kept.read_text(encoding="utf-8").removesuffix("\n").split("\n")
     pairs = zip_longest(expected, found)
     alike = found == expected if exact else all(None not in pair and _alike(*pair, rel, abs_) for pair in pairs)

@@ -15,12 +15,14 @@ TEMPLATE = EXAMPLES / "liquid_study_device"
 def install(site: Path, package: str, kind: str, entry_points: dict[str, str], **modules: str) -> None:
     """Write an installed package with plug-ins of a kind: its modules and its metadata."""
     for name, source in modules.items():
-        (site / f"{name}.py").write_text(dedent(source), encoding="utf-8")
+        (site / f"{name}.py").write_text(dedent(source), encoding="utf-8", newline="\n")
     metadata = site / f"{package}-1.0.dist-info"
     metadata.mkdir()
-    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
+    (metadata / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", encoding="utf-8", newline="\n"
+    )
     points = "".join(f"{name} = {value}\n" for name, value in entry_points.items())
-    (metadata / "entry_points.txt").write_text(f"[liquid_study.{kind}s]\n{points}")
+    (metadata / "entry_points.txt").write_text(f"[liquid_study.{kind}s]\n{points}", encoding="utf-8", newline="\n")
 
 
 def forget(*packages: str) -> None:

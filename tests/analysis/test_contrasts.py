@@ -62,13 +62,13 @@ COMPARED = 'conditions = ["prompt_one", "late_one"], standard = "prompt_one"'
 @pytest.fixture(scope="module")
 def delayed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("delayed")
-    (folder / "delayed.toml").write_text(DELAYED)
+    (folder / "delayed.toml").write_text(DELAYED, encoding="utf-8", newline="\n")
     return rehearse_answers(folder / "delayed.toml", participants=6, seed=3, results=folder / "study", features={})
 
 
 def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_path: Path) -> None:
     assert load_study(delayed).contrasts == ()
-    receipts = "".join(path.read_text() for path in delayed.rglob("session.json"))
+    receipts = "".join(path.read_text("utf-8") for path in delayed.rglob("session.json"))
     assert "late_one" not in receipts
     assert '"contrasts"' not in receipts
     unblind(delayed, "AB", "to analyse")
@@ -103,7 +103,7 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     """A 3-down-1-up track stays above the threshold, which may therefore lie below all levels that a person met."""
     method = 'kind = "updown", rule = "3down1up", tracks = 2, trials = 24'
     text = DELAYED.replace('kind = "questplus", trials = 20', method).replace("participants = 6", "participants = 8")
-    (tmp_path / "delayed.toml").write_text(text)
+    (tmp_path / "delayed.toml").write_text(text, encoding="utf-8", newline="\n")
     folder = rehearse_answers(tmp_path / "delayed.toml", participants=8, seed=5, results=tmp_path / "s", features={})
     unblind(folder, "AB", "to analyse")
     study = load_study(folder)

@@ -164,7 +164,11 @@ def test_the_first_page_says_which_look_it_is(n: int, said: str) -> None:
 @pytest.mark.slow
 def test_the_look_is_that_of_the_sessions_on_disk(tmp_path: Path) -> None:
     file = tmp_path / "looked.toml"
-    file.write_text(LOOKED.replace("participants = 12\nlooks = [6, 12]", "participants = 3\nlooks = [2, 3]"))
+    file.write_text(
+        LOOKED.replace("participants = 12\nlooks = [6, 12]", "participants = 3\nlooks = [2, 3]"),
+        encoding="utf-8",
+        newline="\n",
+    )
     folder = rehearse_answers(
         str(file), participants=2, seed=1, results=tmp_path / "study", features=made_up(str(file))
     )
@@ -174,7 +178,7 @@ def test_the_look_is_that_of_the_sessions_on_disk(tmp_path: Path) -> None:
 
 def test_the_sizes_of_power_are_the_looks(tmp_path: Path) -> None:
     file = tmp_path / "looked.toml"
-    file.write_text(LOOKED)
+    file.write_text(LOOKED, encoding="utf-8", newline="\n")
     result = CliRunner().invoke(commands, ["power", str(file), "--sizes", "5,10"])
     assert result.exit_code == 2
     assert "the study plans looks at 6, 12; omit --sizes" in " ".join(result.output.split())

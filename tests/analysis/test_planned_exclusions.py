@@ -66,7 +66,7 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
 def pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the unblinded results of two participants, of whom the second exchanged the keys."""
     folder = tmp_path_factory.mktemp("pairs")
-    (folder / "pairs.toml").write_text(PAIRS, encoding="utf-8")
+    (folder / "pairs.toml").write_text(PAIRS, encoding="utf-8", newline="\n")
 
     def answer(*, exchanged: bool) -> Callable[[Any], str | None]:
         def of(question: Any) -> str | None:
@@ -129,7 +129,7 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
 def study_with(tmp_path: Path, rules: str, name: str = "demo") -> Path:
     path = tmp_path / f"{name}.toml"
     text = shipped_file(name).read_text("utf-8").replace("format = 1", "format = 2")
-    path.write_text(f"{text}\n{rules}", encoding="utf-8")
+    path.write_text(f"{text}\n{rules}", encoding="utf-8", newline="\n")
     return path
 
 

@@ -69,7 +69,7 @@ def of_kind(kind: type, answers: list[Answer]) -> list:
 def test_studies_are_found_whatever_else_lies_there(study: Path) -> None:
     results = study.parent
     (results / "notes").mkdir()
-    (results / "readme.txt").write_text("x")
+    (results / "readme.txt").write_text("x", encoding="utf-8", newline="\n")
     (results / "empty" / "data").mkdir(parents=True)
     (found,) = of_kind(StudiesFound, told(FindStudies(results)))
     assert [(one.folder.name, one.simulated, one.pilot) for one in found.studies] == [

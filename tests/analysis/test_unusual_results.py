@@ -70,13 +70,15 @@ def adaptive_file(folder: Path) -> Path:
     (folder / "adaptive.toml").write_text(
         text_of_damper(
             "adaptive", ADAPTIVE.replace('method = "', 'catch = { share = 0.3, wrong_most = 0.5 }\nmethod = "'), (4, 8)
-        )
+        ),
+        encoding="utf-8",
+        newline="\n",
     )
     return folder / "adaptive.toml"
 
 
 def grouped(folder: Path) -> Path:
-    (folder / "grouped.toml").write_text(STUDY + GROUPS)
+    (folder / "grouped.toml").write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
     felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
     results = rehearse_answers(folder / "grouped.toml", participants=4, seed=2, results=folder / "r", features=felt)
     unblind(results, "AB", "to analyse")

@@ -233,7 +233,7 @@ def test_examples_of_the_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of one short block of 2IFC."""
     path = tmp_path_factory.mktemp("api") / "levels.toml"
-    path.write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8")
+    path.write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8", newline="\n")
     return path
 
 
@@ -308,7 +308,7 @@ def to_twice_the_standard(question: Any) -> np.int64:
 @needs_servo
 def test_an_own_observer_sets_levels(tmp_path: Path) -> None:
     study = tmp_path / "matching.toml"
-    study.write_text(matching.TEXT, encoding="utf-8")
+    study.write_text(matching.TEXT, encoding="utf-8", newline="\n")
     with api.open_session(study, "P001", results=tmp_path / "r", seed=3, answer=to_twice_the_standard) as session:
         session.run()
     with (
@@ -331,7 +331,7 @@ def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short:
         next(iter(session))
     held = json.loads((session.folder / "receipt.json").read_text(encoding="utf-8"))
     held["screens"] = {"participant": {"name": "DP-1"}}
-    (session.folder / "receipt.json").write_text(json.dumps(held), encoding="utf-8")
+    (session.folder / "receipt.json").write_text(json.dumps(held), encoding="utf-8", newline="\n")
     with (
         pytest.raises(SessionError, match="is a participant's session"),
         api.open_session(short, "P001", results=tmp_path / "r", seed=5),
@@ -424,7 +424,7 @@ def calls_an_answer(folder: Path, statements: int) -> float:
         f'{{ id = "s{number}", text = "Statement {number}", short = "S{number}" }},\n' for number in range(statements)
     )
     study = folder / f"form{statements}.toml"
-    study.write_text(FORM.format(rows=rows), encoding="utf-8")
+    study.write_text(FORM.format(rows=rows), encoding="utf-8", newline="\n")
     calls = 0
 
     def count(_frame: Any, event: str, _: Any) -> None:

@@ -49,7 +49,7 @@ def test_a_notebook_runs_from_top_to_bottom(path: Path, monkeypatch: pytest.Monk
 def test_an_own_observer_runs_a_session_whose_thresholds_follow_its_noise(tmp_path: Path, study: str) -> None:
     if study == "short":
         study = str(tmp_path / "short.toml")
-        Path(study).write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8")
+        Path(study).write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8", newline="\n")
     found = example("own_observer.py")["main"](tmp_path / "results", study)
     assert verify_study(tmp_path / "results").errors == ()
     assert len(found) > 0

@@ -100,7 +100,7 @@ def can_go_on(study: str, results: Path) -> bool:
 
 def events(results: Path):
     journal = results / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
-    return [json.loads(line) for line in journal.read_text().splitlines()]
+    return [json.loads(line) for line in journal.read_text("utf-8").splitlines()]
 
 
 def rows(results: Path, name: str):
@@ -110,7 +110,7 @@ def rows(results: Path, name: str):
 
 
 def receipt_of(results: Path):
-    return json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())
+    return json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text("utf-8"))
 
 
 class Leaver(Person):

@@ -23,12 +23,12 @@ def test_a_crash_leaves_the_functions_and_no_value(tmp_path: Path) -> None:
     path = tmp_path / "crash.txt"
     ended = subprocess.run([sys.executable, "-c", CRASH, str(path)], capture_output=True, check=False)
     assert ended.returncode < 0
-    text = path.read_text()
+    text = path.read_text("utf-8")
     assert "Segmentation fault" in text
     assert "in crash_here" in text
     assert "honey" not in text
     CrashTrace(path).close()  # a session that goes on keeps it
-    assert path.read_text() == text
+    assert path.read_text("utf-8") == text
 
 
 def test_without_a_crash_no_file_is_left(tmp_path: Path) -> None:

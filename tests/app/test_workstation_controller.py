@@ -27,7 +27,7 @@ def desk(qapp):
 
 
 def test_settings_that_cannot_be_kept_are_told_and_count_all_the_same(desk, qtbot):
-    settings_file().parent.write_text("")  # a file where the folder should be
+    settings_file().parent.write_text("", encoding="utf-8", newline="\n")  # a file where the folder should be
     with qtbot.waitSignal(desk.troubled) as told:
         desk.change_settings({"theme": "dark"})
     assert "could not be saved" in told.args[0]

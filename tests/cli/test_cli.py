@@ -63,7 +63,9 @@ def test_check_warns_of_what_the_device_of_this_computer_cannot_give(
 def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liquid_study: Run) -> None:
     source = source_bytes("rek2024").decode()
     assert liquid_study("check", "rek2024").stdout.count("Note:") == 0
-    (tmp_path / "own.toml").write_text(source.replace('nl = "Welkom"', 'nl = "Welcome"'), encoding="utf-8")
+    (tmp_path / "own.toml").write_text(
+        source.replace('nl = "Welkom"', 'nl = "Welcome"'), encoding="utf-8", newline="\n"
+    )
     noted = liquid_study("check", "own.toml")
     assert noted.returncode == 0
     note = "study.languages: 1 text to translate to Dutch, still in English: pages.consent.title"
@@ -72,7 +74,7 @@ def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liqui
 
 def test_a_letter_that_the_console_lacks_stops_no_command(tmp_path: Path) -> None:
     text = source_bytes("demo").decode().replace('title = "A first look"', 'title = "Łódź"', 1)
-    (tmp_path / "lodz.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "lodz.toml").write_text(text, encoding="utf-8", newline="\n")
     told = subprocess.run(
         [sys.executable, "-m", "study_app", "check", "lodz.toml"],
         cwd=tmp_path,
@@ -145,7 +147,9 @@ def test_a_blinded_report_says_once_how_to_open_the_key_and_which_limits_were_br
 ) -> None:
     source = source_bytes("demo").decode()
     assert "frame_gap_ms = 250" in source
-    (tmp_path / "own.toml").write_text(source.replace("frame_gap_ms = 250", "frame_gap_ms = 2"), encoding="utf-8")
+    (tmp_path / "own.toml").write_text(
+        source.replace("frame_gap_ms = 250", "frame_gap_ms = 2"), encoding="utf-8", newline="\n"
+    )
     liquid_study("rehearse", "own.toml", "--no-recordings", "--results", "results")
     liquid_study("report", "results", "--to", "report")
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")

@@ -110,8 +110,8 @@ def test_the_demo_runs_valid_sessions_and_a_second_call_changes_nothing(workspac
     assert len(list((workspace / REPORT).parent.glob("*.png"))) >= 4
 
     note = workspace / STUDY / "data" / "note.txt"
-    note.write_text("mine")
-    (workspace / REPORT).write_text("edited")
+    note.write_text("mine", encoding="utf-8", newline="\n")
+    (workspace / REPORT).write_text("edited", encoding="utf-8", newline="\n")
     before = digests(workspace)
     assert "P001" not in finish("--no-window")
     assert digests(workspace) == before

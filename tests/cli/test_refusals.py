@@ -48,7 +48,7 @@ def test_new_begins_a_study_in_the_designer_and_writes_nothing(visit: Visit, tmp
 
 def test_edit_opens_a_study_by_name_or_file(visit: Visit, tmp_path: Path) -> None:
     file = tmp_path / "other.toml"
-    file.write_text("format = 1\n")
+    file.write_text("format = 1\n", encoding="utf-8", newline="\n")
     for words in ("demo", str(file)):
         assert CliRunner().invoke(commands, ["edit", words]).exit_code == 0
     assert visit.asked == [("open", "demo"), ("open", str(file))]
@@ -69,7 +69,7 @@ def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.Monkey
     monkeypatch.setattr(survey, "survey", lambda _scenes, _show: ("compared",))
     monkeypatch.setattr(survey, "evidence", lambda found: Evidence("", {"survey.md": found[0]}))
     done = CliRunner().invoke(commands, ["accuracy", "--liquids", "--to", str(tmp_path)])
-    assert (done.exit_code, (tmp_path / "survey.md").read_text()) == (0, "compared"), done.output
+    assert (done.exit_code, (tmp_path / "survey.md").read_text("utf-8")) == (0, "compared"), done.output
     assert done.stdout.strip() == str(tmp_path / "survey.md")
 
 

@@ -65,7 +65,7 @@ def workspace(
     for name in ("demo", "copied"):
         shutil.copytree(once(tmp_path_factory, "cli-demo", make) / "demo", tmp_path / "results" / name)
     for name, text in FILES.items():
-        (tmp_path / name).write_text(text)
+        (tmp_path / name).write_text(text, encoding="utf-8", newline="\n")
     if request.node.callspec.id in LABS:
         shutil.copytree(once(tmp_path_factory, "cli-labs", make_labs), tmp_path / "labs")
     monkeypatch.chdir(tmp_path)

@@ -138,7 +138,7 @@ def test_what_the_designer_tells(story: Callable[..., Story], pytestconfig: pyte
     told.drafts_are_kept = False  # the file is written anew before each flow
     for flow in FLOWS[:6]:
         told.text = text
-        told.designer.file.write_text(text, encoding="utf-8")
+        told.designer.file.write_text(text, encoding="utf-8", newline="\n")
         told.designer.window.resize(1600, 1000)
         told.act("open", told.designer.open)
         told.lines = []

@@ -36,7 +36,7 @@ def test_a_study_is_made_from_the_empty_one_by_names_and_saved(designer: Any, ki
     save(user, file)
     assert user.actions < 600
     check_file(file, study)
-    assert file.read_text() == designer.text
+    assert file.read_text("utf-8") == designer.text
 
 
 SCRIPT = """

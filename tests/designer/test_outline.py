@@ -122,10 +122,10 @@ def listed(designer: Any) -> list[str]:
 
 
 def add_study(designer: Any, name: str, title: str) -> None:
-    text = designer.file.read_text()
+    text = designer.file.read_text("utf-8")
     before = next(line for line in text.splitlines() if line.startswith("title = "))
     made = text.replace('name = "kitchen"', f'name = "{name}"').replace(before, f'title = "{title}"', 1)
-    (designer.file.parent / f"{name}.toml").write_text(made)
+    (designer.file.parent / f"{name}.toml").write_text(made, encoding="utf-8", newline="\n")
 
 
 def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(designer: Any) -> None:

@@ -91,7 +91,7 @@ def banner(story: Story) -> None:
     ends = {"undo": "ctrl+z ctrl+z", "save": "ctrl+s", "close": "", "Esc": "ctrl+1 Escape", "go": "[Discard the draft]"}
     for end, acts in ends.items():
         story.act("open another", lambda: designer.open("demo"))
-        text = designer.file.read_text()
+        text = designer.file.read_text("utf-8")
         write_draft(designer.file, Draft(text=f"{text}# {end}\n", base=content_hash(text.encode())))
         story.act("open a draft", designer.open)
         story.expect("Draft of today HH:MM, not saved", undo="Restore the draft", kept="edited")
@@ -149,7 +149,7 @@ def others(story: Story) -> None:
     outside("Another look", "A third look")
     story.expect(both, undo="Change Version", kept="edited")
     story.play("ctrl+s")
-    assert "A third look" in designer.file.read_text(), "not overwritten while that is asked"
+    assert "A third look" in designer.file.read_text("utf-8"), "not overwritten while that is asked"
     story.play("[Take the file's]")
     story.expect(undo="Take the file's content", kept="saved")
     story.has('title = "A third look"', 'version = "1.0"')
@@ -224,7 +224,7 @@ def failing(story: Story) -> None:
         for name in ("kitchen.toml.0123abcd", "kitchen.toml.4567abcd", "other.toml.0123abcd")
     )
     for half in (killed, written_now, other):
-        half.write_text("format = ")
+        half.write_text("format = ", encoding="utf-8", newline="\n")
     for half in (killed, other):
         os.utime(half, (0, 0))
     story.play("ctrl+s")
@@ -388,7 +388,7 @@ def names(story: Story) -> None:
     story.ask(SetValue((*designer.editing.selected, "title"), "Afterwards"))
     story.select("study")
     story.has("[questionnaires.afterwards]", 'questionnaire = "afterwards"')
-    assert designer.undo_all() == story.designer.file.read_text()
+    assert designer.undo_all() == story.designer.file.read_text("utf-8")
 
 
 def one_instead(story: Story) -> None:
@@ -423,7 +423,7 @@ def questions(story: Story) -> None:
     story.play("Escape")
     story.expect("No problems", at="Text")
     assert designer.value(*ITEMS, 1, "text") == pasted
-    assert designer.undo_all() == designer.file.read_text()
+    assert designer.undo_all() == designer.file.read_text("utf-8")
 
 
 def fields(story: Story) -> None:
@@ -513,7 +513,9 @@ def header(story: Story) -> None:
         story.expect(kept=kept, at="Repetitions")
         story.act(f"click {name}, disabled", lambda at=at: designer.hand.click(at))
         story.expect(kept=kept, at="Repetitions")
-    designer.file.with_name("zeta.toml").write_text(DEMO.replace('"demo"', '"zeta"').replace("A first look", "Zebra"))
+    designer.file.with_name("zeta.toml").write_text(
+        DEMO.replace('"demo"', '"zeta"').replace("A first look", "Zebra"), encoding="utf-8", newline="\n"
+    )
     story.act("look", designer.controller.enter)
     story.act("to the list", box.setFocus)
     story.play("Escape ctrl+Home")

@@ -48,15 +48,15 @@ def test_a_draft_can_be_continued_where_no_study_is_open(designer: Any) -> None:
 def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_path: Path) -> None:
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    liquid = shipped_file("demo").read_text().split("[liquids.thick]")[1].split("\n\n")[0]
-    (elsewhere / "syrup.toml").write_text(f"[liquids.syrup]{liquid}\n")
-    text = designer.file.read_text().replace(f"[liquids.thick]{liquid}", '[liquids.thick]\nfile = "syrup.toml"')
+    liquid = shipped_file("demo").read_text("utf-8").split("[liquids.thick]")[1].split("\n\n")[0]
+    (elsewhere / "syrup.toml").write_text(f"[liquids.syrup]{liquid}\n", encoding="utf-8", newline="\n")
+    text = designer.file.read_text("utf-8").replace(f"[liquids.thick]{liquid}", '[liquids.thick]\nfile = "syrup.toml"')
     text = text.replace("format = 1", "format = 2", 1)
     for name in ("thin", "thick"):
         text = text.replace(f"[conditions.{name}]\n", f'[conditions.{name}]\nview = "sea/waves.mp4"\n')
     (elsewhere / "sea").mkdir()
     (elsewhere / "sea" / "waves.mp4").write_bytes(b"copied, not decoded")
-    (elsewhere / "kitchen.toml").write_text(text)
+    (elsewhere / "kitchen.toml").write_text(text, encoding="utf-8", newline="\n")
     designer.open(str(elsewhere / "kitchen.toml"))
     assert designer.study.faults == ()
     designer.controller.begin_study(str(elsewhere / "kitchen.toml"), "mine")
@@ -100,13 +100,13 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     designer.open()
     designer.editing.handle_request(SetValue(REPETITIONS, 3))
     other("Saved elsewhere", "save")
-    assert "Saved elsewhere" in designer.file.read_text()
+    assert "Saved elsewhere" in designer.file.read_text("utf-8")
     designer.saving.save()
-    assert "Saved elsewhere" in designer.file.read_text()
+    assert "Saved elsewhere" in designer.file.read_text("utf-8")
     assert designer.place.banner.words.text().startswith("Another program changed this file")
     designer.saving.answer_banner("keep")
     designer.saving.save()
-    assert "repetitions = 3" in designer.file.read_text()
+    assert "repetitions = 3" in designer.file.read_text("utf-8")
     kept = [kept_content(one.hash) or b"" for one in kept_versions(designer.file)]
     assert any(b"Saved elsewhere" in content for content in kept)
 

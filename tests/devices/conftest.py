@@ -45,7 +45,7 @@ def built_template(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(TEMPLATE, folder)
     command = [sys.executable, "-W", "ignore", "setup.py", "-q", "build_ext", "--inplace"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
-    project = tomllib.loads((folder / "pyproject.toml").read_text())["project"]
+    project = tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))["project"]
     install(folder / "src", "liquid_study_example", "device", project["entry-points"]["liquid_study.devices"])
     return folder / "src"
 

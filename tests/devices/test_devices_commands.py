@@ -120,7 +120,7 @@ class TestCalibrate:
         assert len([line for line in told.output.splitlines() if " +0.0" in line or " -0.0" in line]) >= 20
         file = calibration_file("EMULATED-WEIGHED")
         assert str(file) in told.output
-        assert json.loads(file.read_text())["poses"] == 20
+        assert json.loads(file.read_text("utf-8"))["poses"] == 20
         assert load_calibration("EMULATED-WEIGHED").units_per_nm == pytest.approx(6616, rel=0.01)
         assert load_calibration("EMULATED") is None  # rehearsals do not use it
 

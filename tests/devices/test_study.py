@@ -96,7 +96,7 @@ def table(folder: StudyFolder, name: str) -> list[dict[str, str]]:
 def test_the_study_verifies_and_its_receipt_names_the_device(rehearsed: Rehearsed) -> None:
     folder = rehearsed.by_device
     assert verify_study(folder.path).errors == ()
-    receipt = json.loads(folder.sessions()[0].receipt.read_text())["device"]
+    receipt = json.loads(folder.sessions()[0].receipt.read_text("utf-8"))["device"]
     assert receipt["name"] == rehearsed.device
     assert receipt.items() >= RECEIPTS[rehearsed.device].items()
     for one in (rehearsed.by_script, folder):

@@ -68,7 +68,7 @@ def test_header_and_numpy_records_have_the_same_offsets_sizes_and_constants(tmp_
         **{name: printed(dtype.names, f"liquid_study_{name}") for name, dtype in records.items()},
         constants=' printf(", "); '.join(f'printf("\\"{name}\\": %d", LIQUID_STUDY_{name});' for name in constants),
     )
-    (tmp_path / "offsets.c").write_text(text)
+    (tmp_path / "offsets.c").write_text(text, encoding="utf-8", newline="\n")
     program = tmp_path / "offsets"
     include = f"-I{TEMPLATE / SOURCES}"
     subprocess.run(

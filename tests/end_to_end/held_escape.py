@@ -65,7 +65,7 @@ class SessionBench:
 
     def __init__(self, display: str, folder: Path) -> None:
         study = folder / "heldkeys.toml"
-        study.write_text(STUDY, encoding="utf-8")
+        study.write_text(STUDY, encoding="utf-8", newline="\n")
         options = ("--participant", "H1", "--windowed", "--device", "falcon-emulated", "--results", "results/heldkeys")
         self.program = Program(display, folder, "run", str(study), *options)
         self.xdotool = self.program.xdotool
@@ -100,7 +100,7 @@ class LabBench:
         self.window = self.program.window("^lab$")
 
     def _states(self) -> list[str]:
-        return self.told.read_text().split() if self.told.exists() else []
+        return self.told.read_text("utf-8").split() if self.told.exists() else []
 
     def counts(self) -> Counts:
         states = self._states()

@@ -104,7 +104,7 @@ def check_outputs(study: Protocol, results: Path, to: Path) -> None:
 def test_any_accepted_study_can_be_held_resumed_verified_exported_and_reported(number: int, tmp_path: Path) -> None:
     text, study = drawn(number)
     file, results = tmp_path / "drawn.toml", tmp_path / "results"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text, encoding="utf-8", newline="\n")
     felt = made_up(str(file))
     rehearse_answers(file, participants=2, seed=number, results=results, features=felt)
     cut_off_and_resumed(study, file.read_bytes(), results, felt, number)

@@ -103,7 +103,7 @@ def test_a_draft_that_release_0_2_left_is_shown_at_home_and_opened_in_the_design
     }
     name = hashlib.sha256(str(file).encode()).hexdigest()[:32]
     (data_folder() / "drafts").mkdir(parents=True)
-    (data_folder() / "drafts" / f"{name}.json").write_text(json.dumps(draft), encoding="utf-8")
+    (data_folder() / "drafts" / f"{name}.json").write_text(json.dumps(draft), encoding="utf-8", newline="\n")
     visit = MainController(tmp_path / "results")
     qtbot.addWidget(visit.window)
     visit.window.show()

@@ -127,7 +127,9 @@ def test_the_designer_names_a_plug_in_that_is_not_installed(
 ) -> None:
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     designer = Designer(tmp_path)
-    designer.file.write_text(STUDY.read_text().replace('name = "plugins"', 'name = "kitchen"'))
+    designer.file.write_text(
+        STUDY.read_text("utf-8").replace('name = "plugins"', 'name = "kitchen"'), encoding="utf-8", newline="\n"
+    )
     designer.open("kitchen", "tasks", "circle")
     missing = f'"{PACKAGE}:circle" is a task of the plug-in {PACKAGE}, which is not installed (pip install {PACKAGE})'
     assert designer.form_row("tasks", "circle", "kind").row.faults == (missing,)
@@ -145,7 +147,9 @@ class TestTemplate:
         }
         monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
         designer = Designer(tmp_path)
-        designer.file.write_text(STUDY.read_text().replace('name = "plugins"', 'name = "kitchen"'))
+        designer.file.write_text(
+            STUDY.read_text("utf-8").replace('name = "plugins"', 'name = "kitchen"'), encoding="utf-8", newline="\n"
+        )
         designer.open()
         labels = {}
         for path in (("questionnaires", "mood", "items", 0), ("tasks", "circle"), ("methods", "limits")):
@@ -272,7 +276,7 @@ QUESTION = """
             return {{"n": "1"}}
 """
 TOY_STUDY = (
-    STUDY.read_text()
+    STUDY.read_text("utf-8")
     .replace(f'kind = "{PACKAGE}:limits"\nlevels = 5\nseries = 2', 'kind = "constant"\nlevels = 2\nrepetitions = 1')
     .replace(f'kind = "{PACKAGE}:circle"\nturns = 1', 'kind = "explore"\nmin_s = 0.2\nmax_s = 1')
     .replace(f'kind = "{PACKAGE}:grid"', 'kind = "toy-plug:toy"')
@@ -285,7 +289,7 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
     run: Any, site: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     study, folder = tmp_path / "toy.toml", tmp_path / "results"
-    study.write_text(TOY_STUDY)
+    study.write_text(TOY_STUDY, encoding="utf-8", newline="\n")
     points = {"toy": "toy_plug:Toy"}
     install(site, "toy_typo", "outlet", {"toy": "toy-typo:Toy"})
     install(site, "toy-plug", "question", points, toy_plug=QUESTION.format(problem="1 / 0", measure="1 / 0"))
@@ -297,8 +301,10 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
     caplog.clear()
     code, said, _ = run("verify", folder)
     assert (code, said.splitlines()[-1]) == (0, "1 session: sound")
-    assert len((folder / "data/sub-P001/ses-01").glob("*responses*").__next__().read_text().splitlines()) == 3
-    (site / "toy_plug.py").write_text((site / "toy_plug.py").read_text().replace("1 / 0", "return None", 1))
+    assert len((folder / "data/sub-P001/ses-01").glob("*responses*").__next__().read_text("utf-8").splitlines()) == 3
+    (site / "toy_plug.py").write_text(
+        (site / "toy_plug.py").read_text("utf-8").replace("1 / 0", "return None", 1), encoding="utf-8", newline="\n"
+    )
     forget("toy_")
     other = tmp_path / "others"
     assert run("rehearse", study, "--participants", 1, "--results", other)[0] == 0
@@ -334,7 +340,7 @@ def test_what_cannot_be_used_is_a_line_and_hides_no_other(
     assert line.startswith(f"    question  toy: {reason}")
     assert line.endswith("; update or uninstall the plug-in")
     study = tmp_path / "toy.toml"
-    study.write_text(TOY_STUDY)
+    study.write_text(TOY_STUDY, encoding="utf-8", newline="\n")
     code, _, said = run("check", study)
     assert code == 2
     assert f'"toy-plug:toy" is a question that the plug-in toy-plug 1.0 does not provide: {reason}' in said
@@ -388,13 +394,13 @@ def study_with(site: Path, tmp_path: Path) -> Callable[[str, str, str, str], Pat
     """Return a function that installs an edited class of the template as toy-plug, and returns a study with it."""
 
     def edited(kind: str, name: str, old: str, new: str) -> Path:
-        source = (TEMPLATE / f"src/liquid_study_template/{kind}.py").read_text()
+        source = (TEMPLATE / f"src/liquid_study_template/{kind}.py").read_text("utf-8")
         assert source.count(old) == 1
         changed = source.replace(old, new).replace(PACKAGE, "toy-plug")
         install(site, "toy-plug", kind, {"toy": f"toy_plug:{name}"}, toy_plug=changed)
         text = TOY_STUDY.replace('kind = "toy-plug:toy"', 'kind = "text"')
         assert IN_STUDY[name][0] in text
-        (tmp_path / "toy.toml").write_text(text.replace(*IN_STUDY[name]))
+        (tmp_path / "toy.toml").write_text(text.replace(*IN_STUDY[name]), encoding="utf-8", newline="\n")
         return tmp_path / "toy.toml"
 
     return edited
@@ -444,7 +450,7 @@ def test_an_answer_of_a_plug_in_that_is_too_long_is_refused(run: Any, study_with
     assert run("verify", tmp_path / "results")[0] == 0
 
 
-DEVICE = (TEMPLATE / "src/liquid_study_template/device.py").read_text()
+DEVICE = (TEMPLATE / "src/liquid_study_template/device.py").read_text("utf-8")
 
 
 def test_a_device_that_ends_the_program_hides_no_other_and_one_that_opens_nothing_is_named(
@@ -457,7 +463,9 @@ def test_a_device_that_ends_the_program_hides_no_other_and_one_that_opens_nothin
     assert "the plug-in toy-plug 1.0 failed (SystemExit: 3)" in said
     assert "falcon" in said
     forget("toy_")
-    (site / "toy_plug.py").write_text(DEVICE.replace("return opened(LightHand())", "return None"))
+    (site / "toy_plug.py").write_text(
+        DEVICE.replace("return opened(LightHand())", "return None"), encoding="utf-8", newline="\n"
+    )
     with pytest.raises(PlugInError, match=r"toy-plug 1\.0 failed \(open of device light-hand returned None"):
         open_device("light-hand")
 

@@ -43,7 +43,7 @@ def test_a_session_by_keys_and_clicks_from_the_home_window_into_the_csv(display,
     monkeypatch.chdir(tmp_path)
     quick = source_bytes("rek2024").decode().replace("min_s = 30", "min_s = 1").replace("min_s = 10", "min_s = 1")
     (tmp_path / "protocols").mkdir()
-    (tmp_path / "protocols" / "rek2024.toml").write_text(quick, encoding="utf-8")
+    (tmp_path / "protocols" / "rek2024.toml").write_text(quick, encoding="utf-8", newline="\n")
     program = Program(display, tmp_path)
     try:
         begin_session(program, qtbot)

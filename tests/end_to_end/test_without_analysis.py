@@ -60,7 +60,7 @@ sys.exit(run_home_window(Path(sys.argv[1]), then=visit_all))
 def environment(tmp_path: Path) -> dict[str, str]:
     """Return the environment of processes, also of those that they start, without the libraries."""
     (tmp_path / "blocked").mkdir()
-    (tmp_path / "blocked" / "sitecustomize.py").write_text(BLOCK)
+    (tmp_path / "blocked" / "sitecustomize.py").write_text(BLOCK, encoding="utf-8", newline="\n")
     path = os.pathsep.join([str(tmp_path / "blocked"), str(ROOT)])
     own = {"LIQUID_STUDY_WORKSPACE": str(tmp_path), "LIQUID_STUDY_CONFIG": str(tmp_path / "settings")}
     return os.environ | own | {"PYTHONPATH": path, "QT_QPA_PLATFORM": "offscreen"}

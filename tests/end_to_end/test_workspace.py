@@ -117,10 +117,12 @@ def test_the_first_start_asks_once_and_creates_nothing_before_the_answer(documen
 
 def test_an_earlier_results_folder_becomes_the_workspace(documents, tmp_path):
     settings_file().parent.mkdir(parents=True)
-    settings_file().write_text(json.dumps({"results": str(tmp_path / "lab" / "results"), "theme": "dark"}))
+    settings_file().write_text(
+        json.dumps({"results": str(tmp_path / "lab" / "results"), "theme": "dark"}), encoding="utf-8", newline="\n"
+    )
     assert load_settings().workspace == str(tmp_path / "lab")
     assert workspace().folder == tmp_path / "lab"
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="file"):
         keep_workspace(Workspace(tmp_path / "file"))
     assert workspace().folder == tmp_path / "lab", "what cannot be created is not kept"
@@ -147,8 +149,10 @@ def test_recent_protocols_are_remembered_newest_first_and_only_while_they_exist(
 
 def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
     start_folder(tmp_path / "start", monkeypatch, "protocols")
-    Path("protocols/syrup.toml").write_text("format = 1\n[liquids.syrup]\ndensity_kg_m3 = 1300\neffects = ['drag']\n")
-    Path("protocols/broken.toml").write_text("format = 1\n[study]\n")
+    Path("protocols/syrup.toml").write_text(
+        "format = 1\n[liquids.syrup]\ndensity_kg_m3 = 1300\neffects = ['drag']\n", encoding="utf-8", newline="\n"
+    )
+    Path("protocols/broken.toml").write_text("format = 1\n[study]\n", encoding="utf-8", newline="\n")
     assert "syrup" not in known_sources()
     assert "broken" in known_sources()
 

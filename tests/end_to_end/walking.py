@@ -76,7 +76,7 @@ class Visitor(Program):
 
     def __init__(self, display: str, folder: Path) -> None:
         (folder / "protocols").mkdir()
-        (folder / "protocols" / "rek2024.toml").write_text(SHORT, encoding="utf-8")
+        (folder / "protocols" / "rek2024.toml").write_text(SHORT, encoding="utf-8", newline="\n")
         self.display = display
         self.orders: set[str] = set()
         super().__init__(display, folder)

@@ -105,7 +105,7 @@ def test_every_figure_has_its_number_title_and_caption():
 
 
 def test_a_folder_that_cannot_be_is_named(tmp_path):
-    (tmp_path / "file").write_text("")
+    (tmp_path / "file").write_text("", encoding="utf-8", newline="\n")
     with pytest.raises(
         StoreError, match=r"below cannot be written \(a file is in the place of a folder\): .*choose another folder"
     ):

@@ -151,5 +151,5 @@ def test_a_workspace_that_no_folder_can_be_is_not_used(tmp_path: Path, monkeypat
     monkeypatch.chdir(tmp_path)
     settings_file().parent.mkdir(parents=True, exist_ok=True)
     for folder in ("a\0b", "\ud83c"):
-        settings_file().write_text(json.dumps({"workspace": folder}), encoding="utf-8")
+        settings_file().write_text(json.dumps({"workspace": folder}), encoding="utf-8", newline="\n")
         assert folder not in str(workspace.workspace().results)

@@ -68,7 +68,7 @@ def test_a_session_killed_at_random_bytes_of_its_journal_equals_one_that_was_not
         assert old in text
         text = text.replace(old, new)
     protocol = tmp_path / "levels.toml"
-    protocol.write_text(text)
+    protocol.write_text(text, encoding="utf-8", newline="\n")
     outcomes = outcomes_of("killer", protocol, tmp_path, KILLS, 3, "bytes", limit_s=240 + 50 * KILLS)
     whole = told(tmp_path / "whole")
     assert sum(event == "trial_started" for event, *_ in whole) >= 7
@@ -94,7 +94,9 @@ def equals(study: Path, whole: dict[tuple[Any, ...], Any]) -> None:
 @pytest.mark.nightly
 def test_one_session_killed_again_and_again_equals_one_that_was_not(tmp_path: Path) -> None:
     protocol = tmp_path / "levels.toml"
-    protocol.write_text(short_text().replace(CONSTANT, ADAPTIVE).replace('method = "few"', CATCH))
+    protocol.write_text(
+        short_text().replace(CONSTANT, ADAPTIVE).replace('method = "few"', CATCH), encoding="utf-8", newline="\n"
+    )
     (outcome,) = outcomes_of("killer", protocol, tmp_path, KILLS, 3, "again", limit_s=240 + 50 * KILLS)
     assert outcome["kills"] > 0.8 * KILLS
     study = Path(outcome["folder"])

@@ -60,7 +60,7 @@ def concealed(tmp_path: Path, blinding: str) -> Path:
     for pattern, word in (*CONCEALED, (r'blinding = "double"', f'blinding = "{blinding}"')):
         text, found = re.subn(pattern, word, text)
         assert found, pattern
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 
@@ -178,7 +178,7 @@ def test_nothing_seen_written_or_logged_tells_a_level(
         assert old in text, old
         text = text.replace(old, new)
     path = tmp_path / "levels.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8", newline="\n")
     found = held(path, tmp_path / "results", monkeypatch, caplog)
     protocol = load(str(path))
     (place,) = StudyFolder(tmp_path / "results").sessions()

@@ -44,7 +44,9 @@ def test_a_signal_in_a_trial_leaves_a_session_that_can_be_resumed(
 ) -> None:
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     protocol = short.write(tmp_path)
-    protocol.write_text(protocol.read_text(encoding="utf-8").replace("min_s = 0.2", "min_s = 20"), encoding="utf-8")
+    protocol.write_text(
+        protocol.read_text(encoding="utf-8").replace("min_s = 0.2", "min_s = 20"), encoding="utf-8", newline="\n"
+    )
     words = ["run", str(protocol), "--participant", "P001", "--operator", "AK", "--device", "scripted", "--windowed"]
     program, busy = Program(display, tmp_path, *words), []
     try:

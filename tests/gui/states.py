@@ -291,7 +291,7 @@ def used(folder: str, name: str) -> Callable[[Any], None]:
 
     def act(_dialog: Any) -> None:
         Path(folder).mkdir(parents=True)
-        Path(folder, name).write_text('{"name": "otherstudy"}')
+        Path(folder, name).write_text('{"name": "otherstudy"}', encoding="utf-8", newline="\n")
 
     return act
 

@@ -332,7 +332,7 @@ def compare(name: str, lines: Iterable[str], config: pytest.Config) -> None:
     """Compare lines, each once, with the golden file of a window, unless another version of Qt recorded it."""
     version = qVersion().rpartition(".")[0]
     if config.getoption("regenerate"):
-        QT_VERSION.write_text(f"{version}\n")
-    if (recorded := QT_VERSION.read_text().strip()) != version:
+        QT_VERSION.write_text(f"{version}\n", encoding="utf-8", newline="\n")
+    if (recorded := QT_VERSION.read_text("utf-8").strip()) != version:
         pytest.skip(f"recorded with Qt {recorded}, here is Qt {version}: screen readers are told otherwise")
     golden.compare((GOLDEN / re.sub(r"\W+", "_", name)).with_suffix(".txt"), golden.each_once(lines), config)

@@ -56,7 +56,7 @@ def test_a_preset_reads_back_as_it_was_and_check_takes_it(source: str, edit: boo
 def test_the_shipped_liquids_are_at_hand_with_those_of_a_folder_and_without_broken_files(tmp_path: Path) -> None:
     origin = load_scene("rek2024", "honey")
     save_preset(tmp_path / "mine.toml", preset_text(Setting("Honey", origin, origin)))
-    (tmp_path / "broken.toml").write_text("format = ")
+    (tmp_path / "broken.toml").write_text("format = ", encoding="utf-8", newline="\n")
     at_hand = available_liquids((tmp_path,))
     assert Choice(source="rek2024", liquid="light_oil", title="Light oil (rek2024)") in at_hand
     assert Choice(source=str(tmp_path / "mine.toml"), liquid="honey", title="Honey (mine)") in at_hand

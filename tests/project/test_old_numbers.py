@@ -45,7 +45,7 @@ def test_sections_older_than_their_code_and_without_a_date_are_told_apart(tmp_pa
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text(text)
+        (tmp_path / name).write_text(text, encoding="utf-8", newline="\n")
     when = {"GIT_COMMITTER_DATE": "2026-11-24T12:00:00", "GIT_AUTHOR_DATE": "2026-11-24T12:00:00"}
     me = ("-c", "user.name=x", "-c", "user.email=x@example.org")
     for words in (("init", "-q"), ("add", "."), (*me, "commit", "-qm", "x")):

@@ -1,6 +1,9 @@
 """The files for people who join or cite the project name what exists, and agree with the package."""
 
+import ast
 import re
+import shutil
+import subprocess
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -89,3 +92,64 @@ def test_every_test_of_the_list_of_circles_exists() -> None:
         if not (ROOT / module).is_file() or f"def {function}" not in (ROOT / module).read_text("utf-8"):
             missing.append(line)
     assert missing == []
+
+
+def text_without_form(call: ast.Call) -> bool:
+    """Return whether a call reads or writes text in the system's own encoding, or writes the system's line ends."""
+    if not isinstance(call.func, ast.Attribute):
+        return False
+    name, given = call.func.attr, {keyword.arg for keyword in call.keywords}
+    if name == "open":
+        mode = call.args[0].value if call.args and isinstance(call.args[0], ast.Constant) else ""
+        is_text = isinstance(mode, str) and re.fullmatch(r"[rwax]\+?t?", mode) is not None
+        return is_text and not {"encoding", "newline"} <= given
+    if name == "write_text" and len(call.args) == 1:  # with several arguments it is another function
+        return not {"encoding", "newline"} <= given
+    return name == "read_text" and not call.args and "encoding" not in given
+
+
+def test_text_files_have_one_encoding_and_one_line_end_on_every_system() -> None:
+    """Otherwise Windows would use its code page, which lacks many letters, and end lines with two characters."""
+    unfit = [
+        f"{path.relative_to(ROOT).as_posix()}:{node.lineno}"
+        for folder in ("study_app", "tests", "tools", "packaging", "docs")
+        for path in sorted((ROOT / folder).rglob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Call) and text_without_form(node)
+    ]
+    assert unfit == [], "write encoding and newline"
+
+
+@pytest.mark.parametrize(
+    ("call", "unfit"),
+    [
+        ("path.write_text(text)", True),
+        ('path.write_text(text, encoding="utf-8")', True),
+        ('path.write_text(text, encoding="utf-8", newline="\\n")', False),
+        ("path.read_text()", True),
+        ('path.read_text("utf-8")', False),
+        ('path.open("a")', True),
+        ('path.open("ab")', False),
+        ('path.open("w", encoding="utf-8", newline="")', False),
+    ],
+)
+def test_which_calls_depend_on_the_system(call: str, unfit: bool) -> None:
+    expression = ast.parse(call, mode="eval").body
+    assert isinstance(expression, ast.Call)
+    assert text_without_form(expression) is unfit
+
+
+def test_a_clone_on_windows_has_the_same_bytes(tmp_path: Path) -> None:
+    """Git for Windows converts line ends unless the repository forbids it; the hash of a study would differ."""
+    if shutil.which("git") is None:
+        pytest.skip("git is not installed")
+    made, clone = tmp_path / "made", tmp_path / "clone"
+    made.mkdir()
+    names = (".gitattributes", "protocols/demo.toml", "study_app/haptics/kernels/tick.py", "docs/pictures/tank.jpg")
+    for name in names:
+        (made / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, made / name)
+    person = ("-c", "user.name=P", "-c", "user.email=p@example.org", "-c", "core.autocrlf=true")
+    for words in (("init", "-q", "."), ("add", "."), ("commit", "-q", "-m", "files"), ("clone", "-q", ".", str(clone))):
+        subprocess.run(["git", *person, *words], cwd=made, check=True, capture_output=True)
+    assert [name for name in names if (clone / name).read_bytes() != (ROOT / name).read_bytes()] == []

@@ -92,7 +92,7 @@ def regenerate(file: Path) -> None:
         edits = "...\n".join(_signed("-", old) + _signed("+", new) for old, new in case.edits)
         said = "".join(f"> {line}\n" for line in said_of(case.text, case.study))
         parts.append(f"=== {case.name}\n{edits}{said}")
-    file.write_text("\n".join(parts), encoding="utf-8")
+    file.write_text("\n".join(parts), encoding="utf-8", newline="\n")
 
 
 def _signed(sign: str, text: str) -> str:

@@ -25,7 +25,7 @@ def _written_anew(pytestconfig: pytest.Config) -> None:
         for file in FILES:
             regenerate(file)
         for name in STUDY_NAMES:
-            (DESCRIBED / f"{name}.txt").write_text(_description(name), encoding="utf-8")
+            (DESCRIBED / f"{name}.txt").write_text(_description(name), encoding="utf-8", newline="\n")
 
 
 def _description(name: str) -> str:
@@ -126,7 +126,7 @@ def test_the_command_prints_problems_and_judges_levels_for_a_delay(
     said: str,
 ) -> None:
     path = tmp_path / "rows.toml"
-    path.write_text(text_of("rows").replace(old, new, 1), encoding="utf-8")
+    path.write_text(text_of("rows").replace(old, new, 1), encoding="utf-8", newline="\n")
     monkeypatch.setattr(sys, "argv", ["liquid-study", "check", str(path), "--delay-ticks", ticks])
     with pytest.raises(SystemExit) as ended:
         main()

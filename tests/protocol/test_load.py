@@ -28,7 +28,7 @@ def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeyp
     assert load("rek2024").study.name == "rek2024"
     own = tmp_path / "protocols" / "rek2024.toml"
     own.parent.mkdir()
-    own.write_text(SOUND)
+    own.write_text(SOUND, encoding="utf-8", newline="\n")
     assert load("rek2024").study.name == "small"
     assert source_bytes("rek2024") == SOUND.encode()
     assert load(own).study.name == load(str(own)).study.name == "small"
@@ -55,7 +55,7 @@ def test_a_protocol_that_is_not_there(name: str, words: str, tmp_path: Path, mon
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     path = tmp_path / "secret.toml"
-    path.write_text(SOUND)
+    path.write_text(SOUND, encoding="utf-8", newline="\n")
 
     def refuse(_: Path) -> bytes:
         raise PermissionError(13, "Permission denied")
@@ -74,16 +74,18 @@ def test_a_scene_is_one_liquid_of_a_protocol():
 
 def test_a_scene_file_needs_no_study(tmp_path: Path):
     path = tmp_path / "scene.toml"
-    path.write_text("[scene]\nscale = 3\nrate_hz = 500\n[liquids.tar]\ndensity_kg_m3 = 1153\n")
+    path.write_text(
+        "[scene]\nscale = 3\nrate_hz = 500\n[liquids.tar]\ndensity_kg_m3 = 1153\n", encoding="utf-8", newline="\n"
+    )
     scene = load_scene(path, "tar")
     assert (scene.scale, scene.rate_hz, scene.liquids[0].density_kg_m3) == (3, 500, 1153)
-    path.write_text("[liquids.tar]\ndensity_kg_m3 = 1153\n")
+    path.write_text("[liquids.tar]\ndensity_kg_m3 = 1153\n", encoding="utf-8", newline="\n")
     assert load_scene(path, "tar").scale == 10
 
 
 def test_problems_of_a_scene_file_are_its_own(tmp_path: Path):
     path = tmp_path / "scene.toml"
-    path.write_text("[scene]\nscael = 3\n\n[liquids.tar]\ndensity = 1153\n")
+    path.write_text("[scene]\nscael = 3\n\n[liquids.tar]\ndensity = 1153\n", encoding="utf-8", newline="\n")
     with pytest.raises(ProtocolError) as caught:
         load_scene(path, "tar")
     assert [(problem.line, problem.place) for problem in caught.value.problems] == [
@@ -153,7 +155,7 @@ DAMPER = '[liquids.damper]\ndrag = { law = "linear", damping_nspm = 12 }\n'
 
 
 def written(path: Path, text: str) -> Path:
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 

@@ -82,9 +82,9 @@ def test_the_schema_refuses_what_check_refuses(study: str, old: str, new: str) -
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("taplo") is None, reason="taplo is not installed")
 def test_an_editor_of_toml_accepts_shipped_studies_and_names_the_line_of_a_mistake(tmp_path: Path) -> None:
-    (tmp_path / "schema.json").write_text(json.dumps(SCHEMA), encoding="utf-8")
+    (tmp_path / "schema.json").write_text(json.dumps(SCHEMA), encoding="utf-8", newline="\n")
     for name in shipped():
-        (tmp_path / f"{name}.toml").write_text(text_of(name), encoding="utf-8")
+        (tmp_path / f"{name}.toml").write_text(text_of(name), encoding="utf-8", newline="\n")
     words = ["taplo", "lint", "--colors", "never", "--schema", (tmp_path / "schema.json").as_uri()]
 
     def lint() -> tuple[int, str]:
@@ -93,7 +93,7 @@ def test_an_editor_of_toml_accepts_shipped_studies_and_names_the_line_of_a_mista
 
     assert lint()[0] == 0
     wrong = text_of("demo").replace('order = "shuffled"', 'order = "shufled"')
-    (tmp_path / "demo.toml").write_text(wrong, encoding="utf-8")
+    (tmp_path / "demo.toml").write_text(wrong, encoding="utf-8", newline="\n")
     line = wrong[: wrong.index('\norder = "shufled"')].count("\n") + 2
     code, said = lint()
     assert (code, f"demo.toml:{line}:9" in said) == (1, True)

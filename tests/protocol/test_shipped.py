@@ -28,7 +28,7 @@ def test_a_study_made_in_a_checkout_does_not_ship(tmp_path: Path, monkeypatch: p
     (tmp_path / "study_app").mkdir()
     shutil.copytree(PROTOCOLS, tmp_path / "protocols")
     text = (PROTOCOLS / "demo.toml").read_text(encoding="utf-8")
-    (tmp_path / "protocols" / "mine.toml").write_text(text.replace('"demo"', '"mine"'), encoding="utf-8")
+    (tmp_path / "protocols" / "mine.toml").write_text(text.replace('"demo"', '"mine"'), encoding="utf-8", newline="\n")
     monkeypatch.setattr(files, "_PACKAGE", tmp_path / "study_app")
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     assert is_shipped("demo")
@@ -75,6 +75,7 @@ def test_a_scene_file_may_say_auto_and_give_its_motion(tmp_path):
         '[liquids.oil]\ndensity_kg_m3 = 900\nviscosity_pa_s = 0.1\neffects = "auto"\n'
         'region = { kind = "box", size_m = [1, 1, 1] }\n',
         encoding="utf-8",
+        newline="\n",
     )
     scene = load_scene(file, "oil")
     assert scene.motion_in(scene.liquids[0]).depth_m == (-0.1, 0.2)

@@ -22,7 +22,7 @@ def study(tmp_path: Path) -> Path:
     live = SEEN.format(name="live", delay=11, keys='view = "camera"')
     clip = SEEN.format(name="clip", delay=12, keys='view = "waves/sea.mp4"\noverlay = "hidden"')
     path = tmp_path / "mine.toml"
-    path.write_text(text[:first] + live + clip + text[first:], encoding="utf-8")
+    path.write_text(text[:first] + live + clip + text[first:], encoding="utf-8", newline="\n")
     (tmp_path / "waves").mkdir()
     (tmp_path / "waves" / "sea.mp4").write_bytes(FOOTAGE)
     return path
@@ -70,7 +70,7 @@ def test_footage_and_liquid_files_come_back_from_one_source() -> None:
     ],
 )
 def test_a_view_that_cannot_be_is_named(study: Path, old: str, new: str, problem: str) -> None:
-    study.write_text(study.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+    study.write_text(study.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8", newline="\n")
     with pytest.raises(ProtocolError) as refused:
         load(study)
     assert problem in str(refused.value)

@@ -54,9 +54,11 @@ def study(tmp_path: Path) -> Path:
     text = source_bytes("demo").decode()
     assert THICK in text
     path = tmp_path / "mine.toml"
-    path.write_text(text.replace(THICK, '[liquids.thick]\nfile = "liquids/syrup.toml"\n'), encoding="utf-8")
+    path.write_text(
+        text.replace(THICK, '[liquids.thick]\nfile = "liquids/syrup.toml"\n'), encoding="utf-8", newline="\n"
+    )
     (tmp_path / "liquids").mkdir()
-    (tmp_path / "liquids" / "syrup.toml").write_text(SYRUP, encoding="utf-8")
+    (tmp_path / "liquids" / "syrup.toml").write_text(SYRUP, encoding="utf-8", newline="\n")
     return path
 
 
@@ -77,7 +79,7 @@ def test_the_hash_covers_the_liquid_files_and_nothing_else_changes_it(study: Pat
     syrup.write_bytes(SYRUP.encode() + b"# \x7f \xf0\x9f\x8c\x8a \\ \" '''\r\n")
     assert protocol_hash(source_bytes(study)) != protocol_hash(source)
     assert unbundle(source_bytes(study))[1]["liquids/syrup.toml"].encode() == syrup.read_bytes()
-    syrup.write_text(SYRUP)
+    syrup.write_text(SYRUP, encoding="utf-8", newline="\n")
     assert source_bytes(study) == source
 
 
@@ -119,20 +121,24 @@ def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that
 def test_what_is_wrong_with_a_liquid_file_is_one_problem_at_its_line(
     study: Path, table: str, file: str, said: str
 ) -> None:
-    study.write_text(study.read_text().replace('file = "liquids/syrup.toml"', table), encoding="utf-8")
-    (study.parent / "liquids" / "syrup.toml").write_text(file, encoding="utf-8")
+    study.write_text(
+        study.read_text("utf-8").replace('file = "liquids/syrup.toml"', table), encoding="utf-8", newline="\n"
+    )
+    (study.parent / "liquids" / "syrup.toml").write_text(file, encoding="utf-8", newline="\n")
     with pytest.raises(ProtocolError) as refused:
         load(study)
     (problem,) = refused.value.problems
     assert said in str(problem)
-    lines = study.read_text().splitlines()
+    lines = study.read_text("utf-8").splitlines()
     assert problem.line is not None
     assert lines[problem.line - 1].split(" = ")[0] in ("file", "density_kg_m3")
 
 
 def test_liquids_of_one_condition_have_one_ball(study: Path) -> None:
     both = '[conditions.thick]\nliquids = ["thin", "thick"]'
-    study.write_text(study.read_text().replace('[conditions.thick]\nliquid = "thick"', both), encoding="utf-8")
+    study.write_text(
+        study.read_text("utf-8").replace('[conditions.thick]\nliquid = "thick"', both), encoding="utf-8", newline="\n"
+    )
     with pytest.raises(ProtocolError, match="different balls"):
         load(study)
 
@@ -148,7 +154,7 @@ def test_a_drag_coefficient_may_be_a_liquids_own_and_the_rest_the_scenes() -> No
 def test_a_ball_of_its_own_is_drawn_as_large_as_it_is_and_warned_of_where_it_tells_a_condition(study: Path) -> None:
     assert not any("sizes" in one for one in liquid_warnings(load(study)))
     syrup = study.parent / "liquids" / "syrup.toml"
-    syrup.write_text(SYRUP.replace("diameter_m = 0.068", "diameter_m = 0.04"))
+    syrup.write_text(SYRUP.replace("diameter_m = 0.068", "diameter_m = 0.04"), encoding="utf-8", newline="\n")
     protocol = load(study)
     (warned,) = (one for one in liquid_warnings(protocol) if "sizes" in one)
     assert "block liquids shows balls of different sizes (40, 68 mm)" in warned
@@ -201,7 +207,7 @@ def test_an_interrupted_session_goes_on_with_the_sealed_liquid(
             rehearsal.rehearse(str(study), participants=1, seed=3, results=tmp_path / "results")
     session = StudyFolder(tmp_path / "results").session("P001", 1).path
     syrup = tmp_path / "liquids" / "syrup.toml"
-    syrup.unlink() if becomes is None else syrup.write_text(becomes)
+    syrup.unlink() if becomes is None else syrup.write_text(becomes, encoding="utf-8", newline="\n")
     chosen = resumed_choices(session, protocol=str(study))
     assert chosen.read_protocol().liquids["thick"].density_kg_m3 == 1387.25
     assert resumed_choices(session, candidates=["demo", str(study)]).source == str(study)

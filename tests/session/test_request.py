@@ -55,7 +55,9 @@ def test_a_changed_protocol_is_refused_before_any_window(
     begun.close()
     before = begun.folder.journal.read_bytes()
     changed = tmp_path / "changed.toml"
-    changed.write_text(source_bytes("demo").decode().replace('"Now reach"', '"Reach now"'))
+    changed.write_text(
+        source_bytes("demo").decode().replace('"Now reach"', '"Reach now"'), encoding="utf-8", newline="\n"
+    )
     with pytest.raises(StoreError, match="Reach now"):
         app.resume(begun.folder.path, protocol=str(changed))
     assert windows == []

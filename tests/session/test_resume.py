@@ -148,7 +148,7 @@ def square(tmp_path: Path) -> Path:
     path = tmp_path / "square.toml"
     text = source_bytes("demo").decode()
     assert text.count('\norder = "shuffled"') == 2
-    path.write_text(text.replace('\norder = "shuffled"', '\norder = "latin"'))
+    path.write_text(text.replace('\norder = "shuffled"', '\norder = "latin"'), encoding="utf-8", newline="\n")
     return path
 
 
@@ -204,11 +204,13 @@ def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str, 
     protocol, store = run_one(square, "P025", row_of)
     present(store, build_schedule(protocol, "P025", SEED, place))
     path = store.folder.receipt
-    held = json.loads(path.read_text())
+    held = json.loads(path.read_text("utf-8"))
     assert held["row_of"] == row_of
     assert reproduce_session(store.folder.path).differences == []
     assert verify_study(square.parent / "results").errors == ()
-    path.write_text(json.dumps(held | {"row_of": "P002" if row_of == "P001" else "P001"}))
+    path.write_text(
+        json.dumps(held | {"row_of": "P002" if row_of == "P001" else "P001"}), encoding="utf-8", newline="\n"
+    )
     assert any("code" in line for line in reproduce_session(store.folder.path).differences)
     assert any("row_of: differ from the journal" in str(one) for one in verify_study(square.parent / "results").errors)
 
@@ -226,7 +228,7 @@ def test_resumed_session_keeps_the_row(square: Path) -> None:
 def test_session_without_a_row_of_another_has_no_such_key(square: Path) -> None:
     _, store = run_one(square, "P025", None)
     store.close()
-    assert "row_of" not in json.loads(store.folder.receipt.read_text())
+    assert "row_of" not in json.loads(store.folder.receipt.read_text("utf-8"))
     assert resumed_choices(store.folder.path, protocol=str(square)).row_of is None
 
 

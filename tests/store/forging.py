@@ -89,4 +89,4 @@ def cut(session: Path, size: int) -> None:
     shutil.rmtree(session / "recordings")
     receipt = session / "receipt.json"
     ended = re.compile('"status": "(completed|incomplete)"')
-    receipt.write_text(ended.sub('"status": "unfinished"', receipt.read_text()))
+    receipt.write_text(ended.sub('"status": "unfinished"', receipt.read_text("utf-8")), encoding="utf-8", newline="\n")

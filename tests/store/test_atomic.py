@@ -47,7 +47,7 @@ def test_a_clock_that_is_ahead_removes_no_temporary_file_that_is_being_written(
 ) -> None:
     new, old = temporary_path(tmp_path / "table"), temporary_path(tmp_path / "table")
     for path in (new, old):
-        path.write_text("half")
+        path.write_text("half", encoding="utf-8", newline="\n")
     os.utime(old, (time.time() - 2 * OLD_S,) * 2)
     monkeypatch.setattr(time, "time", lambda: new.stat().st_mtime + 2 * OLD_S)
     remove_old_temporary_files(tmp_path)

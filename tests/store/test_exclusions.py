@@ -74,7 +74,9 @@ def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path)
     later = (datetime.now().astimezone() + timedelta(hours=1)).isoformat(timespec="milliseconds")
     path.write_text(
         "participant,session,trial,rule_or_person,reason,excluded_at\n"
-        f"P008,1,n/a,AB,slow,2026-03-02T09:30:00.000+01:00\nP007,1,2,AB,the phone rang,{later}\n"
+        f"P008,1,n/a,AB,slow,2026-03-02T09:30:00.000+01:00\nP007,1,2,AB,the phone rang,{later}\n",
+        encoding="utf-8",
+        newline="\n",
     )
     assert [row.key_open for row in exclusions(folder)] == [None, None]
     assert [row.participant for row in late_exclusions(folder, exclusions(folder))] == ["P007"]

@@ -108,7 +108,7 @@ def prepare_withdrawal(folder: Path) -> None:
         exclude(folder)
         command("include", "FOLDER/study", *OF_P008, "--session", "1", *WHO)(folder)
     exclude(folder)
-    (folder / "study/.psychds-ignore").write_text("")
+    (folder / "study/.psychds-ignore").write_text("", encoding="utf-8", newline="\n")
     output_files.write_output(folder / "study", folder / "study/report", {"report.html": b"P008"})
 
 
@@ -118,7 +118,7 @@ def lose_files(folder: Path) -> None:
     atomic.write_file(
         fingerprints := folder / "study/fingerprints.txt", fingerprints.read_bytes().splitlines(keepends=True)[1]
     )
-    temporary_path(folder / SESSION / "receipt.json").write_text("half")
+    temporary_path(folder / SESSION / "receipt.json").write_text("half", encoding="utf-8", newline="\n")
 
 
 def merge_one(folder: Path) -> None:
@@ -197,7 +197,7 @@ def made_table() -> Any:
 
 def spoil_settings(_folder: Path) -> None:
     workstation.settings_file().parent.mkdir(exist_ok=True)
-    workstation.settings_file().write_text("no settings")
+    workstation.settings_file().write_text("no settings", encoding="utf-8", newline="\n")
 
 
 def leave_session(folder: Path) -> None:
@@ -217,9 +217,9 @@ def leave_claims(folder: Path) -> None:
     for path in ("sub-P009/ses-01", f"sub-P009/{temporary_path(Path('ses-01')).name}"):
         (folder / "study/data" / path).mkdir(parents=True)
     for path in (folder / "study/data/sub-P009").iterdir():
-        (path / "receipt.json").write_text("{}")
+        (path / "receipt.json").write_text("{}", encoding="utf-8", newline="\n")
         os.utime(path, (0, 0))
-    (old := temporary_path(folder / "study/data/table")).write_text("half")
+    (old := temporary_path(folder / "study/data/table")).write_text("half", encoding="utf-8", newline="\n")
     os.utime(old, (0, 0))
 
 
@@ -305,7 +305,9 @@ WRITERS: Final = {
     "session": Writer(hold_session, remedy="rebuild"),
 }
 OTHERS: Final = {
-    "edits": Writer(save_edits, lambda folder: (folder / "edited.toml").write_text("[study]")),
+    "edits": Writer(
+        save_edits, lambda folder: (folder / "edited.toml").write_text("[study]", encoding="utf-8", newline="\n")
+    ),
     "settings": Writer(keep_settings, spoil_settings),
     "small files": Writer(write_small_files),
     "resumed session": Writer(hold_session, leave_session),
@@ -403,7 +405,7 @@ class StopFaults(Exception):
 
 @pytest.mark.usefixtures("user")
 def test_an_output_that_cannot_be_listed_is_mentioned(studied: Path, tmp_path: Path) -> None:
-    (tmp_path / "user").write_text("a file is where the list's folder should be")
+    (tmp_path / "user").write_text("a file is where the list's folder should be", encoding="utf-8", newline="\n")
     warnings: list[str] = []
     output_files.write_output(studied / "study", tmp_path / "report", {"report.html": b"report"}, warnings.append)
     assert (tmp_path / "report/report.html").read_bytes() == b"report"

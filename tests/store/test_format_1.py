@@ -16,7 +16,7 @@ from study_app.store.columns import TABLES
 from study_app.store.folders import StudyFolder
 from tests.journal_lines import event_from, raw
 
-RECORDED: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "format_1.json").read_text())
+RECORDED: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "format_1.json").read_text("utf-8"))
 UNEQUAL = (
     "at",
     "previous",

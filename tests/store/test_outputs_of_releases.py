@@ -97,7 +97,7 @@ def outputs(study: str, to: Path) -> Iterator[str]:
     yield from (f"report: {line}" for line in run("report", folder, "--to", to / "report"))
     yield from (f"report: {line}" for line in columns(to / "report" / "tests.csv", exactly=False))
     yield from (f"report: {line}" for line in results(to / "report" / "report.json"))
-    unfinished = [place for place in sessions if '"session_ended"' not in (place / "journal.jsonl").read_text()]
+    unfinished = [place for place in sessions if '"session_ended"' not in (place / "journal.jsonl").read_text("utf-8")]
     for place in unfinished:
         again = shutil.copytree(RELEASES / study, to / "resumed")
         session = again / place.relative_to(folder)

@@ -29,7 +29,7 @@ RECORDED = sorted(path.parent for path in RELEASES.glob("*/*/data/sub-P001/ses-0
 STUDIES = [
     (path.parent.name, study)
     for path in sorted(RELEASES.glob("*/expected.json"))
-    for study in json.loads(path.read_text())
+    for study in json.loads(path.read_text("utf-8"))
 ]
 
 
@@ -37,7 +37,7 @@ STUDIES = [
 def held(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, dict[str, tuple[str, int]]]:
     """Return a copy of a recorded study, and status and number of answers of each participant."""
     version, study = request.param
-    expected = json.loads((RELEASES / version / "expected.json").read_text())[study]
+    expected = json.loads((RELEASES / version / "expected.json").read_text("utf-8"))[study]
     return Path(shutil.copytree(RELEASES / version / study, tmp_path / study)), expected
 
 
@@ -68,7 +68,7 @@ def test_every_answer_is_exported_and_the_report_is_whole(
     folder, expected = held
     unblind(folder, by="AB", reason="a test")
     written = export(folder, tmp_path / "tables")
-    assert json.loads((tmp_path / "tables" / "codebook.json").read_text())["doubts"] == []
+    assert json.loads((tmp_path / "tables" / "codebook.json").read_text("utf-8"))["doubts"] == []
     (table,) = [path for path in written if path.name.endswith("responses_data.csv")]
     counts = pd.read_csv(table, dtype=str).groupby("participant").size()
     assert {name: int(counts.get(name, 0)) for name in expected} == {
@@ -140,7 +140,7 @@ def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path) ->
     assert lines[-1]["status"] == "completed"
     resumed = next(line["n"] for line in lines if line["event"] == "session_resumed")
     assert [line["n"] for line in lines if "previous" in line] == list(range(resumed, len(lines) + 1))
-    assert len(StudyFolder(study).fingerprints.read_text().splitlines()) == 1
+    assert len(StudyFolder(study).fingerprints.read_text("utf-8").splitlines()) == 1
     assert "data: 1 journal is of format 1" in warned(study)
     content = folder.journal.read_bytes()
     folder.journal.write_bytes(content.replace(b'"value":4', b'"value":5', 1))  # in a line of format 1
@@ -158,5 +158,5 @@ def test_rebuild_mends_a_table_and_notes_the_columns_that_have_come_since(study:
     trials = folder.table("rek2024", "trials")
     assert rebuild_session(folder.path).rewritten == (table, trials, folder.checksums, folder.rebuilt)
     assert table.read_bytes() == before
-    assert folder.rebuilt.read_text().endswith(f"rebuild: different checksums were listed for {trials.name}\n")
+    assert folder.rebuilt.read_text("utf-8").endswith(f"rebuild: different checksums were listed for {trials.name}\n")
     assert "rebuilt.txt" in warned(study)

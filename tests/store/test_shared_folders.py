@@ -78,7 +78,7 @@ def test_a_file_of_a_system_that_the_list_has_belongs_to_the_fingerprint(tmp_pat
     rehearse("demo", participants=1, seed=1, results=study)
     sums = session_of(study) / "checksums.sha256"
     (session_of(study) / "desktop.ini").write_bytes(b"[.ShellClassInfo]\n")
-    sums.write_text(f"{sums.read_text()}{'0' * 64}  desktop.ini\n", encoding="utf-8")
+    sums.write_text(f"{sums.read_text('utf-8')}{'0' * 64}  desktop.ini\n", encoding="utf-8", newline="\n")
     assert any(one.place.endswith("desktop.ini") and "has changed" in one.message for one in verify_study(study).errors)
 
 

@@ -68,11 +68,15 @@ def test_nothing_of_a_study_is_in_it(
     session = results / "rek2024" / "data" / f"sub-{ID}" / "ses-01"
     session.mkdir(parents=True)
     (results / "rek2024" / "blinding").mkdir()
-    (results / "rek2024" / "blinding" / "key.sealed").write_text(NONCE)
-    (session / "journal.jsonl").write_text(f'{{"participant": "{ID}", "value": "{ANSWER}"}}\n')
+    (results / "rek2024" / "blinding" / "key.sealed").write_text(NONCE, encoding="utf-8", newline="\n")
+    (session / "journal.jsonl").write_text(
+        f'{{"participant": "{ID}", "value": "{ANSWER}"}}\n', encoding="utf-8", newline="\n"
+    )
     (session / "crash.txt").write_text(
         "Fatal Python error: Segmentation fault\n\nCurrent thread 0x00007f (most recent call first):\n"
-        f'  File "/opt/tester-home/study_app/app/session/bridge.py", line 12 in start\n{ID} {DENSITY}\n'
+        f'  File "/opt/tester-home/study_app/app/session/bridge.py", line 12 in start\n{ID} {DENSITY}\n',
+        encoding="utf-8",
+        newline="\n",
     )
     axes = (1.0, 1.0, 1.0)
     measured = dict.fromkeys(("mass_kg", "damping_nspm", "friction_n", "delay_ms", "stable_nspm"), axes)

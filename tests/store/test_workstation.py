@@ -48,7 +48,7 @@ def test_a_write_that_fails_leaves_the_old_settings(folder, monkeypatch):
     with pytest.raises(StoreError, match="machine"):
         save_settings(DEFAULTS)
     monkeypatch.undo()
-    assert json.loads((folder / "machine.json").read_text())["screen"] == "DP-1"
+    assert json.loads((folder / "machine.json").read_text("utf-8"))["screen"] == "DP-1"
     assert [path.name for path in folder.iterdir()] == ["machine.json"]
 
 

@@ -64,7 +64,7 @@ def test_the_digest_of_a_program_is_of_names_and_contents_of_its_files(
     found = []
     for name, content in (("a.py", "1"), ("b.py", "1"), ("b.py", "2"), ("b.txt", "2"), ("c.txt", "3")):
         file = tmp_path / name
-        file.write_text(content)
+        file.write_text(content, encoding="utf-8", newline="\n")
         found.append(environment.__wrapped__()["liquid-study"])
         file.unlink()
     assert len(set(found)) == 4

@@ -36,11 +36,11 @@ def write_studies(folder: Path) -> None:
     folder.mkdir(parents=True)
     for name, source, languages in STUDIES:
         study = with_answers(template(source), Answers(languages=languages))
-        folder.joinpath(f"{name}.toml").write_text(study.text, encoding="utf-8")
+        folder.joinpath(f"{name}.toml").write_text(study.text, encoding="utf-8", newline="\n")
     text = source_bytes("demo").decode()
     for sound, broken in FAULTS:
         text = text.replace(sound, broken)
-    folder.joinpath("broken.toml").write_text(text, encoding="utf-8")
+    folder.joinpath("broken.toml").write_text(text, encoding="utf-8", newline="\n")
 
 
 def take_designer(camera: Camera, results: Path, theme: Theme) -> None:

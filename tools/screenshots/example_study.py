@@ -60,5 +60,5 @@ def quick(folder: Path, *, blinding: str = "double") -> Path:
     where = folder / blinding
     where.mkdir(parents=True, exist_ok=True)
     path = where / f"{STUDY}.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return path

@@ -169,7 +169,7 @@ def save_calibration(serial: str, calibration: Calibration) -> Path:
     fresh = file.with_suffix(".new")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        fresh.write_text(json.dumps(asdict(calibration), indent=2) + "\n", encoding="utf-8")
+        fresh.write_text(json.dumps(asdict(calibration), indent=2) + "\n", encoding="utf-8", newline="\n")
         fresh.replace(file)
     except OSError as error:
         raise DeviceError(

@@ -41,8 +41,8 @@ def test_what_earlier_versions_wrote_in_clear_is_not_handed_out_sealed(rek: Resu
     export(rek.folder, to, extras=("psych-ds", "wide"))
     held = {path: path.read_bytes() for path in to.rglob("*") if path.is_file()}
     assert not [path for path, content in held.items() if b"4.8151623" in content]
-    assert set(json.loads((to / "codebook.json").read_text())["sealed_columns"]) == SEALED
-    described = json.loads((to / "psych-ds" / "dataset_description.json").read_text())["variableMeasured"]
+    assert set(json.loads((to / "codebook.json").read_text("utf-8"))["sealed_columns"]) == SEALED
+    described = json.loads((to / "psych-ds" / "dataset_description.json").read_text("utf-8"))["variableMeasured"]
     assert not SEALED & {one["name"] for one in described}
     rek.open()
     export(rek.folder, to)
@@ -69,7 +69,7 @@ def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Resul
         expected = ("1", "1", "1") if row["code"] == honey else ("2", "0", "2")
         assert (row["n"], row["presented_excluded"], row["presented"]) == expected
         assert row["missing"] == "0"
-    codebook = json.loads((to / "codebook.json").read_text())
+    codebook = json.loads((to / "codebook.json").read_text("utf-8"))
     assert (codebook["study"]["participants"], codebook["study"]["sessions"]) == (2, 3)
     assert (codebook["study"]["sessions_excluded"], codebook["study"]["sessions_left_out"]) == (1, 0)
     assert codebook["exclusions"][1] == {
@@ -105,16 +105,16 @@ def test_a_delay_that_was_not_measured_is_not_claimed(rek: Results, to: Path) ->
 def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Results, to: Path) -> None:
     rek.add("P001", lambda *_: 6)
     export(rek.folder, to)
-    (to / "mine.txt").write_text("kept")
+    (to / "mine.txt").write_text("kept", encoding="utf-8", newline="\n")
     rek.add("P002", lambda *_: 6)
     export(rek.folder, to)
     assert len(rows(to, "responses")) == 124
-    assert (to / "mine.txt").read_text() == "kept"
+    assert (to / "mine.txt").read_text("utf-8") == "kept"
 
 
 def test_a_broken_folder_leaves_no_export(rek: Results, to: Path) -> None:
     rek.add("P001", lambda *_: 6)
-    rek.responses("P001").write_text("x")
+    rek.responses("P001").write_text("x", encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError):
         export(rek.folder, to)
     assert not to.exists()
@@ -122,10 +122,10 @@ def test_a_broken_folder_leaves_no_export(rek: Results, to: Path) -> None:
 
 def test_a_file_in_the_place_of_the_folder_is_refused(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda *_: 6)
-    (tmp_path / "taken").write_text("x")
+    (tmp_path / "taken").write_text("x", encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError, match=r"taken cannot be written \(it is a file, not a folder\): .*--to"):
         export(rek.folder, tmp_path / "taken")
-    assert (tmp_path / "taken").read_text() == "x"
+    assert (tmp_path / "taken").read_text("utf-8") == "x"
 
 
 def test_halves_of_a_killed_export_go_with_the_next_one(rek: Results, to: Path) -> None:
@@ -139,11 +139,11 @@ def test_halves_of_a_killed_export_go_with_the_next_one(rek: Results, to: Path) 
 
 
 def test_where_one_file_cannot_be_written_the_others_stay_as_they_were(tmp_path: Path) -> None:
-    (tmp_path / "a.csv").write_text("old")
+    (tmp_path / "a.csv").write_text("old", encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError, match="cannot be written"):
         write_files(tmp_path, {"a.csv": b"new", "x" * 300: b"too long a name"})
     assert [path.name for path in tmp_path.iterdir()] == ["a.csv"]
-    assert (tmp_path / "a.csv").read_text() == "old"
+    assert (tmp_path / "a.csv").read_text("utf-8") == "old"
     with pytest.raises(AnalysisError):
         write_files(tmp_path / "made", {"x" * 300: b""})
     assert not (tmp_path / "made").exists()

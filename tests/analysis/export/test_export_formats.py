@@ -72,7 +72,7 @@ short = { nl = "Vaak", en = "Often" }
     text = SMALL.replace("format = 1", "format = 2").replace('"try", "feel"]', '"try", "feel", "smooth"]')
     text = text.replace("[blocks.try]", f"{form}[blocks.try]", 1)
     text = text.replace("smooth", item).replace("heavyzembla", heavy).replace("lightquorn", light)
-    (tmp_path / "small.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "small.toml").write_text(text, encoding="utf-8", newline="\n")
     features = dict.fromkeys((("try", "learn"), ("feel", heavy), ("feel", light)), (NO_FEATURES,))
     folder = rehearse_answers(
         tmp_path / "small.toml", participants=2, seed=1, results=tmp_path / "r", features=features
@@ -165,7 +165,7 @@ def test_a_study_without_anybody_who_counts_is_exported_too(small: Results, to: 
 def test_a_folder_that_cannot_be_written_leaves_nothing_of_any_format(small: Results, to: Path) -> None:
     half_answered(small)
     to.mkdir()
-    (to / FOLDER).write_text("in the way")
+    (to / FOLDER).write_text("in the way", encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError, match="cannot be written"):
         export(small.folder, to, extras=["psych-ds"])
     assert [path.name for path in to.iterdir()] == [FOLDER]

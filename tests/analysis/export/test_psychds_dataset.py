@@ -43,7 +43,7 @@ def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     text = text.replace("[study]\n", f"[study]\n{CREDITS}", 1).replace('"demo"', '"kitchen"', 1)
     head = '[conditions.thick]\nliquid = "thick"'
     text = text.replace(head, '[conditions.thick]\nliquid = "thin"\nview = "waves.mp4"', 1)
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text, encoding="utf-8", newline="\n")
     file.with_name("waves.mp4").write_bytes(FOOTAGE)
     folder = rehearsed(tmp_path / "results", "kitchen", people=4)
     reveal(folder, by="AK", reason="to share it")
@@ -59,12 +59,14 @@ def without_report(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.nightly
 def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path, tmp_path: Path) -> None:
     stand_in, to = tmp_path / "validator", tmp_path / "out"
-    stand_in.write_text('#!/bin/sh\ntest -f "$1/dataset_description.json" && exit $(cat "$0.code")\n')
+    stand_in.write_text(
+        '#!/bin/sh\ntest -f "$1/dataset_description.json" && exit $(cat "$0.code")\n', encoding="utf-8", newline="\n"
+    )
     stand_in.chmod(0o755)
     asked = ["export", str(kitchen), "--to", str(to), "--validator", str(stand_in)]
     assert CliRunner().invoke(commands, asked).exit_code == 2
     for code, expected in (("0", 0), ("1", 3)):
-        Path(f"{stand_in}.code").write_text(code)
+        Path(f"{stand_in}.code").write_text(code, encoding="utf-8", newline="\n")
         assert CliRunner().invoke(commands, [*asked, "--psych-ds"]).exit_code == expected
     folder = to / FOLDER
     assert undescribed(folder) == set()

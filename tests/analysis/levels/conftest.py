@@ -18,7 +18,9 @@ def opened_adaptive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of up–down tracks at two standards and of QUEST+ at one, its key open."""
 
     def make(folder: Path) -> None:
-        (folder / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
+        (folder / "adaptive.toml").write_text(
+            text_of_damper("adaptive", ADAPTIVE, (4, 8)), encoding="utf-8", newline="\n"
+        )
         study = rehearse_answers(
             folder / "adaptive.toml", participants=3, seed=1, results=folder / "study", features={}
         )
@@ -38,7 +40,7 @@ def opened_catch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the study of adaptive tracks with catch trials, answered without servo, its key open."""
     folder = tmp_path_factory.mktemp("catch")
     more = ADAPTIVE.replace('method = "', 'catch = { share = 0.2, wrong_most = 1 }\nmethod = "').replace("24", "48")
-    (folder / "catch.toml").write_text(text_of_damper("catch", more, (4, 8)))
+    (folder / "catch.toml").write_text(text_of_damper("catch", more, (4, 8)), encoding="utf-8", newline="\n")
     study = rehearse_answers(folder / "catch.toml", participants=2, seed=1, results=folder / "study", features={})
     assert unblind(study, "AB", "to analyse").left == ()
     return study

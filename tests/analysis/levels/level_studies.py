@@ -29,14 +29,14 @@ ONE = (Setting(code="V1", condition="8/1"),)
 def levels_file(folder: Path) -> Path:
     """Write the study with a block of every reply, and return the file."""
     path = folder / "levels.toml"
-    path.write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE))
+    path.write_text(text_of(SEQUENCE, *SHORT, more=FIVE_POINTS + MORE), encoding="utf-8", newline="\n")
     return path
 
 
 def matching_file(folder: Path) -> Path:
     """Write the study whose participants adjust a damper, and return the file."""
     path = folder / "matching.toml"
-    path.write_text(matching.text_of())
+    path.write_text(matching.text_of(), encoding="utf-8", newline="\n")
     return path
 
 

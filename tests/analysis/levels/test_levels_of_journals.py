@@ -118,7 +118,7 @@ def test_a_sealed_study_exports_its_intervals_without_what_tells_a_level(sealed_
     assert len(intervals) == 3 * (12 * 2 + 9 + 6 + 7 + 6 * 2 + 6 * 3 + 8 * 2)
     assert sealed.isdisjoint(intervals[0])
     assert not [path for path in tmp_path.iterdir() if re.search("tracks|thresholds|exponents|settings", path.name)]
-    codebook = json.loads((tmp_path / "codebook.json").read_text())
+    codebook = json.loads((tmp_path / "codebook.json").read_text("utf-8"))
     assert set(codebook["sealed_columns"]) >= sealed
     assert [one["block"] for one in codebook["levels"]] == BLOCKS
     assert "vary" not in codebook["levels"][0]
@@ -128,8 +128,8 @@ def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_leve
     sealed_levels: Path, tmp_path: Path
 ) -> None:
     report(sealed_levels, tmp_path)
-    page = (tmp_path / "report.html").read_text()
-    held = json.loads((tmp_path / "report.json").read_text())["results"]["levels"]
+    page = (tmp_path / "report.html").read_text("utf-8")
+    held = json.loads((tmp_path / "report.json").read_text("utf-8"))["results"]["levels"]
     assert page.count("appear here after unblinding") == len(BLOCKS)
     assert {(len(one["answers"]), one["vary"], one["level_kind"]) for one in held} == {(0, None, None)}
     assert sum(times["numbers"]["n"] for one in held for times in one["times"]) == 3 * 54

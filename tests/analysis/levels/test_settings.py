@@ -81,7 +81,7 @@ def test_before_unblinding_there_are_steps_and_no_level(sealed: Path, tmp_path: 
     report(sealed, tmp_path, failed=pytest.fail)
     assert not list(tmp_path.glob("settings-*"))
     assert not list(tmp_path.glob("*settings_data*"))
-    text = (tmp_path / "report.html").read_text(encoding="utf-8") + (tmp_path / "report.json").read_text()
+    text = (tmp_path / "report.html").read_text(encoding="utf-8") + (tmp_path / "report.json").read_text("utf-8")
     key = read_key(sealed)
     levels: list[Any] = []
     for session in StudyFolder(sealed).sessions():

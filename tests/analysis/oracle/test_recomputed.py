@@ -121,7 +121,7 @@ def test_a_number_that_is_off_by_a_thousandth_is_found(
         part = part[key]
     part[path[-1]] += 1e-3 * max(1.0, abs(part[path[-1]]))
     report.unlink()
-    report.write_text(json.dumps(changed), encoding="utf-8")
+    report.write_text(json.dumps(changed), encoding="utf-8", newline="\n")
     differences = replace(of_study, report=tmp_path).compared().differences
     assert [place for place, _, _ in differences] == ["results." + ".".join(map(str, path))]
 

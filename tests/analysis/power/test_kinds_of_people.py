@@ -157,7 +157,7 @@ def test_the_command_adds_the_planned_number_of_participants_and_quotes_it(
     features = {("feel", "heavyzembla"): (huge,), ("feel", "lightquorn"): (NO_FEATURES,)}
     monkeypatch.setattr("study_app.session.simulated.rehearsal.condition_features", lambda *_, **_named: features)
     file = tmp_path / "small.toml"
-    file.write_text(f"{TEXT}\n[analysis]\nparticipants = 7\n", encoding="utf-8")
+    file.write_text(f"{TEXT}\n[analysis]\nparticipants = 7\n", encoding="utf-8", newline="\n")
     asked = ["power", str(file), "--studies", "20", "--workers", "1", "--to", str(tmp_path)]
     result = CliRunner().invoke(commands, asked)
     assert result.exit_code == 0, result.output

@@ -28,7 +28,7 @@ def receipts(results: Results, **changes: object) -> None:
     """Change the receipts of all sessions."""
     for session in StudyFolder(results.folder).sessions():
         content = json.loads(session.receipt.read_text(encoding="utf-8"))
-        session.receipt.write_text(json.dumps(content | changes), encoding="utf-8")
+        session.receipt.write_text(json.dumps(content | changes), encoding="utf-8", newline="\n")
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def committed(results: Results, participants: int | None = 3, **changes: object)
         study="small", version="2", protocol_hash=HASH, participants=participants, precision=None, rules=(CATCH,)
     )
     path = results.folder / FILE
-    path.write_text(f"# Preregistration\n\n{written(one)}", encoding="utf-8")
+    path.write_text(f"# Preregistration\n\n{written(one)}", encoding="utf-8", newline="\n")
     return path
 
 
@@ -76,7 +76,7 @@ def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
     committed(answered)
     (first, *_) = StudyFolder(answered.folder).sessions()
     content = json.loads(first.receipt.read_text(encoding="utf-8"))
-    first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8")
+    first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8", newline="\n")
     (line,) = evaluate_block(answered)
     assert line.startswith("1 session ran under another protocol (version 2) than the preregistered one")
     assert line.endswith("P001/1")
@@ -120,7 +120,7 @@ def test_where_only_the_protocol_plans_participants_they_are_compared(answered: 
 
 @pytest.mark.parametrize("content", ["# nothing\n", "```json\n{}\n```\n", "```json\n{broken}\n```\n"])
 def test_a_damaged_preregistration_is_one_line(answered: Results, content: str) -> None:
-    (answered.folder / FILE).write_text(content, encoding="utf-8")
+    (answered.folder / FILE).write_text(content, encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError, match="does not end with what `liquid-study preregister` writes"):
         deviations(load_study(answered.folder))
 

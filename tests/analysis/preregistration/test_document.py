@@ -40,7 +40,7 @@ def test_every_shipped_study_has_all_sections_and_its_hash(name: str, tmp_path: 
     questions = text[places[0] : places[1]].strip().splitlines()[2:]
     assert len(questions) >= 1
     assert all(line.startswith("- ") for line in questions)
-    (tmp_path / FILE).write_text(text, encoding="utf-8")
+    (tmp_path / FILE).write_text(text, encoding="utf-8", newline="\n")
     committed = read_commitment(tmp_path)
     assert committed == commitment(load(name), digest)
     assert committed is not None
@@ -84,7 +84,9 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
 
 
 def test_the_tables_of_power_are_included(tmp_path: Path) -> None:
-    (tmp_path / "power.md").write_text("# Power of Feeling (rek2024 1.0)\n\n## Delays\n\n| n |\n", encoding="utf-8")
+    (tmp_path / "power.md").write_text(
+        "# Power of Feeling (rek2024 1.0)\n\n## Delays\n\n| n |\n", encoding="utf-8", newline="\n"
+    )
     text = written("rek2024", "--power", str(tmp_path))
     assert "\n### Power of Feeling (rek2024 1.0)\n\n#### Delays\n\n| n |\n\n## Exclusions\n" in text
     assert "Power was not computed" not in text
@@ -95,7 +97,7 @@ def test_the_tables_of_power_are_included(tmp_path: Path) -> None:
 )
 def test_a_folder_without_this_studys_power_is_a_usage_error(content: str | None, line: str, tmp_path: Path) -> None:
     if content is not None:
-        (tmp_path / "power.md").write_text(content)
+        (tmp_path / "power.md").write_text(content, encoding="utf-8", newline="\n")
     result = CliRunner().invoke(commands, ["preregister", "rek2024", "--power", str(tmp_path)])
     assert result.exit_code == 2
     assert line in " ".join(result.output.split())

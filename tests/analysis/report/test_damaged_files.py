@@ -48,7 +48,7 @@ def another_answer(session: SessionFolder) -> Path:
     cells = first.split(",")
     place = head.split(",").index("response")
     cells[place] = "1" if cells[place] != "1" else "2"
-    path.write_text("\n".join((head, ",".join(cells), *rest)), encoding="utf-8")
+    path.write_text("\n".join((head, ",".join(cells), *rest)), encoding="utf-8", newline="\n")
     return path
 
 
@@ -99,7 +99,9 @@ def test_a_table_that_lacks_a_later_column_is_named_where_it_had_it(copy: StudyF
     path = copy.sessions()[0].table("rek2024", "trials")
     rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     place = rows[0].index("loop_delay_ticks")
-    path.write_text("".join(f"{','.join(row[:place] + row[place + 1 :])}\n" for row in rows), encoding="utf-8")
+    path.write_text(
+        "".join(f"{','.join(row[:place] + row[place + 1 :])}\n" for row in rows), encoding="utf-8", newline="\n"
+    )
     (line,) = told(copy)
     assert line.startswith(f"{path} has changed since the session ended")
 
@@ -132,7 +134,9 @@ def test_one_file_that_was_changed_brings_all_of_its_session_under_suspicion(cop
     name = table.name
     listed = session.checksums.read_text(encoding="utf-8")
     forged = hashlib.sha256(table.read_bytes()).hexdigest()
-    session.checksums.write_text(re.sub(rf"[0-9a-f]{{64}}  {name}", f"{forged}  {name}", listed), encoding="utf-8")
+    session.checksums.write_text(
+        re.sub(rf"[0-9a-f]{{64}}  {name}", f"{forged}  {name}", listed), encoding="utf-8", newline="\n"
+    )
     trials = session.table("rek2024", "trials")
     change(trials, b",complete,", b",timeout,")
     assert {line.split()[0] for line in told(copy)} == {str(trials), str(table)}

@@ -106,7 +106,7 @@ def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a sealed study of six participants in two groups."""
     path = tmp_path_factory.mktemp("grouped")
-    (path / "grouped.toml").write_text(STUDY + GROUPS)
+    (path / "grouped.toml").write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
     felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
     return rehearse_answers(path / "grouped.toml", participants=6, seed=2, results=path / "r", features=felt)
 
@@ -116,9 +116,9 @@ def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path
     assert group_counts(sealed) == {}
     assert list(group_means(sealed)) == []
     report(folder, tmp_path / "sealed")
-    assert "<td>first_thin" not in (tmp_path / "sealed" / "report.html").read_text()
+    assert "<td>first_thin" not in (tmp_path / "sealed" / "report.html").read_text("utf-8")
     words = "randomised in permuted blocks to the groups first_thin and first_thick, with an allocation ratio of 1:1."
-    assert words in (tmp_path / "sealed" / "methods.txt").read_text()
+    assert words in (tmp_path / "sealed" / "methods.txt").read_text("utf-8")
     unblind(folder, "AB", "a test")
     study = load_study(folder)
     assert group_counts(study) == {"first_thick": 3, "first_thin": 3}
@@ -130,25 +130,26 @@ def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path
         assert one.sd == pytest.approx(each.std())
     assert len(list(group_means(study))) == 2 * 2 * 2
     report(folder, tmp_path / "opened")
-    text = (tmp_path / "opened" / "report.html").read_text()
+    text = (tmp_path / "opened" / "report.html").read_text("utf-8")
     assert ">Groups</h2>" in text
     assert "first_thin" in text
 
 
 def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp_path: Path) -> None:
     head = 'study.name = "grouped"\nstudy.group_assignment = "pre-existing"\n'
-    (tmp_path / "grouped.toml").write_text((STUDY + GROUPS).replace('study.name = "grouped"\n', head))
+    (tmp_path / "grouped.toml").write_text(
+        (STUDY + GROUPS).replace('study.name = "grouped"\n', head), encoding="utf-8", newline="\n"
+    )
     felt = {(block, condition): (NO_FEATURES,) for block in ("thin", "thick") for condition in ("water", "honey")}
     study = rehearse_answers(tmp_path / "grouped.toml", participants=5, seed=2, results=tmp_path / "r", features=felt)
     assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}, "dealt in turn"
     report(study, tmp_path / "sealed")
-    methods = (tmp_path / "sealed" / "methods.txt").read_text()
+    methods = (tmp_path / "sealed" / "methods.txt").read_text("utf-8")
     assert "belonged to the groups first_thin (n = 3) and first_thick (n = 2) by an existing attribute" in methods
     assert "groups were not randomised" in methods
-    assert (
-        "Groups were not randomised, so a difference may have other causes"
-        in (tmp_path / "sealed" / "report.html").read_text()
-    )
+    assert "Groups were not randomised, so a difference may have other causes" in (
+        tmp_path / "sealed" / "report.html"
+    ).read_text("utf-8")
     unblind(study, "AB", "a test")
     assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}
     trials = load_study(study).trials

@@ -114,7 +114,7 @@ def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_writt
 
 def test_an_unreadable_place_leaves_nothing(small: Results, tmp_path: Path) -> None:
     answered_by_two(small)
-    (tmp_path / "file").write_text("x")
+    (tmp_path / "file").write_text("x", encoding="utf-8", newline="\n")
     with pytest.raises(AnalysisError, match="cannot be written"):
         report(small.folder, tmp_path / "file" / "report")
     assert load_study(small.folder).n == 2
@@ -149,7 +149,7 @@ def test_r_finds_a_number_that_was_changed(of_twelve: Path, tmp_path: Path) -> N
     tests = (tmp_path / "tests.csv").read_text(encoding="utf-8")
     changed = tests.replace(f",L,{one['statistic']!r},", f",L,{one['statistic'] + 1!r},", 1)
     assert changed != tests
-    (tmp_path / "tests.csv").write_text(changed, encoding="utf-8")
+    (tmp_path / "tests.csv").write_text(changed, encoding="utf-8", newline="\n")
     done = run_in_r(tmp_path)
     assert done.returncode == 1
     assert done.stdout.count("DIFFERS") == 1

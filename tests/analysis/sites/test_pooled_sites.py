@@ -80,7 +80,7 @@ def test_a_study_is_sealed_until_the_last_key_is_open(sealed: Path, tmp_path: Pa
     assert half.trials["force_mean_n"].isna().all()
     export(tmp_path / "pooled", tmp_path / "out")
     (table,) = (tmp_path / "out").glob("*trials*.csv")
-    assert "force_mean_n" not in table.read_text().splitlines()[0]
+    assert "force_mean_n" not in table.read_text("utf-8").splitlines()[0]
 
 
 def test_a_site_whose_folder_is_missing_is_not_left_out(sealed: Path, tmp_path: Path) -> None:
@@ -104,7 +104,7 @@ def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tm
 
     def said(**others: Commitment) -> tuple[str, ...]:
         for site, own in others.items():
-            (tmp_path / "pooled/sites" / site / FILE).write_text(written(own), encoding="utf-8")
+            (tmp_path / "pooled/sites" / site / FILE).write_text(written(own), encoding="utf-8", newline="\n")
         compared = deviations(found)
         assert compared is not None
         return compared.found
@@ -149,7 +149,9 @@ def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(open
 
 @pytest.mark.nightly
 def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) -> None:
-    (tmp_path / "adaptive.toml").write_text(text_of_damper("adaptive", ADAPTIVE, (4, 8)))
+    (tmp_path / "adaptive.toml").write_text(
+        text_of_damper("adaptive", ADAPTIVE, (4, 8)), encoding="utf-8", newline="\n"
+    )
     folders = {
         site: rehearse_answers(
             tmp_path / "adaptive.toml", participants=2, seed=seed, results=tmp_path / site / "adaptive", features={}

@@ -42,7 +42,7 @@ def change(study: StudyFolder, session: int, **facts: Any) -> None:
     path = study.sessions()[session].receipt
     receipt = json.loads(path.read_text(encoding="utf-8"))
     receipt["device"] |= facts
-    path.write_text(json.dumps(receipt), encoding="utf-8")
+    path.write_text(json.dumps(receipt), encoding="utf-8", newline="\n")
 
 
 @pytest.mark.slow

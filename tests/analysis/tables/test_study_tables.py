@@ -51,7 +51,7 @@ def test_receipts_of_earlier_versions_do_not_say_what_a_block_compares(rek: Resu
     told = json.loads(path.read_bytes())
     for block in told["protocol"]["blocks"].values():
         del block["compares"]
-    path.write_text(json.dumps(told))
+    path.write_text(json.dumps(told), encoding="utf-8", newline="\n")
     assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
     rek.open()
     assert [block.kind for block in load_study(rek.folder).blocks] == ["liquids", "delays"]
@@ -61,8 +61,12 @@ def test_a_repeat_that_was_never_answered_leaves_the_answer_missing(rek: Results
     """The operator discarded the first attempt; its answers must not come back because the second has none."""
     rek.add("P001", lambda *_: 6, repeated={"L2": lambda *_: 1})
     path = rek.responses("P001")
-    lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(line for line in lines if not (",2,liquids," in line and ",L2," in line)))
+    lines = path.read_text("utf-8").splitlines(keepends=True)
+    path.write_text(
+        "".join(line for line in lines if not (",2,liquids," in line and ",L2," in line)),
+        encoding="utf-8",
+        newline="\n",
+    )
     row = cell(load_study(rek.folder), "L2", "immersive")
     assert (row["n"], row["missing"]) == (0, 1)
 
@@ -124,13 +128,13 @@ def test_excluding_what_is_not_there_is_refused(rek: Results, excluded: dict, sa
 
 def test_a_list_of_exclusions_that_makes_no_sense_is_refused(rek: Results) -> None:
     rek.add("P001", lambda *_: 6)
-    (rek.folder / "exclusions.csv").write_text("who,why\n")
+    (rek.folder / "exclusions.csv").write_text("who,why\n", encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match=r"exclusions\.csv"):
         load_study(rek.folder)
 
 
 def test_an_empty_or_foreign_folder_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "holiday.txt").write_text("x")
+    (tmp_path / "holiday.txt").write_text("x", encoding="utf-8", newline="\n")
     assert "does not contain sessions" in refusal(tmp_path)
 
 
@@ -173,7 +177,7 @@ def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: 
     path = real.responses("P001")
     text = path.read_text(encoding="utf-8")
     assert old in text
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    path.write_text(text.replace(old, new, 1), encoding="utf-8", newline="\n")
     message = refusal(real.folder)
     assert says in message
     assert str(path) in message
@@ -223,16 +227,20 @@ def test_a_broken_receipt_is_refused(rek: Results, content: bytes) -> None:
 def test_sessions_under_another_key_are_not_pooled(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda *_: 4)
     session = rek.add("P002", lambda *_: 4)
-    session.receipt.write_text(session.receipt.read_text().replace(rek.key.hash, "0" * 64))
+    session.receipt.write_text(
+        session.receipt.read_text("utf-8").replace(rek.key.hash, "0" * 64), encoding="utf-8", newline="\n"
+    )
     assert "different sealed keys" in refusal(rek.folder)
 
 
 def test_sessions_that_were_asked_other_statements_are_not_pooled(rek: Results) -> None:
     rek.add("P001", lambda *_: 4)
     session = rek.add("P002", lambda *_: 4)
-    session.receipt.write_text(session.receipt.read_text().replace('"like_tar"', '"like_glue"'))
+    session.receipt.write_text(
+        session.receipt.read_text("utf-8").replace('"like_tar"', '"like_glue"'), encoding="utf-8", newline="\n"
+    )
     path = rek.responses("P002")
-    path.write_text(path.read_text().replace("like_tar", "like_glue"))
+    path.write_text(path.read_text("utf-8").replace("like_tar", "like_glue"), encoding="utf-8", newline="\n")
     assert "other statements" in refusal(rek.folder)
 
 

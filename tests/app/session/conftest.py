@@ -73,7 +73,7 @@ def short_demo(tmp_path: Path) -> str:
         text, found = re.subn(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
         assert found == 1
     path = tmp_path / "demo.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8", newline="\n")
     return str(path)
 
 

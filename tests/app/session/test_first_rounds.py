@@ -67,7 +67,7 @@ def test_it_pauses_a_session_that_can_be_resumed(
     assert bridge.participant.isVisible()
     session.end_by_signal(15)
     (journal,) = (tmp_path / "results").rglob("journal.jsonl")
-    recorded = [json.loads(line)["event"] for line in journal.read_text().splitlines()]
+    recorded = [json.loads(line)["event"] for line in journal.read_text("utf-8").splitlines()]
     assert recorded[: 3 + len(events)] == ["session_started", "preflight", "page_shown", *events]
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 

@@ -138,7 +138,7 @@ def test_no_window_stays_where_opening_or_starting_fails(
     assert (windows(), sys.excepthook) == ([], hook)
     assert "servo" not in {thread.name for thread in threading.enumerate()}
     (unfinished,) = (tmp_path / "results").rglob("journal.jsonl")
-    assert '"session_ended"' not in unfinished.read_text()
+    assert '"session_ended"' not in unfinished.read_text("utf-8")
 
 
 def test_changed_conditions_are_refused_before_a_device_opens(qtbot, tmp_path, monkeypatch):

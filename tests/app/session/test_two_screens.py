@@ -65,7 +65,7 @@ print(json.dumps(found))
 
 def test_both_windows_stand_on_the_screens_that_are_set_until_one_is_removed(tmp_path: Path) -> None:
     screens = tmp_path / "screens.json"
-    screens.write_text(json.dumps({"screens": SCREENS}), encoding="utf-8")
+    screens.write_text(json.dumps({"screens": SCREENS}), encoding="utf-8", newline="\n")
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path / "results")],
         env=os.environ | {"QT_QPA_PLATFORM": f"offscreen:configfile={screens}", "XDG_CONFIG_HOME": str(tmp_path)},

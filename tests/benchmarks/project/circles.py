@@ -123,7 +123,7 @@ def main() -> None:
     nightly, every = set(times_s) - slow, times["quick"] | times["slow"]
     lines = [f"slow {name}" for name in short(slow & set(times["quick"]), quick)]
     lines += [f"nightly {name}" for name in short(nightly, quick | slow)]
-    LIST.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    LIST.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
     for circle, tests in (("quick", quick), ("slow", slow), ("nightly", nightly)):
         print(f"{circle:8}{len(tests):6} tests {sum(every[test] for test in tests):6.0f} s")
 

@@ -106,7 +106,7 @@ def finish(session: SessionFolder, fault: str) -> int:
 
 
 def memory_mib() -> float:
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+    return int(Path("/proc/self/statm").read_text("utf-8").split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 def state() -> str:

@@ -48,7 +48,7 @@ class Cost(NamedTuple):
 def rehearse(folder: Path, people: int, seed: int = 1) -> None:
     """Answer the study as so many participants do."""
     study = folder.parent / "grouped.toml"
-    study.write_text(STUDY + GROUPS)
+    study.write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
     protocol = grouped()
     felt = {(block.id, name): (NO_FEATURES,) for block in protocol.blocks.values() for name in block.conditions}
     rehearse_answers(str(study), participants=people, seed=seed, results=folder, features=felt)

@@ -60,9 +60,11 @@ def main(edits: int = 60) -> None:
         os.environ["LIQUID_STUDY_WORKSPACE"] = folder
         protocols = Path(folder) / "protocols"
         protocols.mkdir()
-        text = shipped_file("rek2024").read_text().replace('name = "rek2024"', 'name = "edited"')
-        (protocols / "edited.toml").write_text(text)
-        (protocols / "largest.toml").write_text(grown(text.replace('"edited"', '"largest"')))
+        text = shipped_file("rek2024").read_text("utf-8").replace('name = "rek2024"', 'name = "edited"')
+        (protocols / "edited.toml").write_text(text, encoding="utf-8", newline="\n")
+        (protocols / "largest.toml").write_text(
+            grown(text.replace('"edited"', '"largest"')), encoding="utf-8", newline="\n"
+        )
         controllers: list[DesignerController] = []
 
         def enter() -> None:
@@ -77,7 +79,7 @@ def main(edits: int = 60) -> None:
         windows: list[MainWindow] = []
         rows.append(("place entered first", "400", [timed(enter)]))
         controller, window = controllers[0], windows[0]
-        lines = len((protocols / "largest.toml").read_text().splitlines())
+        lines = len((protocols / "largest.toml").read_text("utf-8").splitlines())
         rows.append((f"opening a study of {lines} lines", "500", [timed(lambda: controller.open("largest"))]))
         QTest.qWait(1000)
         controller.open("edited")

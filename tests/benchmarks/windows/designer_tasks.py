@@ -213,7 +213,7 @@ def act_continued(kind: str, folder: Path) -> None:
         user.press("Continue Killed, killed")
         wait_until(lambda: user.sees("Save"), "the study")
         save(user, folder / "protocols" / "killed.toml")
-        assert "before the kill" in (folder / "protocols" / "killed.toml").read_text()
+        assert "before the kill" in (folder / "protocols" / "killed.toml").read_text("utf-8")
         print(f"{user.actions} in {time.monotonic() - since:.0f} s\t{AFTER_A_KILL}", flush=True)
 
     use(kind, act)
@@ -236,7 +236,7 @@ def main(numbers: Sequence[int]) -> None:
             for right, wrong in FAULTS:
                 assert right in text, right
                 text = text.replace(right, wrong, 1)
-            (folder / "protocols" / "faulty.toml").write_text(text, encoding="utf-8")
+            (folder / "protocols" / "faulty.toml").write_text(text, encoding="utf-8", newline="\n")
             here = environment(folder) | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb", "PYTHONFAULTHANDLER": "1"}
             for act, *more in acts:
                 command = [sys.executable, __file__, act, kind, name, *more]

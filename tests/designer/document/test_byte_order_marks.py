@@ -18,8 +18,10 @@ def studies(folder: Path, mark: str) -> Path:
     """Return a study of two liquids, one of them from a file, in a folder of its own; all files begin with ``mark``."""
     folder.mkdir()
     text = shipped_file("thickness").read_text("utf-8")
-    (folder / "oil.toml").write_text(mark + LIQUID, encoding="utf-8")
-    (folder / "own.toml").write_text(f'{mark}{text}\n[liquids.extra]\nfile = "oil.toml"\n', encoding="utf-8")
+    (folder / "oil.toml").write_text(mark + LIQUID, encoding="utf-8", newline="\n")
+    (folder / "own.toml").write_text(
+        f'{mark}{text}\n[liquids.extra]\nfile = "oil.toml"\n', encoding="utf-8", newline="\n"
+    )
     return folder / "own.toml"
 
 
@@ -42,7 +44,7 @@ def test_the_designer_reads_and_edits_a_file_with_a_mark(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be"])
 def test_utf_16_is_named_in_one_line(encoding: str, tmp_path: Path) -> None:
-    (tmp_path / "wide.toml").write_text(shipped_file("demo").read_text("utf-8"), encoding=encoding)
+    (tmp_path / "wide.toml").write_text(shipped_file("demo").read_text("utf-8"), encoding=encoding, newline="\n")
     with pytest.raises(ProtocolError) as refused:
         load(tmp_path / "wide.toml")
     assert [str(problem) for problem in refused.value.problems] == ["file: is UTF-16 text (save it as UTF-8)"]

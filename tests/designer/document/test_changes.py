@@ -105,7 +105,7 @@ def test_the_only_condition_leaves_its_liquid_to_what_leaves_its_name_out() -> N
 
 
 def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
-    text = re.sub(r"\[conditions\.\w+\]\n(?:\w+ = .*\n)+", "", (FOLDER / "compare-liquids.toml").read_text())
+    text = re.sub(r"\[conditions\.\w+\]\n(?:\w+ = .*\n)+", "", (FOLDER / "compare-liquids.toml").read_text("utf-8"))
     study = read_study(text.replace('conditions = ["practice"]', 'conditions = ["syrup"]').encode(), FOLDER)
     assert not study.problems
     place = ("blocks", "liquids", "conditions", 1)

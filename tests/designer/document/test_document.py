@@ -62,7 +62,7 @@ def test_a_step_that_changes_nothing_is_none() -> None:
 
 
 def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> None:
-    (tmp_path / "thick.toml").write_text("[liquids.any]\ndensity_kg_m3 = 1400\n")
+    (tmp_path / "thick.toml").write_text("[liquids.any]\ndensity_kg_m3 = 1400\n", encoding="utf-8", newline="\n")
     own = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]'
     text = DEMO.text.replace(own, '[liquids.thick]\nfile = "thick.toml"')
     study = read_study(text.encode(), tmp_path)
@@ -81,7 +81,7 @@ def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:
     assert drafted_files() == ()
     for name in ("b.toml", "a.toml"):
         write_draft(tmp_path / name, Draft(text="a = 1\n", base=""))
-    (data_folder() / "drafts" / "broken.json").write_text("{")
+    (data_folder() / "drafts" / "broken.json").write_text("{", encoding="utf-8", newline="\n")
     assert drafted_files() == (tmp_path.resolve() / "a.toml", tmp_path.resolve() / "b.toml")
     delete_draft(tmp_path / "a.toml")
     assert drafted_files() == (tmp_path.resolve() / "b.toml",)
@@ -126,7 +126,7 @@ def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: p
     keeper = Keeper(tmp_path / "a.toml", "")
     keeper.note_edit("x", (), 0.0)
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "file"))
-    (tmp_path / "file").write_text("in the way")
+    (tmp_path / "file").write_text("in the way", encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="a file is in the place of a folder"):
         keeper.write()
     (tmp_path / "file").unlink()
@@ -153,7 +153,7 @@ def session(folder: Path, participant: str, source: bytes, **facts: Any) -> None
         "key_hash": "0" * 64, "protocol_hash": protocol_hash(source), "protocol": protocol, "simulated": False,
         "pilot": False, "started_at": "2026-11-21T12:00:00+00:00", **facts,
     }  # fmt: skip
-    path.write_text(json.dumps(held))
+    path.write_text(json.dumps(held), encoding="utf-8", newline="\n")
 
 
 def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -> None:
@@ -177,7 +177,7 @@ def test_runs_counts_sessions_pilots_and_rehearsals_by_content(tmp_path: Path) -
 
 def test_a_content_that_was_run_is_kept_before_the_file_changes(tmp_path: Path) -> None:
     file = tmp_path / "demo.toml"
-    file.write_text(TEXT, encoding="utf-8")
+    file.write_text(TEXT, encoding="utf-8", newline="\n")
     keep_run_content(file, [Run(hash="another", version="1.0", sessions=1)])
     assert kept_content(content_hash(TEXT.encode())) is None
     keep_run_content(file, [Run(hash=content_hash(TEXT.encode()), version="1.0", sessions=1)])
@@ -225,7 +225,7 @@ def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(t
     base = content_hash(b"a = 1\r\n")
     halves = [file.with_name(f".{name}.tmp") for name in ("study.toml.0123abcd", "study.toml.v2.0123abcd")]
     for half in (*halves, fresh := file.with_name(".study.toml.4567cdef.tmp")):
-        half.write_text("a =")
+        half.write_text("a =", encoding="utf-8", newline="\n")
         os.utime(half, None if half == fresh else (0, 0))  # another program may be writing the fresh one
     after = save_study(link, "a = 2\r\n", base)
     assert [half.exists() for half in (*halves, fresh)] == [False, True, True]
@@ -245,10 +245,10 @@ def test_save_refuses_a_file_that_another_program_changed(tmp_path: Path) -> Non
     base = save_study(file, "a = 1\n", "")
     with pytest.raises(ChangedOutsideError, match="changed by another program"):
         save_study(file, "a = 2\n", "")
-    file.write_text("b = 1\n")
+    file.write_text("b = 1\n", encoding="utf-8", newline="\n")
     with pytest.raises(ChangedOutsideError, match="changed by another program"):
         save_study(file, "a = 2\n", base)
-    assert file.read_text() == "b = 1\n"
+    assert file.read_text("utf-8") == "b = 1\n"
     file.unlink()
     with pytest.raises(ChangedOutsideError, match="deleted or moved"):
         save_study(file, "a = 2\n", base)
@@ -284,9 +284,9 @@ while saved < 20:
 @pytest.mark.slow
 def test_two_programs_that_save_one_file_lose_nothing(tmp_path: Path) -> None:
     file = tmp_path / "study.toml"
-    file.write_text("")
+    file.write_text("", encoding="utf-8", newline="\n")
     programs = [subprocess.Popen([sys.executable, "-c", SAVING, str(file), name]) for name in "ab"]
     assert [program.wait(120) for program in programs] == [0, 0]
     expected = {f"{name}{number} = 1" for name in "ab" for number in range(20)}
-    assert set(file.read_text().splitlines()) == expected
+    assert set(file.read_text("utf-8").splitlines()) == expected
     assert len(list(Path(os.environ["LIQUID_STUDY_DATA"], "contents").glob("*.toml"))) == 41

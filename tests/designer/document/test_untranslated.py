@@ -123,7 +123,7 @@ def test_a_copy_of_an_own_study_is_recognised_and_warned_of(tmp_path: Path) -> N
     own = copy_of(translated(template("empty"), "en"), "own")
     own, _ = own.with_edits(Set(("pages", "thanks", "body"), "Many thanks for your patience."))
     workspace().protocols.mkdir(parents=True, exist_ok=True)
-    (workspace().protocols / "own.toml").write_text(own.text, encoding="utf-8")
+    (workspace().protocols / "own.toml").write_text(own.text, encoding="utf-8", newline="\n")
     french = copy_of(with_answers(own, Answers(languages=("fr",))), "notre")
     assert copied_texts(french) == {"fr": 1}, "two words may be the same in two languages"
     check_translated(french.document)
@@ -142,7 +142,7 @@ def test_a_language_that_was_added_and_then_left_alone_keeps_its_copies() -> Non
 def test_a_session_is_refused_before_anything_is_made_and_a_pilot_is_warned(tmp_path: Path, pilot: bool) -> None:
     file = tmp_path / "etude.toml"
     study = copy_of(with_answers(template("empty"), Answers(languages=("fr",))), "etude")
-    file.write_text(study.text, encoding="utf-8")
+    file.write_text(study.text, encoding="utf-8", newline="\n")
     chosen = NewSession(
         source=str(file),
         participant="P001",

@@ -135,7 +135,9 @@ def test_no_fault_blanks_the_page(designer: Any, broken: Any, opened: str) -> No
     if opened == "sound":
         designer.editing.make_step("Break it", broken)
     else:
-        designer.file.write_text(read_study(designer.file.read_bytes()).with_edits(broken)[0].text)
+        designer.file.write_text(
+            read_study(designer.file.read_bytes()).with_edits(broken)[0].text, encoding="utf-8", newline="\n"
+        )
         designer.open("demo")
         designer.open("kitchen", "pages", "welcome")
     assert designer.study.faults

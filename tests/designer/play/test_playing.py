@@ -76,10 +76,10 @@ def folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def likert(designer: Any) -> Any:
     """The workspace's study with tasks of a second, open."""
-    text = designer.file.read_text()
+    text = designer.file.read_text("utf-8")
     for key, value in (("min_s", "0.3"), ("count", "1"), ("dwell_s", "0.05"), *((one, "1000") for one in UNLIMITED)):
         text = re.sub(rf"^{key} = [\d.]+", f"{key} = {value}", text, flags=re.MULTILINE)
-    designer.file.write_text(text)
+    designer.file.write_text(text, encoding="utf-8", newline="\n")
     designer.open()
     return designer
 
@@ -93,7 +93,7 @@ def press_f5(qtbot: Any, designer: Any) -> None:
 
 def lines_of(study: Path) -> list[dict[str, Any]]:
     journal = study / "data" / "sub-P001" / "ses-01" / "journal.jsonl"
-    return [json.loads(line) for line in journal.read_text().splitlines()]
+    return [json.loads(line) for line in journal.read_text("utf-8").splitlines()]
 
 
 def play_to_the_end(qtbot: Any, designer: Any) -> Player:
@@ -273,7 +273,7 @@ def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: 
     ):
         assert old in text
         text = text.replace(old, new, 1)
-    designer.file.write_text(text.replace('name = "viscosity"', 'name = "kitchen"'))
+    designer.file.write_text(text.replace('name = "viscosity"', 'name = "kitchen"'), encoding="utf-8", newline="\n")
     designer.open()
     protocol = designer.study.protocol
     assert protocol is not None

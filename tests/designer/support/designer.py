@@ -32,7 +32,7 @@ class Designer(KeyUser):
     def __init__(self, folder: Path) -> None:
         self.file = folder / "protocols" / "kitchen.toml"
         self.file.parent.mkdir()
-        self.file.write_text(DEMO, encoding="utf-8")
+        self.file.write_text(DEMO, encoding="utf-8", newline="\n")
         self.results = folder / "results"
         self.controller = DesignerController(self.results)
         self.playing = Playing(self.controller)
@@ -62,7 +62,7 @@ class Designer(KeyUser):
         for old, new in pairs:
             assert old in text, old
             text = text.replace(old, new, 1)
-        self.file.write_text(text, encoding="utf-8")
+        self.file.write_text(text, encoding="utf-8", newline="\n")
         return before
 
     def open(self, name: str = "kitchen", *path: str | int, width: int = 0) -> None:

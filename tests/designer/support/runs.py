@@ -18,5 +18,5 @@ def run(designer: Any, participant: str, source: bytes, study: str = "kitchen", 
         "key_hash": "0" * 64, "protocol_hash": protocol_hash(source), "protocol": protocol, "simulated": False,
         "pilot": False, "started_at": "2026-11-20T12:00:00+00:00", **facts,
     }  # fmt: skip
-    (folder / "receipt.json").write_text(json.dumps(held))
+    (folder / "receipt.json").write_text(json.dumps(held), encoding="utf-8", newline="\n")
     return folder

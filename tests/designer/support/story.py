@@ -50,7 +50,7 @@ class Story:
         self.drafts_are_kept = True  # False while a draft cannot be written or deleted
         self._before: list[str] = []
         self._checked = ""
-        designer.file.write_text(text, encoding="utf-8")
+        designer.file.write_text(text, encoding="utf-8", newline="\n")
         self.act("open", designer.open)
 
     def play(self, story: str) -> None:

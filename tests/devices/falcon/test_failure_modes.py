@@ -84,7 +84,7 @@ class TestFaultsOfTheEmulator:
     def test_no_firmware_one_that_is_none_and_one_that_does_not_arrive(self, firmware, tmp_path):
         has_words_of(refused(Emulator()), "firmware-file")
         page = tmp_path / "page.bin"
-        page.write_text("<!DOCTYPE html><html>")
+        page.write_text("<!DOCTYPE html><html>", encoding="utf-8", newline="\n")
         has_words_of(refused(Emulator(), firmware=page), "not-firmware")
         has_words_of(refused(Emulator(), firmware=tmp_path / "nowhere.bin"), "firmware-file")
         unpowered, garbling = Emulator(), Emulator()

@@ -190,7 +190,7 @@ def test_without_a_guard_there_is_no_force(monkeypatch):
 def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(guarding, "PATIENCE_S", 0.0)
     monkeypatch.setattr(guarding.signal, "signal", lambda *_: None)
-    with (tmp_path / "ended").open("w+") as ended_at_once:
+    with (tmp_path / "ended").open("w+", encoding="utf-8", newline="\n") as ended_at_once:
         monkeypatch.setattr(guarding.sys, "stdin", ended_at_once)
         assert watch_program("falcon", ENDS_TORQUE, str(tmp_path / "none")) == 2
     said = capsys.readouterr()
@@ -227,7 +227,7 @@ def test_the_guard_loads_no_compiler():
 
 
 def test_a_guard_loads_nothing_from_the_folder_it_is_started_in(tmp_path, monkeypatch):
-    (tmp_path / "signal.py").write_text("raise SystemExit")
+    (tmp_path / "signal.py").write_text("raise SystemExit", encoding="utf-8", newline="\n")
     monkeypatch.chdir(tmp_path)
     with guard_for("falcon") as guard:
         assert guard.watching

@@ -26,7 +26,7 @@ def test_a_motion_that_meets_no_force_is_refused():
 
 def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path, monkeypatch):
     rows = "\n".join(f"{k / 50},{k / 100},0,0" for k in range(21))
-    (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8")
+    (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8", newline="\n")
     measured = []
     monkeypatch.setattr(comparison, "accuracy", lambda *given, **_: measured.append(given))
     monkeypatch.setattr(accuracy_report, "evidence", lambda _found: Evidence("", {}))

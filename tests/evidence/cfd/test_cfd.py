@@ -147,8 +147,8 @@ t_s,velocity_mps,force_n
 
 def test_a_stored_table_is_taken_for_its_own_liquid_alone(tmp_path):
     honey, glycerin = (load_scene("physical_liquids", name) for name in ("honey", "glycerin"))
-    (tmp_path / "start-100mmps.csv").write_text(TABLE, encoding="utf-8")
-    (tmp_path / "steady.csv").write_text("reynolds,drag_coefficient\n1,27\n", encoding="utf-8")
+    (tmp_path / "start-100mmps.csv").write_text(TABLE, encoding="utf-8", newline="\n")
+    (tmp_path / "steady.csv").write_text("reynolds,drag_coefficient\n1,27\n", encoding="utf-8", newline="\n")
     (truth,) = solver_truths(honey, tmp_path)
     (case,) = truth.cases
     assert (truth.name, truth.computing_s, truth.machine) == ("start and stop", 1.5, "two cores")

@@ -43,7 +43,7 @@ def alone(tmp_path: Path) -> Path:
     (tmp_path / "held_out").mkdir()
     for name in ("score.py", "SHA256SUMS", f"held_out/{NAME}.csv"):
         shutil.copy(SCORE.parent / name, tmp_path / name)
-    (tmp_path / "stokes.py").write_text(STOKES)
+    (tmp_path / "stokes.py").write_text(STOKES, encoding="utf-8", newline="\n")
     return tmp_path
 
 
@@ -146,7 +146,7 @@ def test_a_bad_engine_or_table_ends_in_one_line(
     monkeypatch.setattr(score, "ANSWER_S", 0.5)
     monkeypatch.setattr(score, "__file__", str(alone / "score.py"))
     if program == "changed":
-        with (alone / "held_out" / f"{NAME}.csv").open("a") as file:
+        with (alone / "held_out" / f"{NAME}.csv").open("a", encoding="utf-8", newline="\n") as file:
             file.write("99,0,0\n")
     words = ["/nowhere/engine"] if program is None else [sys.executable, "-c", program]
     assert score.main(["--only", NAME, *words]) == 2
@@ -160,7 +160,9 @@ def test_a_function_by_its_name(
 ) -> None:
     monkeypatch.setattr(score, "DELAYS", (0,))
     monkeypatch.syspath_prepend(alone)
-    (alone / "own_engine.py").write_text("def none(setup):\n    return lambda *tick: 0.0\n")
+    (alone / "own_engine.py").write_text(
+        "def none(setup):\n    return lambda *tick: 0.0\n", encoding="utf-8", newline="\n"
+    )
     assert score.main(["--function", "own_engine:none", "--only", NAME]) == 0
     assert "| 100.0% | 100.0% |" in capsys.readouterr().out
     assert score.main(["--function", "own_engine:nothing"]) == 2

@@ -51,7 +51,7 @@ def main(folder: str) -> int:
         r"^max_s = 30\b", f"max_s = {LONGEST_S}", protocol.read_text(encoding="utf-8"), flags=re.MULTILINE
     )
     assert found == 1
-    protocol.write_text(text, encoding="utf-8")
+    protocol.write_text(text, encoding="utf-8", newline="\n")
     application = application_here()
     person = Person(watch)
     code = app.run(

@@ -23,5 +23,5 @@ def write(folder: Path, *, resume: str = "trial") -> Path:
         assert f'"{name}"' in text
         text = text.replace(f'"{name}"', f'"statement_{number}"')
     path = folder / "short.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return path

@@ -31,7 +31,7 @@ def own_study(folder, title="Own"):
     file = folder / "protocols" / "own.toml"
     file.parent.mkdir(exist_ok=True)
     text = source_bytes("demo").decode().replace('name = "demo"', 'name = "own"')
-    file.write_text(text.replace('"A first look"', f'"{title}"'), encoding="utf-8")
+    file.write_text(text.replace('"A first look"', f'"{title}"'), encoding="utf-8", newline="\n")
     return file
 
 
@@ -56,7 +56,7 @@ def changes_of_studies(home, folder, chooses):
     yield "nothing has changed", home.enter
     assert home.grid.cards is cards
     yield "it has the title of another one", come_back(lambda: own_study(folder, "A first look"))
-    yield "it is damaged", come_back(lambda: file.write_text("format = 1\n"))
+    yield "it is damaged", come_back(lambda: file.write_text("format = 1\n", encoding="utf-8", newline="\n"))
     yield pen("own")
     yield "it is deleted", come_back(file.unlink)
     text = own_study(folder).read_text(encoding="utf-8")
@@ -72,9 +72,11 @@ def changes_of_studies(home, folder, chooses):
     yield "press New study", home.new_study.click
     yield "the draft is that of the file", come_back(lambda: write_draft(file, Draft(text=text, base="")))
     elsewhere = folder / "elsewhere.toml"
-    elsewhere.write_text(text.replace('name = "own"', 'name = "elsewhere"'), encoding="utf-8")
+    elsewhere.write_text(text.replace('name = "own"', 'name = "elsewhere"'), encoding="utf-8", newline="\n")
     for chosen in (elsewhere, folder / "broken.toml"):
-        chosen.write_text(chosen.read_text(encoding="utf-8") if chosen.exists() else "format = 1\n", encoding="utf-8")
+        chosen.write_text(
+            chosen.read_text(encoding="utf-8") if chosen.exists() else "format = 1\n", encoding="utf-8", newline="\n"
+        )
         chooses.setattr(QFileDialog, "getOpenFileName", lambda *_, chosen=chosen: (str(chosen), ""))
         yield f"open {chosen.name}", home.open_protocol.click
 
@@ -130,7 +132,7 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
     text = own_study(tmp_path, "Zest").read_text(encoding="utf-8")
     for name in "abcdefgh":
         made = text.replace('name = "own"', f'name = "{name}"').replace("Zest", f"Study {name}")
-        (tmp_path / "protocols" / f"{name}.toml").write_text(made, encoding="utf-8")
+        (tmp_path / "protocols" / f"{name}.toml").write_text(made, encoding="utf-8", newline="\n")
     file = tmp_path / "protocols" / ("own.toml" if after == "saved" else "fresh.toml")
     write_draft(file, Draft(text=text.replace("Zest", "Else"), base=""))
     home = open_home(qtbot, tmp_path / "results")

@@ -155,7 +155,11 @@ def test_a_session_begins_with_what_is_set_for_this_machine_unless_its_firmware_
 
 def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path, opened):
     source = tmp_path / "grouped.toml"
-    source.write_text(STUDY.replace("format = 2\n", 'format = 2\nsequences = [["hello", "thin"], ["thick", "end"]]\n'))
+    source.write_text(
+        STUDY.replace("format = 2\n", 'format = 2\nsequences = [["hello", "thin"], ["thick", "end"]]\n'),
+        encoding="utf-8",
+        newline="\n",
+    )
     made = opened(study_facts(str(source)))
     made.editors["session"].control.setValue(2)
     settle(qtbot, made)
@@ -167,7 +171,11 @@ def test_a_session_beyond_the_last_is_refused(qtbot, tmp_path, opened):
 
 def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, tmp_path, opened):
     study = tmp_path / "square.toml"
-    study.write_text(source_bytes("demo").decode().replace('\norder = "shuffled"', '\norder = "latin"'))
+    study.write_text(
+        source_bytes("demo").decode().replace('\norder = "shuffled"', '\norder = "latin"'),
+        encoding="utf-8",
+        newline="\n",
+    )
     dialog = opened(study_facts(str(study)))
     settle(qtbot, dialog)
     assert dialog.editors["row_of"].control.isVisible()
@@ -185,7 +193,7 @@ def test_replaced_participant_is_asked_for_where_rows_are_dealt(qtbot, tmp_path,
 def grouped(tmp_path: Path, assignment: str) -> Path:
     study = tmp_path / "grouped.toml"
     head = f'study.name = "grouped"\nstudy.group_assignment = "{assignment}"\n'
-    study.write_text((STUDY + GROUPS).replace('study.name = "grouped"\n', head))
+    study.write_text((STUDY + GROUPS).replace('study.name = "grouped"\n', head), encoding="utf-8", newline="\n")
     return study
 
 

@@ -117,17 +117,21 @@ def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):
         stop_at(tmp_path, participant, 3, then=then)
     exclude(tmp_path / "demo", "P004", 1, by="AB", reason="fell asleep")
     journal = tmp_path / "demo" / "data" / "sub-P005" / "ses-01" / "journal.jsonl"
-    first = journal.read_text().splitlines()[0]
-    journal.write_text(first.replace('"at":', '"once":').replace('"event":"session_started"', '"event":"tired"') + "\n")
+    first = journal.read_text("utf-8").splitlines()[0]
+    journal.write_text(
+        first.replace('"at":', '"once":').replace('"event":"session_started"', '"event":"tired"') + "\n",
+        encoding="utf-8",
+        newline="\n",
+    )
     holiday = tmp_path / "holiday" / "data" / "sub-x" / "ses-01"
     holiday.mkdir(parents=True)
-    (holiday / "journal.jsonl").write_text("[]\nno journal\n")
+    (holiday / "journal.jsonl").write_text("[]\nno journal\n", encoding="utf-8", newline="\n")
     lines += ["== all", *told(tmp_path)]
     lines += [read_record(tmp_path / "demo" / "data" / "sub-P020" / "ses-01").about]
     opening = lock_folder(tmp_path / "demo" / "data" / "sub-P022" / "ses-01")
     lines += ["== P022 is open in a program", *told(tmp_path)]
     opening.release()
-    (tmp_path / "demo" / "exclusions.csv").write_text("nonsense")
+    (tmp_path / "demo" / "exclusions.csv").write_text("nonsense", encoding="utf-8", newline="\n")
     lines += ["== exclusions that cannot be read", *told(tmp_path)]
     compare(Path(__file__).parent / "golden" / "sessions.txt", each_once(lines), pytestconfig)
 
@@ -135,7 +139,7 @@ def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):
 def test_studies_state_extent_languages_needs_and_the_first_problem(tmp_path, pytestconfig):
     lines = []
     for name, text in {"grouped": STUDY + GROUPS, "cut": "format = 1\nsequence = [", "bare": "format = 1\n"}.items():
-        (tmp_path / f"{name}.toml").write_text(text)
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8", newline="\n")
     assert known_sources()[-1] == "demo"
     for source in ("rek2024", "viscosityjnd", *(str(tmp_path / f"{name}.toml") for name in ("grouped", "cut", "bare"))):
         facts = study_facts(source)
@@ -150,8 +154,8 @@ def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
     table = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]\n'
     text = source_bytes("demo").decode()
     assert table in text
-    source.write_text(text.replace(table, '[liquids.thick]\nfile = "thick.toml"\n'), encoding="utf-8")
-    liquid.write_text(f"format = 1\n{table}", encoding="utf-8")
+    source.write_text(text.replace(table, '[liquids.thick]\nfile = "thick.toml"\n'), encoding="utf-8", newline="\n")
+    liquid.write_text(f"format = 1\n{table}", encoding="utf-8", newline="\n")
     results, now = tmp_path / "results", datetime.now().astimezone()
     stop_at(results, "P001", 2, source=source)
     whole = interrupted_session(sessions(results, {}), [study_facts("demo"), study_facts(str(source))], now)
@@ -177,12 +181,14 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
     text = source_bytes("demo").decode()
     for number, name in enumerate(("saved", "older", "newer", "broken")):
         file, own = protocols / f"{name}.toml", text.replace('name = "demo"', f'name = "{name}"')
-        file.write_text(own if name != "broken" else own.replace("format = ", "form = "), encoding="utf-8")
+        file.write_text(
+            own if name != "broken" else own.replace("format = ", "form = "), encoding="utf-8", newline="\n"
+        )
         write_draft(file, Draft(text=own.replace("force_limit_n = 6", "force_limit_n = 5") if number else own, base=""))
     write_draft(protocols / "fresh.toml", Draft(text='[study]\ntitle = "Fresh"\n', base=""))
     for name, at in (("older", "2026-11-20T08:00:00+01:00"), ("newer", "2026-11-20T08:30:00+00:00")):
         (kept,) = (file for file in draft_files() if f"{name}.toml" in file.read_text(encoding="utf-8"))
-        kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8")
+        kept.write_text(json.dumps(json.loads(kept.read_bytes()) | {"kept_at": at}), encoding="utf-8", newline="\n")
     keep_original(protocols / "older.toml", "demo")
     found = read_studies((), lambda: version_rows)
     assert [(Path(it.source).stem, it.origin) for it in found[2:5]] == [
@@ -198,9 +204,9 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
 
 def test_a_file_of_liquids_that_becomes_a_study_is_noticed(tmp_path: Path) -> None:
     file = tmp_path / "liquids.toml"
-    file.write_text("format = 1\n[liquids.water]\ndensity_kg_m3 = 1000\n")
+    file.write_text("format = 1\n[liquids.water]\ndensity_kg_m3 = 1000\n", encoding="utf-8", newline="\n")
     assert holds_liquids_alone(str(file))
-    file.write_text(f"{file.read_text()}[study]\nname = 'mine'\n")
+    file.write_text(f"{file.read_text('utf-8')}[study]\nname = 'mine'\n", encoding="utf-8", newline="\n")
     assert not holds_liquids_alone(str(file))
     file.unlink()
     assert not holds_liquids_alone(str(file))

@@ -164,7 +164,7 @@ def cut_table(study: Path) -> None:
 
 
 def cut_exclusions(study: Path) -> None:
-    (study / "exclusions.csv").write_text("what\n")
+    (study / "exclusions.csv").write_text("what\n", encoding="utf-8", newline="\n")
 
 
 def without_sessions(study: Path) -> None:

@@ -242,7 +242,7 @@ def test_without_the_extra_the_export_says_what_to_install(opened, whole, qtbot,
 
 def test_intervals_are_chosen_and_nothing_is_cut(opened, tmp_path, qtbot):
     source = tmp_path / "levels.toml"
-    source.write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8")
+    source.write_text(level_studies.text_of(*level_studies.SHORT), encoding="utf-8", newline="\n")
     study = tmp_path / "results" / "levels"
     rehearse(str(source), participants=1, seed=1, results=study)
     unblind(study, by="AK", reason="over")

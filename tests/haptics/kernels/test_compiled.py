@@ -41,7 +41,7 @@ def said_at_start(folder: Path, environment: dict[str, str], text: str = TWICE, 
     """Run a program whose file is in ``folder``; return what it printed, and what it logged."""
     program = folder / "program.py"
     if not program.exists():  # its cache is that of its time of change
-        program.write_text(text)
+        program.write_text(text, encoding="utf-8", newline="\n")
     done = subprocess.run(
         [sys.executable, str(program), *arguments],
         env=os.environ | {"PYTHONPATH": str(Path(__file__).parents[3])} | environment,
@@ -90,7 +90,7 @@ def test_a_step_is_code_for_its_callers_until_python_calls_it_also_from_the_cach
 def nowhere(tmp_path: Path) -> Path:
     """Return a place that no folder can be made in, whoever asks: it is a file."""
     file = tmp_path / "file"
-    file.write_text("no folder")
+    file.write_text("no folder", encoding="utf-8", newline="\n")
     return file / "cache"
 
 
@@ -163,9 +163,9 @@ def digest_with(package: Path, file: str, old: str, new: str) -> str:
     path = package / file
     text = path.read_text(encoding="utf-8")
     assert old in text, (file, old)
-    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    path.write_text(text.replace(old, new, 1), encoding="utf-8", newline="\n")
     digest = compiled.digest_of(compiled.compiled_sources(package))
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return digest
 
 
@@ -180,7 +180,9 @@ def test_a_changed_constant_of_a_kernel_changes_the_digest_and_a_word_elsewhere_
     ):
         assert digest_with(package, file, old, new) != digest, file
     assert digest_with(package, "haptics/model/overrides.py", '"""', '"""The ') == digest
-    (package / "haptics/model/effects/unlisted.py").write_text("")  # found by `iter_modules`
+    (package / "haptics/model/effects/unlisted.py").write_text(
+        "", encoding="utf-8", newline="\n"
+    )  # found by `iter_modules`
     assert compiled.digest_of(compiled.compiled_sources(package)) != digest
 
 

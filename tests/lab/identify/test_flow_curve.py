@@ -157,7 +157,7 @@ def test_from_a_rheometer_file_to_a_preset(tmp_path):
     ],
 )
 def test_a_flow_curve_that_cannot_be_used_is_one_line(tmp_path, text, said):
-    (tmp_path / "curve.csv").write_text(text)
+    (tmp_path / "curve.csv").write_text(text, encoding="utf-8", newline="\n")
     with pytest.raises(StudyError, match=said) as caught:
         measured_force.read(tmp_path / "curve.csv")
     assert "\n" not in str(caught.value)
@@ -216,7 +216,7 @@ def test_a_table_of_an_instrument_gives_the_numbers_of_a_plain_one(tmp_path):
     said = []
     for text in (plain, plain.replace(",", ";").replace(".", ","), plain.replace(",", "\t")):
         path = tmp_path / "flow.csv"
-        path.write_text(text, encoding="utf-8")
+        path.write_text(text, encoding="utf-8", newline="\n")
         shown = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", ",".join(STARTS["ketchup"]))
         assert shown.exit_code == 0
         said.append(shown.output)
@@ -225,7 +225,9 @@ def test_a_table_of_an_instrument_gives_the_numbers_of_a_plain_one(tmp_path):
 
 def test_a_table_with_more_fields_than_its_header_is_refused(tmp_path):
     path = tmp_path / "flow.csv"
-    path.write_text("shear_rate_per_s,shear_stress_pa\n1,5,26,7\n2,5,28,6\n4,5,31,3\n6,5,33,3\n", encoding="utf-8")
+    path.write_text(
+        "shear_rate_per_s,shear_stress_pa\n1,5,26,7\n2,5,28,6\n4,5,31,3\n6,5,33,3\n", encoding="utf-8", newline="\n"
+    )
     with pytest.raises(StudyError) as refusal:
         identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", "flow_index")
     assert str(refusal.value) == f"{path}, line 2: has 4 fields, more than the 2 of the header: write decimal points"

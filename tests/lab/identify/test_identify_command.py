@@ -50,10 +50,10 @@ def fitted(tmp_path_factory):
 )
 def test_the_preset_is_the_fitted_scene(scene, tmp_path):
     (liquid,) = scene.liquids
-    (tmp_path / "measured.csv").write_text("t_s\n")
+    (tmp_path / "measured.csv").write_text("t_s\n", encoding="utf-8", newline="\n")
     found = fit(scene, liquid.id, ["density_kg_m3"], REACH, noisy(scene, REACH, 0.02))
     file = tmp_path / "preset.toml"
-    file.write_text(preset.preset_file_text(found, tmp_path / "measured.csv"), encoding="utf-8")
+    file.write_text(preset.preset_file_text(found, tmp_path / "measured.csv"), encoding="utf-8", newline="\n")
     assert load_scene(file, liquid.id) == found.scene.model_copy(update={"velocity": Kalman()})
     assert found.scene != scene
     for command in ("check", "scene"):
@@ -74,7 +74,9 @@ def test_the_residuals_in_the_table_are_measured_less_fitted(fitted, tmp_path):
 
 
 def test_places_along_a_line_follow_from_the_velocity(tmp_path):
-    (tmp_path / "line.csv").write_text("t_s,velocity_mps,force_n\n0,0,1\n0.01,0.2,2\n0.02,0.4,3\n0.04,0.4,4\n")
+    (tmp_path / "line.csv").write_text(
+        "t_s,velocity_mps,force_n\n0,0,1\n0.01,0.2,2\n0.02,0.4,3\n0.04,0.4,4\n", encoding="utf-8", newline="\n"
+    )
     read = measured_force.read(tmp_path / "line.csv")
     assert read.motion.position_m[:, 0] == pytest.approx([0, 0.001, 0.004, 0.012])
     assert read.force_n[:, 0].tolist() == [1, 2, 3, 4]

@@ -14,5 +14,5 @@ def mixed_file(folder: Path, *edits: tuple[str, str]) -> Path:
         assert old in text, old
         text = text.replace(old, new, 1)
     path = folder / "mixed.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return path

@@ -114,5 +114,5 @@ def test_designs_in_words(pytestconfig: pytest.Config) -> None:
     told += [describe_balance(balance(physical, numbered_participants(participants), 1)) for participants in (1, 6, 12)]
     file = Path(__file__).parents[1] / "orders" / "designs.txt"
     if pytestconfig.getoption("regenerate"):
-        file.write_text("\n=====\n".join(told), encoding="utf-8")
+        file.write_text("\n=====\n".join(told), encoding="utf-8", newline="\n")
     assert file.read_text(encoding="utf-8").split("\n=====\n") == told

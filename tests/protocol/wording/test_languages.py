@@ -127,7 +127,7 @@ def spanish(folder: Path, **changed: str) -> Path:
     text = text.replace('language = "¡en"', 'language = "es"')
     for key, value in changed.items():
         text = re.sub(rf"^{key} = .*$", value, text, flags=re.MULTILINE)
-    (folder / "es.toml").write_text(text, encoding="utf-8")
+    (folder / "es.toml").write_text(text, encoding="utf-8", newline="\n")
     return folder / "es.toml"
 
 
@@ -182,10 +182,10 @@ def test_a_file_of_a_shipped_language_or_a_folder_that_cannot_be_read_changes_no
 def test_a_template_lacks_every_text_and_is_complete_once_each_is_written(tmp_path: Path) -> None:
     file = tmp_path / "es.toml"
     template = languages.language_template("es")
-    file.write_text(template, encoding="utf-8")
+    file.write_text(template, encoding="utf-8", newline="\n")
     with pytest.raises(StudyError, match="name is missing; english_name is missing"):
         languages.read_language(file)
-    file.write_text(re.sub(r'(?:""|\[\])  # ("[^"]*"|\[.*?\])', r"\1", template), encoding="utf-8")
+    file.write_text(re.sub(r'(?:""|\[\])  # ("[^"]*"|\[.*?\])', r"\1", template), encoding="utf-8", newline="\n")
     expected = vars(words("en")) | {"language": "es"}
     assert vars(languages.read_language(file)) == expected
 
@@ -195,7 +195,7 @@ def test_a_study_in_the_labs_language_is_checked_and_described(tmp_path: Path) -
     (folder / "languages").mkdir(parents=True)
     spanish(folder / "languages")
     study = tmp_path / "own.toml"
-    study.write_text(STUDY, encoding="utf-8")
+    study.write_text(STUDY, encoding="utf-8", newline="\n")
     command = [sys.executable, "-m", "study_app", "check", str(study)]
     environment = {**os.environ, "LIQUID_STUDY_WORKSPACE": str(folder)}
     done = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)

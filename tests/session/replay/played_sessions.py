@@ -24,7 +24,7 @@ NAMES = {"RECEIPT": "receipt.json", "FIRST": "recordings/trial-001.parquet", "SE
 
 def _rehearsed(text: str, seed: int) -> Callable[[Path], object]:
     def make(folder: Path) -> object:
-        (folder / "study.toml").write_text(text, encoding="utf-8")
+        (folder / "study.toml").write_text(text, encoding="utf-8", newline="\n")
         return rehearse(folder / "study.toml", participants=1, seed=seed, results=folder / "study")
 
     return make
@@ -67,13 +67,13 @@ class Recorded(Files):
 
     def receipt(self, *gone: str, **changes: Any) -> None:
         """Change fields of the receipt, or take some away."""
-        held = json.loads((self.root / "receipt.json").read_text()) | changes
+        held = json.loads((self.root / "receipt.json").read_text("utf-8")) | changes
         told = {name: value for name, value in held.items() if name not in gone}
         self.write("receipt.json", json.dumps(told).encode())
 
     def velocity(self, **estimator: Any) -> None:
         """Let the receipt name another estimator of the velocity."""
-        held = json.loads((self.root / "receipt.json").read_text())
+        held = json.loads((self.root / "receipt.json").read_text("utf-8"))
         held["protocol"]["scene"]["velocity"] = estimator
         self.write("receipt.json", json.dumps(held).encode())
 

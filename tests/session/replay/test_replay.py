@@ -141,10 +141,14 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
     """Replay uses the recorded effects where this program would choose others, and the recorded estimator."""
     file = short.write(tmp_path)
     text = file.read_text(encoding="utf-8").replace("format = 1", "format = 2", 1)
-    file.write_text(re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8")
+    file.write_text(
+        re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8", newline="\n"
+    )
     rehearse(file, participants=1, seed=1, results=tmp_path / "results")
     place = session(tmp_path / "results")
-    assert json.loads((place / "receipt.json").read_text())["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
+    assert json.loads((place / "receipt.json").read_text("utf-8"))["protocol"]["scene"]["velocity"] == {
+        "kind": "kalman"
+    }
     monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
     monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
     comes_out(place, 4)
@@ -168,8 +172,8 @@ def test_forces_that_limits_change_come_out_to_the_last_bit(tmp_path: Path, liqu
 def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tmp_path: Path) -> None:
     place = resumed_on_another_device(tmp_path / "results")
     comes_out(place, 2)
-    receipt = json.loads((place / "receipt.json").read_text())
-    (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}))
+    receipt = json.loads((place / "receipt.json").read_text("utf-8"))
+    (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="lacks the device used since"):
         replay(place)
 
@@ -180,18 +184,18 @@ def test_each_part_of_a_session_is_replayed_by_the_force_rules_that_its_receipt_
     for liquid in small.TABLES["liquids"].values():
         monkeypatch.setitem(liquid, "effects", ["drag", "added_mass"])
     place = resumed_on_another_device(tmp_path / "results")
-    receipt = json.loads((place / "receipt.json").read_text())
+    receipt = json.loads((place / "receipt.json").read_text("utf-8"))
     lighter = receipt["resumed"][0]["device"]
     assert receipt["device"]["force_rules"] == lighter["force_rules"] == FORCE_RULES
     monkeypatch.setitem(VERSIONS, 1, VERSIONS[1]._replace(cut_inertia_share=0.0))
     assert replay(place).proved
     del lighter["force_rules"]
-    (place / "receipt.json").write_text(json.dumps(receipt))
+    (place / "receipt.json").write_text(json.dumps(receipt), encoding="utf-8", newline="\n")
     differences = replay(place).differences
     assert differences
     assert all(line.startswith("trial 1, attempt 2:") for line in differences)
     lighter["force_rules"] = FORCE_RULES + 1
-    (place / "receipt.json").write_text(json.dumps(receipt))
+    (place / "receipt.json").write_text(json.dumps(receipt), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match=f"force rules {FORCE_RULES + 1}, this version knows 1 to {FORCE_RULES}"):
         replay(place)
 

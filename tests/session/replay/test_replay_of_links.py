@@ -31,7 +31,7 @@ STUDY = text_of("late_forces")
 def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("late")
     protocol = folder / "late.toml"
-    protocol.write_text(STUDY)
+    protocol.write_text(STUDY, encoding="utf-8", newline="\n")
     return rehearse(protocol, participants=1, seed=2, results=folder / "study")
 
 

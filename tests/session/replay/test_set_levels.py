@@ -36,7 +36,7 @@ VISCOSITY = (DELAY[0], 'vary = "viscosity_pa_s"\nlevel = "value"\nlevels = [0.4,
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("protocol") / "matching.toml"
-    path.write_text(text_of(SHORT))
+    path.write_text(text_of(SHORT), encoding="utf-8", newline="\n")
     return path
 
 
@@ -88,7 +88,7 @@ def test_a_session_that_was_killed_and_resumed_is_set_as_one_that_was_not(
 def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tmp_path: Path) -> None:
     unjudged = ("[liquids", "[limits]\nwithheld_percent = 100\nlevel_error_percent = 100\n\n[liquids")
     path = tmp_path / "matching.toml"
-    path.write_text(text_of(SHORT, unjudged, *edits))
+    path.write_text(text_of(SHORT, unjudged, *edits), encoding="utf-8", newline="\n")
     session = session_of(rehearse(path, participants=1, seed=5, results=tmp_path / "study"))
     assert reproduce_session(session).differences == []
     proved = replay(session)
@@ -112,6 +112,6 @@ def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: P
 
 def test_a_level_that_was_set_is_found_in_a_note(session: Path) -> None:
     level = next(line["setting"] for line in lines_of(session) if len(str(line.get("setting"))) > 6)
-    (session / "note.txt").write_text(f"it was {level!r}", encoding="utf-8")
+    (session / "note.txt").write_text(f"it was {level!r}", encoding="utf-8", newline="\n")
     warnings = [str(one) for one in verify_study(session.parents[2], None).warnings]
     assert any("note.txt, line 1 reveals a condition, although the key is sealed" in one for one in warnings)

@@ -57,7 +57,7 @@ def rehearsed(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text, changed = re.subn(pattern, change, text, flags=re.MULTILINE)
         assert changed == 1, pattern
     protocol = folder / "short.toml"
-    protocol.write_text(text + MORE, encoding="utf-8")
+    protocol.write_text(text + MORE, encoding="utf-8", newline="\n")
     return rehearse(protocol, participants=SESSIONS, seed=5, results=folder / "results")
 
 

@@ -58,7 +58,11 @@ questionnaire = "felt"
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("levels") / "levels.toml"
-    path.write_text(edited_studies.text_of("every_design").replace('"expected"]', '"expected", "said"]') + STATEMENTS)
+    path.write_text(
+        edited_studies.text_of("every_design").replace('"expected"]', '"expected", "said"]') + STATEMENTS,
+        encoding="utf-8",
+        newline="\n",
+    )
     return path
 
 
@@ -88,7 +92,9 @@ def run(protocol: Path, folder: Path, secret: int) -> Path:
     open_or_draw_key(folder, load(str(protocol)), stream(secret, "blinding").random)
     with collecting() as markers:
         rehearse(protocol, participants=1, seed=4, results=folder)
-    (folder / "markers.jsonl").write_text("".join(f"{one.text}\n" for one in markers.markers), encoding="utf-8")
+    (folder / "markers.jsonl").write_text(
+        "".join(f"{one.text}\n" for one in markers.markers), encoding="utf-8", newline="\n"
+    )
     return folder
 
 
@@ -204,7 +210,7 @@ def sessions(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of one block of pairs, answered by what was felt."""
     folder = tmp_path_factory.mktemp("pairs")
     path = folder / "pairs.toml"
-    path.write_text(text_of(("repetitions = 8", "repetitions = 4"), *SHORT[1:]))
+    path.write_text(text_of(("repetitions = 8", "repetitions = 4"), *SHORT[1:]), encoding="utf-8", newline="\n")
     return rehearse(path, participants=SESSIONS, seed=6, results=folder / "study", recordings=False)
 
 

@@ -36,7 +36,7 @@ def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
         text, found = re.subn(pattern, word, text, flags=re.MULTILINE)
         assert found, pattern
     path = tmp_path_factory.mktemp("named") / "named.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", newline="\n")
     return path
 
 

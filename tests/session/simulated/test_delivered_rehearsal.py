@@ -20,7 +20,7 @@ pytestmark = needs_servo
 @pytest.mark.slow
 def test_every_interval_is_delivered_as_requested(tmp_path: Path, study: str) -> None:
     path = tmp_path / "limits.toml"
-    path.write_text(text_of(f"limits_{study}"), encoding="utf-8")
+    path.write_text(text_of(f"limits_{study}"), encoding="utf-8", newline="\n")
     results = rehearse(path, participants=1, seed=1, results=tmp_path / "results")
     session = StudyFolder(results).sessions()[0]
     lines = raw(open_events(journal.read(session.journal), read_key(results)))

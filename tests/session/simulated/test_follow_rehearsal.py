@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.slow, needs_servo]
 @pytest.fixture(scope="module")
 def study_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("dampers") / "dampers.toml"
-    path.write_text(text_of("dampers"), encoding="utf-8")
+    path.write_text(text_of("dampers"), encoding="utf-8", newline="\n")
     return path
 
 

@@ -30,7 +30,9 @@ def told(study: Path, session: SessionFolder) -> tuple[str, list[tuple[Any, ...]
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("groups")
-    (folder / "grouped.toml").write_text((STUDY + GROUPS).replace("min_s = 1\nmax_s = 3", "min_s = 0.3\nmax_s = 0.6"))
+    (folder / "grouped.toml").write_text(
+        (STUDY + GROUPS).replace("min_s = 1\nmax_s = 3", "min_s = 0.3\nmax_s = 0.6"), encoding="utf-8", newline="\n"
+    )
     return rehearse(folder / "grouped.toml", participants=2, seed=3, results=folder / "study", recordings=False)
 
 
@@ -49,8 +51,8 @@ def test_a_resumed_participant_stays_in_the_group_and_answers_alike(study: Path,
         session.journal.write_bytes(content[: round(share * len(content))])
         for made in (*session.path.glob("*.csv"), session.checksums):
             made.unlink()
-        text = session.receipt.read_text().replace('"status": "completed"', '"status": "unfinished"')
-        session.receipt.write_text(text)
+        text = session.receipt.read_text("utf-8").replace('"status": "completed"', '"status": "unfinished"')
+        session.receipt.write_text(text, encoding="utf-8", newline="\n")
         resume_rehearsal(session.path, protocol=study.parent / "grouped.toml")
         assert told(folder, session) == whole
         assert reproduce_session(session.path).differences == []

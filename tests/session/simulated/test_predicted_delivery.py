@@ -58,7 +58,7 @@ SENTENCE = "4 of 4 trials were not delivered: the safety layer held back too muc
 
 def study_of(other: str, folder: Path) -> Path:
     file = folder / "abx.toml"
-    file.write_text(ABX.format(other=other), encoding="utf-8")
+    file.write_text(ABX.format(other=other), encoding="utf-8", newline="\n")
     return file
 
 
@@ -138,7 +138,11 @@ def test_report_and_export_say_who_lost_how_many_trials_of_which_kind(rehearsed:
 
 def test_a_study_that_states_so_completes_a_session_without_a_single_trial(thick: Path, tmp_path: Path) -> None:
     file = tmp_path / "abx.toml"
-    file.write_text(thick.read_text(encoding="utf-8").replace("attempts = 2", "attempts = 2, missing_percent = 100"))
+    file.write_text(
+        thick.read_text(encoding="utf-8").replace("attempts = 2", "attempts = 2, missing_percent = 100"),
+        encoding="utf-8",
+        newline="\n",
+    )
     folder = rehearse(file, participants=1, seed=1, results=tmp_path / "results" / "abx")
     (facts,) = sessions(folder.parent, {})
     assert (status_chip(facts)[2], str(facts.missing), exclusions(folder)) == ("Complete", SENTENCE, ())

@@ -31,7 +31,7 @@ ATTEMPTS = 3
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("clipped") / "clipped.toml"
-    path.write_text(text_of("clipped"), encoding="utf-8")
+    path.write_text(text_of("clipped"), encoding="utf-8", newline="\n")
     return path
 
 
@@ -147,7 +147,7 @@ def test_check_notes_levels_of_a_liquid_with_inertia_that_a_rehearsal_does_not_d
     goo: tuple[str, str], scale: int, notes: int, tmp_path: Path
 ) -> None:
     file = tmp_path / "inertia.toml"
-    file.write_text(INERTIA.format(scale=scale, vary=goo[0], liquid=goo[1]), encoding="utf-8")
+    file.write_text(INERTIA.format(scale=scale, vary=goo[0], liquid=goo[1]), encoding="utf-8", newline="\n")
     said = " ".join(CliRunner().invoke(commands, ["check", str(file)]).output.split())
     assert said.count("level 0.6 and 0.02 cannot be delivered to a hand") == said.count("cannot be delivered") == notes
     study = rehearse(file, participants=1, seed=1, results=tmp_path / "results")

@@ -89,13 +89,13 @@ def test_no_file_names_a_group_of_a_participant(tmp_path: Path) -> None:
         with begun(study.path, "P001") as store:
             found = allocation_of(study, store.key, "P001")
             line = next(line for line in raw(store.lines) if line["event"] == "allocated")
-            (claim,) = (json.loads(path.read_text()) for path in study.allocated.iterdir())
+            (claim,) = (json.loads(path.read_text("utf-8")) for path in study.allocated.iterdir())
         assert found is not None
         assert set(line) == {"n", "event", "t_s", "at", "entry", "sealed", "previous"}
         assert (claim.pop("sealed"), line["sealed"]) == (found.sealed, found.sealed)
         assert claim == {"entry": 1, "participant": "P001", "place_in_group": True}
         readable[found.group] = found.sealed
-        receipt = json.loads(store.folder.receipt.read_text())
+        receipt = json.loads(store.folder.receipt.read_text("utf-8"))
         assert "entry" not in receipt
         assert "group" not in receipt
     assert len(readable) == 2
@@ -157,7 +157,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
         with begun(study.path, participant):
             pass
     first, second, third = sorted(study.allocated.iterdir())
-    held = [path.read_text() for path in (first, second, third)]
+    held = [path.read_text("utf-8") for path in (first, second, third)]
 
     def errors() -> str:
         return "\n".join(str(error) for error in verify_study(study.path).errors)
@@ -167,18 +167,18 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert "is missing, although participant P002 has entry 2" in errors()
     with pytest.raises(StoreError, match=r"002\.json is missing, although participant P002 has entry 2"):
         begun(study.path, "P002", 2)
-    second.write_text(held[0].replace('"entry": 1', '"entry": 2'))
+    second.write_text(held[0].replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
     assert "002.json: was changed" in errors()
-    second.write_text(held[1])
-    third.write_text(held[2].replace("P003", "P004"))
+    second.write_text(held[1], encoding="utf-8", newline="\n")
+    third.write_text(held[2].replace("P003", "P004"), encoding="utf-8", newline="\n")
     assert "was changed" in errors()
     with pytest.raises(StoreError, match="restore it from a copy"):
         begun(study.path, "P003", 2)
-    third.write_text(held[2])
-    first.write_text(re.sub(r'(..)"}', '00"}', held[0]))
+    third.write_text(held[2], encoding="utf-8", newline="\n")
+    first.write_text(re.sub(r'(..)"}', '00"}', held[0]), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="was changed: restore it from a copy"):
         begun(study.path, "P001", 2)
-    first.write_text(held[0])
+    first.write_text(held[0], encoding="utf-8", newline="\n")
     key = open_or_draw_key(study.path, grouped())
     extra = allocate(study, key, "P009")
     assert extra is not None
@@ -187,7 +187,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
         assert store.lines[0].entry == 5
     assert errors() == ""
     assert "it stays unused" in "\n".join(map(str, verify_study(study.path).warnings))
-    (study.allocated / "\u00b2.json").write_text("{}")  # a digit that int() refuses
+    (study.allocated / "\u00b2.json").write_text("{}", encoding="utf-8", newline="\n")  # a digit that int() refuses
     (loop := study.allocated / "006.json").symlink_to(loop)
     assert errors() == "blinding/allocated/006.json: was changed: restore it from a copy"
 
@@ -241,10 +241,10 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
     unblind(folder, "AB", "a test")
     assert not verify_study(folder).errors
     assert verify_study(folder).is_sound
-    table = study.participants("grouped").read_text().splitlines()
+    table = study.participants("grouped").read_text("utf-8").splitlines()
     assert table[0].endswith(",group")
     assert Counter(line.rsplit(",", 1)[1] for line in table[1:]) == dict.fromkeys(GROUP_NAMES, 2)
-    trials = study.sessions()[0].table("grouped", "trials").read_text().splitlines()
+    trials = study.sessions()[0].table("grouped", "trials").read_text("utf-8").splitlines()
     assert trials[0].endswith(",group")
     assert trials[1].rsplit(",", 1)[1] in GROUP_NAMES
 

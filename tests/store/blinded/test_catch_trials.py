@@ -54,7 +54,9 @@ repetitions = 10
 
 
 def rehearsed(folder: Path, *edits: tuple[str, str], more: str = "") -> Path:
-    (folder / "levels.toml").write_text(text_of(*SHORT, ADAPTIVE, CATCH, *edits, more=more))
+    (folder / "levels.toml").write_text(
+        text_of(*SHORT, ADAPTIVE, CATCH, *edits, more=more), encoding="utf-8", newline="\n"
+    )
     return rehearse(folder / "levels.toml", participants=2, seed=2, results=folder / "study", recordings=False)
 
 
@@ -95,10 +97,10 @@ def test_unblinding_again_repeats_nothing_and_keeps_what_a_person_decided(study:
 
 def test_sessions_that_cannot_be_excluded_are_named(study: Path) -> None:
     listed = StudyFolder(study).exclusions
-    listed.write_text("torn")
+    listed.write_text("torn", encoding="utf-8", newline="\n")
     (warning,) = unblind(study, "AB", "to analyse").left
     assert warning.startswith("the rule catch was not applied (")
-    assert listed.read_text() == "torn"
+    assert listed.read_text("utf-8") == "torn"
     listed.unlink()
     assert len(unblind(study, "AB", "once more").excluded) == 2
 
@@ -133,7 +135,7 @@ def test_sessions_of_versions_without_catch_trials_are_reproduced_and_unblinded(
 
     fields = TrialStarted.fields
     monkeypatch.setattr(TrialStarted, "fields", fields_of)
-    (tmp_path / "levels.toml").write_text(text_of(*SHORT))
+    (tmp_path / "levels.toml").write_text(text_of(*SHORT), encoding="utf-8", newline="\n")
     study = rehearse(tmp_path / "levels.toml", participants=1, seed=2, results=tmp_path / "study", recordings=False)
     (session,) = StudyFolder(study).sessions()
     assert reproduce_session(session.path).followed == ["viscosity: 12 of 12 levels agree with the answers"]

@@ -126,17 +126,17 @@ def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> N
         start = start_of(store.lines)
         assert (start.group, start.entry) == ("novices", 1)
         assert [line.event for line in store.lines] == ["session_started"]
-        assert json.loads(store.folder.receipt.read_text())["group"] == "novices"
+        assert json.loads(store.folder.receipt.read_text("utf-8"))["group"] == "novices"
     assert resumed_choices(store.folder.path, protocol=_written(tmp_path, source)).group == "novices"
     with pytest.raises(StudyError, match="P001 is recorded in group novices, not experts"):
         begun(study.path, source, "P001", group="experts", session=2)
     with begun(study.path, source, "P001", session=2) as store:
         assert start_of(store.lines).group == "novices"
     assert read_key(study.path).groups == {}, "nothing is drawn"
-    table = study.participants("grouped").read_text().splitlines()
+    table = study.participants("grouped").read_text("utf-8").splitlines()
     assert table[0].endswith(",group")
     assert [line.rsplit(",", 1)[1] for line in table[1:]] == ["novices", "novices"], "shown while the key is sealed"
-    variables = json.loads(study.description.read_text())["variableMeasured"]
+    variables = json.loads(study.description.read_text("utf-8"))["variableMeasured"]
     assert "group" in [variable["name"] for variable in variables]
     assert not verify_study(study.path).errors
 
@@ -198,14 +198,14 @@ def test_verify_names_an_entry_that_was_changed(tmp_path: Path, edits: tuple[tup
         begun(study.path, source, who, row_of=row_of, **group).close()
     stem = "experts-001" if edits else "001"
     first, second = study.allocated / f"{stem}.json", study.allocated / f"{stem}-P002.json"
-    whole = second.read_text()
-    second.write_text(whole.replace('"replaces": "P001"', '"replaces": "P003"'))
+    whole = second.read_text("utf-8")
+    second.write_text(whole.replace('"replaces": "P001"', '"replaces": "P003"'), encoding="utf-8", newline="\n")
     assert f"{second.name}: replaces participant P003, who does not have such an entry" in _errors(study)
-    second.write_text(whole.replace('"entry": 1', '"entry": 2'))
+    second.write_text(whole.replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
     assert f"{second.name}: was changed" in _errors(study)
     second.unlink()
     assert f"{second.name}: is missing, although participant P002 has entry 1" in _errors(study)
-    second.write_text(whole)
+    second.write_text(whole, encoding="utf-8", newline="\n")
     assert _errors(study) == ""
     if edits:
         first.rename(study.allocated / "novices-001.json")
@@ -221,7 +221,7 @@ def test_a_folder_of_an_earlier_version_goes_on_by_the_numbers_of_ids(tmp_path: 
     study, source = StudyFolder(tmp_path / "s"), source_of()
     begun(study.path, source, "P001").close()
     path = study.allocation(1)
-    path.write_text(path.read_text().replace(', "place_in_group": true', ""))
+    path.write_text(path.read_text("utf-8").replace(', "place_in_group": true', ""), encoding="utf-8", newline="\n")
     orders = {}
     for who, row_of in (("P002", None), ("P004", None), ("P003", None), ("P060", "P003")):
         with begun(study.path, source, who, row_of=row_of) as store:

@@ -69,7 +69,7 @@ def main() -> None:
     for name in ("demo", "thickness"):
         (to / f"{name}.toml").write_bytes(source_bytes(name))
         expected[name] = found(StudyFolder(to / name))
-    (to / "expected.json").write_text(json.dumps(expected, indent=2) + "\n", encoding="utf-8")
+    (to / "expected.json").write_text(json.dumps(expected, indent=2) + "\n", encoding="utf-8", newline="\n")
     size = sum(path.stat().st_size for path in to.rglob("*") if path.is_file())
     print(f"{to.relative_to(HERE)}: {expected}, {size / 1e3:.0f} kB")
 

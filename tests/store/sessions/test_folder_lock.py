@@ -26,7 +26,7 @@ def other(folder: Path, **changes: Any) -> Path:
     holder = json.loads(with_own.marker.read_bytes()) | changes
     with_own.release()
     marker = folder / ".open-0123abcd.json"
-    marker.write_text(json.dumps(holder))
+    marker.write_text(json.dumps(holder), encoding="utf-8", newline="\n")
     return marker
 
 
@@ -38,7 +38,7 @@ def ended_process() -> int:
 
 def test_a_folder_is_open_in_one_program_until_it_lets_go(tmp_path: Path) -> None:
     for name in (".open-me.json", "open-0123abcd.json", ".open-0123abcd.json.bak"):
-        (tmp_path / name).write_text("of no program")
+        (tmp_path / name).write_text("of no program", encoding="utf-8", newline="\n")
     first = lock_folder(tmp_path)
     assert is_open(tmp_path)
     by = rf"is open in another program \(process {os.getpid()} on .*: wait for it, or end it there"
@@ -85,7 +85,7 @@ def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> 
 )
 def test_a_program_that_may_live_is_not_disturbed(tmp_path: Path, holder: str) -> None:
     marker = other(tmp_path)
-    marker.write_text(holder.replace("HOST", json.dumps(platform.node())))
+    marker.write_text(holder.replace("HOST", json.dumps(platform.node())), encoding="utf-8", newline="\n")
     assert is_open(tmp_path)
     with pytest.raises(StoreError, match=r"if that program is gone, delete .*\.open-0123abcd\.json"):
         lock_folder(tmp_path)

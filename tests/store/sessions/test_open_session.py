@@ -87,7 +87,7 @@ def test_recordings_are_kept_beside_the_journal_and_linked_from_the_trials_row(
 
 def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) -> None:
     store = start(recordings=True)
-    store.folder.recordings.write_text("in the way")
+    store.folder.recordings.write_text("in the way", encoding="utf-8", newline="\n")
     store.append(journal_events.TrialStarted(**trial_of(1)))
     assert store.recorder is not None
     store.recorder.start(1, 1, 1000.0)

@@ -67,7 +67,7 @@ def test_effects_cannot_be_read_in_the_receipt(begun: SessionStore) -> None:
     begun.close()
     held = receipt_of(begun)
     assert held["protocol"]["scene"]["velocity"] == {"kind": "kalman"}
-    text = begun.folder.receipt.read_text()
+    text = begun.folder.receipt.read_text("utf-8")
     assert "quagmire" not in text
     assert "unsteady_drag" not in text
     assert len(held["resolved"]) % 64 == 32  # a tag, and blocks

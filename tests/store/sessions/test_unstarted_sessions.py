@@ -90,7 +90,7 @@ def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
         start("P004")
     found = verify_study(left.path)
     assert (found.errors, found.warnings) == ((), ())
-    assert (place.path / "journal.jsonl").read_text().startswith('{"n":1,"event":"session_started"')
+    assert (place.path / "journal.jsonl").read_text("utf-8").startswith('{"n":1,"event":"session_started"')
 
 
 def test_who_fails_after_taking_it_over_leaves_no_folder(

@@ -61,7 +61,7 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
     copytree = shutil.copytree
 
     def copy_while_a_session_ends(*words: object, **options: object) -> object:
-        (lab / "fingerprints.txt").write_text("another line")
+        (lab / "fingerprints.txt").write_text("another line", encoding="utf-8", newline="\n")
         return copytree(*words, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr("shutil.copytree", copy_while_a_session_ends)
@@ -147,10 +147,10 @@ def test_a_withdrawal_by_a_computer_with_a_slow_clock_is_no_missing_session(
 
 def test_a_list_of_sites_of_format_1_is_read(labs: dict[str, Path], results: Path) -> None:
     merged = merge_sites({"A": labs["A"], "B": labs["B"]}, results / "pooled")
-    held = json.loads(merged.manifest.read_text())
+    held = json.loads(merged.manifest.read_text("utf-8"))
     for site in held["sites"]:
         del site["withdrawals"]
-    merged.manifest.write_text(json.dumps(held | {"format": 1}))
+    merged.manifest.write_text(json.dumps(held | {"format": 1}), encoding="utf-8", newline="\n")
     withdraw(merged.folder("A"), "P001", by="AK", reason="asked")
     assert verify_study(merged.path).is_sound
 
@@ -160,10 +160,12 @@ def unfinished(session: Path) -> None:
     path = session / "journal.jsonl"
     path.write_bytes(b"".join(path.read_bytes().splitlines(keepends=True)[:-1]))
     (session / "checksums.sha256").unlink()
-    receipt = json.loads((session / "receipt.json").read_text())
+    receipt = json.loads((session / "receipt.json").read_text("utf-8"))
     held = receipt | {"status": "unfinished", "reason": "", "ended_at": None}
-    (session / "receipt.json").write_text(json.dumps(held))
+    (session / "receipt.json").write_text(json.dumps(held), encoding="utf-8", newline="\n")
     fingerprints = session.parents[2] / "fingerprints.txt"
-    kept = [line for line in fingerprints.read_text().splitlines(keepends=True) if session.parent.name not in line]
-    fingerprints.write_text("".join(kept))
+    kept = [
+        line for line in fingerprints.read_text("utf-8").splitlines(keepends=True) if session.parent.name not in line
+    ]
+    fingerprints.write_text("".join(kept), encoding="utf-8", newline="\n")
     rebuild_session(session)

@@ -44,7 +44,9 @@ def test_a_new_version_of_the_study_renews_it(tmp_path: Path, protocol: Protocol
 
 
 def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Protocol) -> None:
-    (tmp_path / "dataset_description.json").write_text("{}")  # of a project, which may well hold results
+    (tmp_path / "dataset_description.json").write_text(
+        "{}", encoding="utf-8", newline="\n"
+    )  # of a project, which may well hold results
     results = StudyFolder(tmp_path / "results")
     study = StudyFolder(results.path / "brackish")
     study.data.mkdir(parents=True)

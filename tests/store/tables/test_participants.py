@@ -62,7 +62,7 @@ def test_a_journal_that_gives_no_row_stops_no_other_session_and_is_marked(
     store = finished("P001")
     lines = raw(journal.read(store.folder.journal))
     damage(lines)
-    store.folder.journal.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    store.folder.journal.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8", newline="\n")
     start("P002").finish("completed")
     first, second = table(tmp_path / "study")
     assert (first["participant"], first["session"], first["status"]) == ("P001", "1", "damaged")

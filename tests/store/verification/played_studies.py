@@ -113,7 +113,7 @@ def proved(folder: Path) -> Path:
     exclude(study, "P002", 1, trial=2, by="AK", reason="the phone rang")
     withdraw(study, "P003", by="AK", reason="asked by letter")
     unblind(study, "AK", "closed")
-    (study.parent / "kept.txt").write_text(proof_text(StudyFolder(study)))
+    (study.parent / "kept.txt").write_text(proof_text(StudyFolder(study)), encoding="utf-8", newline="\n")
     return study
 
 
@@ -268,7 +268,7 @@ class Changed(Files):
     def exchange(self, other: str) -> None:
         """Give each of two participants the answers of the other."""
         paths = self.journal, self.study / other / "journal.jsonl"
-        held = [[json.loads(line) for line in path.read_text().splitlines()] for path in paths]
+        held = [[json.loads(line) for line in path.read_text("utf-8").splitlines()] for path in paths]
         values = [[line["value"] for line in lines if line["event"] == "choice"] for lines in held]
 
         def give(lines: Lines, told: list[int]) -> None:
@@ -347,7 +347,7 @@ class Changed(Files):
     def elsewhere(self) -> None:
         """Leave the marker of a program of another machine."""
         marker = {"host": "elsewhere", "pid": 1, "began": "x"}
-        (self.study / P007 / ".open-0123abcd.json").write_text(json.dumps(marker))
+        (self.study / P007 / ".open-0123abcd.json").write_text(json.dumps(marker), encoding="utf-8", newline="\n")
 
 
 def player(made: dict[str, Path], folder: Path) -> Play:

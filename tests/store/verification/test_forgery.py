@@ -109,7 +109,7 @@ def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
     proofs = read_list(StudyFolder(study).fingerprints)
     assert proofs
     for proof, place in proofs:
-        lines = (study / place / "checksums.sha256").read_text().splitlines(keepends=True)
+        lines = (study / place / "checksums.sha256").read_text("utf-8").splitlines(keepends=True)
         proved = "".join(line for line in lines if "_data.csv" not in line and "rebuilt.txt" not in line)
         letters = base64.b32encode(hashlib.sha256(proved.encode()).digest()).decode().lower()
         assert proof.replace("-", "") == letters[:12]

@@ -29,7 +29,7 @@ def test_a_leak_is_found_wherever_it_is(tmp_path: Path, protocol: Protocol, star
     )
     store.write_tables()
     store.finish("completed")
-    (store.folder.path / "quagmire.txt").write_text("first\nfeel_quagmire is it")
+    (store.folder.path / "quagmire.txt").write_text("first\nfeel_quagmire is it", encoding="utf-8", newline="\n")
     session = "data/sub-P007/ses-01"
     assert found(tmp_path / "study", protocol) == [
         (f"{session}/journal.jsonl, line 2, text", "mildew"),
@@ -91,7 +91,9 @@ def test_levels_standards_and_comparisons_are_looked_for_in_every_unit(tmp_path:
     protocol = levels_study(*edits)
     comparison = 1.0713 + 1.0713 * 0.2371
     assert presented_numbers(protocol) == {1.0713, 0.2371, comparison}
-    (tmp_path / "notes.txt").write_text(f"level 0.2371\nnothing\nfelt {comparison!r} Pa s, or {comparison * 1000!r}")
+    (tmp_path / "notes.txt").write_text(
+        f"level 0.2371\nnothing\nfelt {comparison!r} Pa s, or {comparison * 1000!r}", encoding="utf-8", newline="\n"
+    )
     assert {place for place, _ in found(tmp_path, protocol)} == {"notes.txt, line 1", "notes.txt, line 3"}
     published = receipt.without_conditions(protocol)
     certain = certain_telltales({"liquids": {}, "conditions": {}}, published, presented_numbers(protocol))

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def protocol(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("protocol") / "levels.toml"
-    path.write_text(short_text())
+    path.write_text(short_text(), encoding="utf-8", newline="\n")
     return path
 
 
@@ -43,7 +43,7 @@ def session(study: Path, tmp_path: Path) -> Path:
 
 def test_levels_are_in_the_tables_only_after_unblinding(session: Path) -> None:
     def intervals() -> list[dict[str, str]]:
-        return [*csv.DictReader(io.StringIO(next(session.glob("*intervals*")).read_text()))]
+        return [*csv.DictReader(io.StringIO(next(session.glob("*intervals*")).read_text("utf-8")))]
 
     assert "level" not in intervals()[0]
     assert "force_mean_n" not in intervals()[0]
@@ -78,7 +78,7 @@ def test_compared_conditions_follow_from_the_key(tmp_path: Path) -> None:
     text = HEAD + BLOCK.replace("stimulus", "#").replace("method", "#")
     text += 'conditions = ["oil", "other", "late"]\nstandard = "oil"\nrepetitions = 2\n'
     path = tmp_path / "pairs.toml"
-    path.write_text(text.replace("min_s = 1", "min_s = 0.3"))
+    path.write_text(text.replace("min_s = 1", "min_s = 0.3"), encoding="utf-8", newline="\n")
     study = rehearse(path, participants=1, seed=2, results=tmp_path / "study", recordings=False)
     found = reproduce_session(next((study / "data").glob("sub-*/ses-*")))
     assert found.differences == []

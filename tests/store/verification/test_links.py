@@ -43,7 +43,7 @@ def test_a_study_that_is_called_by_a_path_is_not_exported(tmp_path: Path, finish
     for path in (finished.folder.receipt, finished.place.study_folder.description):
         held = json.loads(path.read_bytes())
         (held["protocol"]["study"] if "protocol" in held else held)["name"] = "../../../../ESCAPED"
-        path.write_text(json.dumps(held), encoding="utf-8")
+        path.write_text(json.dumps(held), encoding="utf-8", newline="\n")
     before = {path for path in tmp_path.rglob("*") if "out" not in path.parts}
     done = CliRunner().invoke(commands, ["export", str(tmp_path / "study"), "--to", str(tmp_path / "a" / "b" / "out")])
     assert isinstance(done.exception, AnalysisError | StoreError)
@@ -93,12 +93,14 @@ def test_an_endless_device_is_never_read(tmp_path: Path, finished: SessionStore,
         study = StudyFolder(tmp_path / "study")
         try:
             found = [str(one) for of in study.sessions() for one in session_discrepancies(Place(study, of, "brackish"))]
-            said.write_text("\n".join([*found, *map(str, verify_study(study.path).errors)]))
+            said.write_text(
+                "\n".join([*found, *map(str, verify_study(study.path).errors)]), encoding="utf-8", newline="\n"
+            )
         except StudyError as error:
-            said.write_text(str(error))
+            said.write_text(str(error), encoding="utf-8", newline="\n")
 
     assert forked(look) == 0
-    assert path.name in said.read_text()
+    assert path.name in said.read_text("utf-8")
 
 
 @needs_fork

@@ -48,10 +48,10 @@ def key_store(tmp_path: Path) -> Iterator[Path]:
         priority = 1
 
         def get_password(self, service: str, username: str) -> str | None:
-            return json.loads(held.read_text()).get(f"{service}/{username}") if held.exists() else None
+            return json.loads(held.read_text("utf-8")).get(f"{service}/{username}") if held.exists() else None
 
         def set_password(self, service: str, username: str, password: str) -> None:
-            held.write_text(json.dumps({f"{service}/{username}": password}))
+            held.write_text(json.dumps({f"{service}/{username}": password}), encoding="utf-8", newline="\n")
 
     before = keyring.get_keyring()
     keyring.set_keyring(InFile())
@@ -90,11 +90,11 @@ def test_the_page_lists_the_forgeries_and_what_tells_them() -> None:
 
 def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_its_own(study: Path) -> None:
     kept = study.parent / "kept.txt"
-    lines = [line.split()[1] for line in kept.read_text().splitlines()]
+    lines = [line.split()[1] for line in kept.read_text("utf-8").splitlines()]
     names = ["withdrawals.jsonl/sub-P003", "reveals.jsonl", "exclusions.csv/sub-P002"]
     assert lines == [P001, P001.replace("1/", "2/"), *names]
     typed = study.parent / "typed.txt"
-    typed.write_text(kept.read_text().upper())
+    typed.write_text(kept.read_text("utf-8").upper(), encoding="utf-8", newline="\n")
     assert verify_study(study, kept).errors == verify_study(study, typed).errors == ()
     (study / "blinding" / "reveals.jsonl").write_bytes(b"")
     assert "reveals.jsonl: lacks what" in "\n".join(map(str, verify_study(study, kept).errors))
@@ -103,15 +103,15 @@ def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_
     told = "\n".join(map(str, verify_study(study, kept).errors))
     line = said[-1].partition(":  ")[2]
     assert f"the withdrawal of P002 is not in {kept}: if P002 asked for it, add the line: {line}" in told
-    kept.write_text(f"{kept.read_text()}{line}\n")
+    kept.write_text(f"{kept.read_text('utf-8')}{line}\n", encoding="utf-8", newline="\n")
     assert "P002" not in "\n".join(map(str, verify_study(study, kept).errors))
 
 
 def test_a_misread_line_is_named(study: Path) -> None:
     kept = study.parent / "kept.txt"
-    first, *rest = kept.read_text().splitlines()
+    first, *rest = kept.read_text("utf-8").splitlines()
     other = ("b" if first[2] != "b" else "c").join((first[:2], first[3:]))
-    kept.write_text("\n".join([other, *rest]))
+    kept.write_text("\n".join([other, *rest]), encoding="utf-8", newline="\n")
     with pytest.raises(
         StoreError, match=r"kept.txt, line 1 was misread: its last two characters belong to another line"
     ):
@@ -125,12 +125,12 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
     found = verify_study(study, kept)
     assert found.errors == ()
     assert f"{kept} is signed with the key of this computer" in "\n".join(map(str, found.warnings))
-    whole = kept.read_text()
-    kept.write_text("".join(whole.splitlines(keepends=True)[1:]))
+    whole = kept.read_text("utf-8")
+    kept.write_text("".join(whole.splitlines(keepends=True)[1:]), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="was changed after it was signed"):
         verify_study(study, kept)
     key_store.unlink()
-    kept.write_text(whole)
+    kept.write_text(whole, encoding="utf-8", newline="\n")
     assert "compare it with your key" in "\n".join(read_proof(kept).told)
     proof_text(StudyFolder(study), sign=True)
     with pytest.raises(StoreError, match=r"signed with another key .* than this computer's: it was replaced"):
@@ -140,9 +140,9 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
 @pytest.mark.parametrize("forged", ["aaaa-aaaa-aaaa-aa withdrawals.jsonl/sub-P002", "P003", "# a comment"])
 def test_a_line_below_a_signature_is_refused(study: Path, key_store: Path, forged: str) -> None:
     kept = study.parent / "signed.txt"
-    kept.write_text(proof_text(StudyFolder(study), sign=True))
-    lines = len(kept.read_text().splitlines())
-    with kept.open("a") as file:
+    kept.write_text(proof_text(StudyFolder(study), sign=True), encoding="utf-8", newline="\n")
+    lines = len(kept.read_text("utf-8").splitlines())
+    with kept.open("a", encoding="utf-8", newline="\n") as file:
         file.write(f"\n{forged}\n")
     with pytest.raises(StoreError, match=rf"signed.txt, line {lines + 2} is below the signature or stamp"):
         verify_study(study, kept)
@@ -167,7 +167,9 @@ def server(tmp_path: Path) -> Iterator[str]:
         "[ca]\nbasicConstraints=critical,CA:TRUE\nkeyUsage=critical,keyCertSign\nsubjectKeyIdentifier=hash\n"
         f"[tsa]\ndefault_tsa=t\n[t]\nserial={tmp_path}/serial\nsigner_cert={tmp_path}/tsa.pem\n"
         f"signer_key={tmp_path}/tsa.key\nsigner_digest=sha256\ndefault_policy=1.2.3.4.1\ndigests=sha256,sha512\n"
-        "accuracy=secs:1\n"
+        "accuracy=secs:1\n",
+        encoding="utf-8",
+        newline="\n",
     )
 
     def openssl(*words: str) -> None:
@@ -213,12 +215,16 @@ def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
     found = verify_study(study, kept)
     assert found.errors == ()
     assert re.search(r"was stamped at 20\d\d-", "\n".join(map(str, found.warnings)))
-    whole = kept.read_text()
-    kept.write_text("".join(line for line in whole.splitlines(keepends=True)[1:] if not line.startswith("signature")))
+    whole = kept.read_text("utf-8")
+    kept.write_text(
+        "".join(line for line in whole.splitlines(keepends=True)[1:] if not line.startswith("signature")),
+        encoding="utf-8",
+        newline="\n",
+    )
     with pytest.raises(StoreError, match="was changed after it was stamped, or was stamped by another server"):
         verify_study(study, kept)
     workstation.save_settings(workstation.load_settings().model_copy(update={"stamp_root": None}))
-    kept.write_text(whole)
+    kept.write_text(whole, encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match=r"is stamped: give the server's root certificate"):
         verify_study(study, kept)
 

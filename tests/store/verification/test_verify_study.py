@@ -96,14 +96,14 @@ def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_
     content = json.loads(path.read_bytes())
     variables = [it for it in content["variableMeasured"] if it["name"] != "withheld_share"]
     variables[0] = variables[0] | {"description": "In other words.", "valuePattern": "(.*)"}
-    path.write_text(json.dumps(content | {"variableMeasured": variables}))
+    path.write_text(json.dumps(content | {"variableMeasured": variables}), encoding="utf-8", newline="\n")
     findings = verify_study(study)
     assert not any(error.place == path.name for error in findings.errors)
     assert "describes the columns as an earlier version of the program did" in warned(findings)
     at = next(index for index, it in enumerate(variables) if "minValue" in it and "unitText" in it)
     for change in ({"minValue": -5}, {"maxValue": 7}, {"unitText": "mile"}, {"@type": "y"}, None):
         changed = variables[1:] if change is None else [*variables[:at], variables[at] | change, *variables[at + 1 :]]
-        path.write_text(json.dumps(content | {"variableMeasured": changed}))
+        path.write_text(json.dumps(content | {"variableMeasured": changed}), encoding="utf-8", newline="\n")
         assert "differs from what this version writes" in told(verify_study(study))
 
 
@@ -112,7 +112,9 @@ def test_a_column_that_earlier_versions_did_not_write_cannot_be_taken_from_a_tab
     (path,) = (study / "data" / "sub-P007" / "ses-01").glob("*trials_data.csv")
     rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     at = rows[0].index("loop_delay_changes")
-    path.write_text("".join(f"{','.join([*row[:at], *row[at + 1 :]])}\n" for row in rows), encoding="utf-8")
+    path.write_text(
+        "".join(f"{','.join([*row[:at], *row[at + 1 :]])}\n" for row in rows), encoding="utf-8", newline="\n"
+    )
     assert f"{path.name}: has changed since the session ended" in told(verify_study(study))
 
 

@@ -38,7 +38,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     open_one = start("P011")
     (study / P007 / "crash.txt").touch()
     assert "crash" not in warned(verify_study(study))
-    (study / P007 / "crash.txt").write_text("Fatal Python error: Segmentation fault")
+    (study / P007 / "crash.txt").write_text("Fatal Python error: Segmentation fault", encoding="utf-8", newline="\n")
     findings = verify_study(study)
     open_one.close()
     for sentence in (

@@ -90,7 +90,7 @@ def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, resul
     shutil.copy(study / "fingerprints.txt", copy)
     done = erase(study)
     copy = copy.rename(results.parent / "fingerprints-kept.txt")
-    with copy.open("a") as kept:
+    with copy.open("a", encoding="utf-8", newline="\n") as kept:
         kept.write(checked_line(*proof_of_withdrawal(done.tombstone)))
     assert done.left == ()
     assert done.elsewhere == ()
@@ -106,18 +106,18 @@ def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, resul
 
 def test_the_tombstone_proves_which_session_was_erased(study: Path) -> None:
     session = study / "data" / f"sub-{PERSON}" / "ses-01"
-    listed = (study / "fingerprints.txt").read_text()
+    listed = (study / "fingerprints.txt").read_text("utf-8")
     sums = hashlib.sha256((session / "checksums.sha256").read_bytes()).hexdigest()
     first = (session / "journal.jsonl").read_bytes().splitlines(keepends=True)[0]
     erase(study)
-    (line,) = (study / "withdrawals.jsonl").read_text().splitlines()
+    (line,) = (study / "withdrawals.jsonl").read_text("utf-8").splitlines()
     held = json.loads(line)
     (erased,) = held.pop("sessions")
     assert held == {"participant": PERSON, "at": "2026-11-22T09:30:00+00:00", "by": "AK", "reason": "asked by letter"}
     assert erased["checksums"] == sums
     assert erased["begun"] == hashlib.sha256(first).hexdigest()
     assert f"{erased['fingerprint']}  data/sub-{PERSON}/ses-01\n" in listed
-    assert PERSON not in (study / "fingerprints.txt").read_text()
+    assert PERSON not in (study / "fingerprints.txt").read_text("utf-8")
     with pytest.raises(StoreError, match=r"participant p002 withdrew, .* \(next free: P004\)"):
         used_ids(StudyFolder(study)).check_unused("p002", 1)
 
@@ -156,7 +156,7 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
         (folder / where).write_bytes(b"\0" + PERSON.encode() + b"\xff")
     foreign = tmp_path / "disk" / "bids"
     (foreign / "data").mkdir(parents=True)
-    (foreign / "dataset_description.json").write_text('{"Name": "of another program"}')
+    (foreign / "dataset_description.json").write_text('{"Name": "of another program"}', encoding="utf-8", newline="\n")
     export(study, results / "tables", extras=["psych-ds"])  # deleted, since this machine wrote it there
     before = contents(shared)
     done = erase(study, also=[tmp_path])

@@ -62,7 +62,7 @@ def edited(folder: Path, text: str, edits: tuple[tuple[str, str], ...]) -> Path:
     for old, new in edits:
         assert old in text
         text = text.replace(old, new)
-    (folder / "levels.toml").write_text(text)
+    (folder / "levels.toml").write_text(text, encoding="utf-8", newline="\n")
     return folder / "levels.toml"
 
 

@@ -134,7 +134,11 @@ def test_a_session_that_stopped_goes_on_where_it_was_to_its_end(stopped, results
 
 def test_a_changed_protocol_is_refused_with_the_difference_and_nothing_changes(stopped, results, tmp_path):
     changed = tmp_path / "changed.toml"
-    changed.write_text(Path(stopped).read_text().replace('title = "Now reach"', 'title = "Reach now"'))
+    changed.write_text(
+        Path(stopped).read_text("utf-8").replace('title = "Now reach"', 'title = "Reach now"'),
+        encoding="utf-8",
+        newline="\n",
+    )
     before = events(results)
     with pytest.raises(StoreError, match="Reach now"):
         app.resume(results / "data" / "sub-P001" / "ses-01", protocol=str(changed), windowed=True)
@@ -144,7 +148,7 @@ def test_a_changed_protocol_is_refused_with_the_difference_and_nothing_changes(s
 def test_home_offers_first_to_go_on_with_a_session_that_stopped(stopped, results, monkeypatch):
     monkeypatch.chdir(Path(stopped).parent)
     Path("protocols").mkdir()
-    Path("protocols/demo.toml").write_text(Path(stopped).read_text())
+    Path("protocols/demo.toml").write_text(Path(stopped).read_text("utf-8"), encoding="utf-8", newline="\n")
     steps = []
 
     def step():

@@ -41,10 +41,12 @@ NAME = "zanzibar.mp4"
 def study(short_demo: str) -> Path:
     """Return a short demo in format 2 whose condition ``thick`` shows footage, and differs in nothing else."""
     path = Path(short_demo)
-    text = path.read_text().replace("format = 1", "format = 2", 1)
+    text = path.read_text("utf-8").replace("format = 1", "format = 2", 1)
     head = '[conditions.thick]\nliquid = "thick"\n'
     assert head in text
-    path.write_text(text.replace(head, f'[conditions.thick]\nliquid = "thin"\nview = "{NAME}"\n'))
+    path.write_text(
+        text.replace(head, f'[conditions.thick]\nliquid = "thin"\nview = "{NAME}"\n'), encoding="utf-8", newline="\n"
+    )
     return path
 
 
@@ -92,7 +94,9 @@ def test_footage_that_cannot_be_read_is_refused_and_nothing_is_created(study: Pa
 
 
 def test_a_camera_that_is_not_there_is_refused(study: Path, run: Any, results: Path) -> None:
-    study.write_text(study.read_text().replace(f'view = "{NAME}"', 'view = "camera"'))
+    study.write_text(
+        study.read_text("utf-8").replace(f'view = "{NAME}"', 'view = "camera"'), encoding="utf-8", newline="\n"
+    )
     workstation.save_settings(MachineSettings(camera="tcp://127.0.0.1:9"))
     with pytest.raises(
         SessionError, match=r"video: the camera tcp://127\.0\.0\.1:9 cannot be used: Connection refused"
@@ -192,7 +196,10 @@ def test_a_source_that_fails_in_a_trial_ends_in_zero_force(
     assert forces[0] is False
     assert offers[0] is True
     assert "broke" in {event["event"] for event in events(results)}
-    assert json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["status"] == "unfinished"
+    assert (
+        json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text("utf-8"))["status"]
+        == "unfinished"
+    )
     assert "the file is gone" in caplog.text
     caplog.clear()
 

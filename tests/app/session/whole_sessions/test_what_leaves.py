@@ -129,7 +129,7 @@ def test_what_was_typed_leaves_only_where_it_must(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    text = Path(short_demo).read_text()
+    text = Path(short_demo).read_text("utf-8")
     edits = (
         ("format = 1", "format = 2"),
         ('title = "A first look"', 'title = "zq_title"'),
@@ -142,7 +142,7 @@ def test_what_was_typed_leaves_only_where_it_must(
     for old, new in edits:
         assert old in text, old
         text = text.replace(old, new, 1)
-    Path(short_demo).write_text(text + ANSWER)
+    Path(short_demo).write_text(text + ANSWER, encoding="utf-8", newline="\n")
     place = str(tmp_path / "zq_{}" / "x.toml")
     told = MachineSettings(
         camera=f"tcp://zq_user:zq_password@127.0.0.1:{camera}",
@@ -189,6 +189,6 @@ def test_what_was_typed_leaves_only_where_it_must(
     (out / "export" / "psych-ds").rename(out / "psych-ds")
     for name, path in (("log", log_file()), ("receipt", folder.sessions()[0].receipt), ("list", folder.fingerprints)):
         shutil.copy(path, out / name)
-    (out / "markers" / "markers.txt").write_text("\n".join(map(str, collected.markers)))
+    (out / "markers" / "markers.txt").write_text("\n".join(map(str, collected.markers)), encoding="utf-8", newline="\n")
     assert {path.name: needles_in(path) for path in out.iterdir()} == LEAVES
     assert verify_study(results).errors == ()

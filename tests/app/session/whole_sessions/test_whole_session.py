@@ -46,7 +46,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     told = events(results)
     assert told[-1]["event"] == "session_ended"
     assert told[-1]["status"] == "completed"
-    proof, _, place = (results / "fingerprints.txt").read_text().rstrip().partition("  ")
+    proof, _, place = (results / "fingerprints.txt").read_text("utf-8").rstrip().partition("  ")
     assert place == "data/sub-P001/ses-01"
     assert lines[-2] == f"fingerprint of the session (also in the study's fingerprints.txt): {proof}"
     answers = rows(results, "responses")
@@ -59,7 +59,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     assert len(frames) == 4
     assert min(frames) > 5
     assert all(float(row["tick_rate_hz"]) > 500 for row in trials)  # whatever else the machine does
-    receipt = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())
+    receipt = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text("utf-8"))
     assert receipt["screens"]["participant"]["number"] == 1
     assert receipt["operator"] == "AK"
     assert kept_content(receipt["protocol_hash"]) == Path(short_demo).read_bytes()
@@ -68,7 +68,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     assert receipt["status"] == "completed"
     assert traced == [b""]
     assert not (folder / "crash.txt").exists()
-    assert "crash.txt" not in (folder / "checksums.sha256").read_text()
+    assert "crash.txt" not in (folder / "checksums.sha256").read_text("utf-8")
     assert lines[-1] == f"session completed: {results / 'data' / 'sub-P001' / 'ses-01'}"
 
 
@@ -133,7 +133,7 @@ def test_a_lost_device_ends_the_session_with_one_line(short_demo, results, monke
 )
 def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, monkeypatch, tmp_path, wrong, refused):
     monkeypatch.chdir(tmp_path)
-    Path("file").write_text("no folder")
+    Path("file").write_text("no folder", encoding="utf-8", newline="\n")
     with pytest.raises(refused) as error:
         app.run(short_demo, **{"participant": "P001", "windowed": True, "results": results} | wrong)
     assert "\n" not in str(error.value)
@@ -148,7 +148,7 @@ def test_the_receipt_says_what_is_set_for_the_machine_and_words_are_as_large_as_
     scales = []
     code, _ = attended(short_demo, results, Person(once=lambda participant: scales.append(participant.text_scale)))
     assert code == 0
-    told = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text())["screens"]
+    told = json.loads((results / "data" / "sub-P001" / "ses-01" / "receipt.json").read_text("utf-8"))["screens"]
     assert (told["participant"]["viewing_distance_mm"], told["participant"]["width_mm"]) == (1200, 150)
     assert told["participant"]["display_offset"] is None
     assert scales[0] > 1
@@ -191,7 +191,7 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
     assert "pilot" in seen[3]
     folder = tmp_path / "results" / "demo-pilot"
     assert not (tmp_path / "results" / "demo").exists()
-    assert json.loads((folder / "data" / "sub-test" / "ses-01" / "receipt.json").read_text())["pilot"] is True
+    assert json.loads((folder / "data" / "sub-test" / "ses-01" / "receipt.json").read_text("utf-8"))["pilot"] is True
 
 
 def test_the_preflight_is_told_before_anything_is_created(short_demo, results):

@@ -102,7 +102,7 @@ class TestKeeping:
     )
     def test_a_file_that_makes_no_sense_is_told_with_its_place(self, text):
         file = save_calibration("A", self.CALIBRATION)
-        file.write_text(text)
+        file.write_text(text, encoding="utf-8", newline="\n")
         with pytest.raises(DeviceError, match=r"falcon-A\.json.*calibrate again"):
             load_calibration("A")
 
@@ -112,6 +112,6 @@ class TestKeeping:
             load_calibration("A")
 
     def test_a_folder_that_is_a_file_is_told(self, folder):
-        folder.write_text("")
+        folder.write_text("", encoding="utf-8", newline="\n")
         with pytest.raises(DeviceError, match="LIQUID_STUDY_CONFIG"):
             save_calibration("A", self.CALIBRATION)
