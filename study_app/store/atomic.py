@@ -22,7 +22,7 @@ from study_app.errors import StoreError
 
 OLD_S = 3600.0  # longer than any time between the last write of a temporary file and its renaming
 _NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # error numbers of folders that cannot be flushed
-_REPLACE_AGAIN_S = (0.01, 0.05, 0.2)
+_MOVE_AGAIN_S = (0.01, 0.05, 0.2)
 _MOST_LEVELS = 64  # greatest depth of JSON, so that values can be processed recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not of hidden files: markers are created and removed
 
@@ -42,19 +42,20 @@ def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) ->
     """
     with _temporary_file(path, path) as half:
         write_new_file(half, content, waits=waits)
-        _replace_file(half, path)
+        move(half, path)
     if waits:
         flush_entry(path)
 
 
-def _replace_file(half: Path, path: Path) -> None:
-    """Rename over the old file; retry while a viewer or virus scanner holds it on Windows."""
-    for pause_s in _REPLACE_AGAIN_S:
+def move(half: Path, path: Path) -> None:
+    """Rename a folder, or a file over the old one; retry while a viewer or virus scanner holds it on Windows."""
+    rename = half.rename if half.is_dir() else half.replace
+    for pause_s in _MOVE_AGAIN_S:
         with contextlib.suppress(PermissionError):
-            half.replace(path)
+            rename(path)
             return
         time.sleep(pause_s)
-    half.replace(path)
+    rename(path)
 
 
 @contextlib.contextmanager
@@ -85,7 +86,7 @@ def create_folder(path: Path, files: Mapping[str, bytes], *, waits: bool = True,
             write_new_file(half / name, content, waits=waits, mode=mode)
         if waits:
             sync_folder(half)
-        half.rename(path)
+        move(half, path)
     except OSError as error:
         if any((path / name).exists() for name in files):
             return False
@@ -127,7 +128,7 @@ def copy_folder(folder: Path, to: Path) -> None:
     try:
         to.parent.mkdir(parents=True, exist_ok=True)
         shutil.copytree(folder, half)
-        half.rename(to)
+        move(half, to)
     except OSError as error:  # shutil.Error, too
         raise cannot_write(to, error) from error
     finally:

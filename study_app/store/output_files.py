@@ -19,6 +19,7 @@ from study_app.store.atomic import (
     append_line,
     cannot_write,
     make_folder,
+    move,
     open_regular,
     parse_json,
     remove_old_temporary_files,
@@ -43,8 +44,9 @@ class FileCopy(NamedTuple):
 def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, ...]:
     """Write ``files`` (name → content) into the folder ``to``, which is created; replace older files.
 
-    All are written under temporary names and flushed before the first is renamed, so that a full disk changes
-    nothing. Old temporary files of killed programs there are removed at the end.
+    All are written under temporary names and flushed before the first is renamed, so that neither a full disk nor a
+    file that another program has open changes anything. Old temporary files of killed programs there are removed at
+    the end.
 
     Raises
     ------
@@ -70,8 +72,10 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
                     os.fsync(file.fileno())
             else:
                 write_new_file(staged[name], content)
+        for name in files:
+            _refuse_open_file(to / name)
         for name, path in staged.items():
-            path.replace(to / name)
+            move(path, to / name)
     except (OSError, AnalysisError) as error:
         for path in staged.values():
             with contextlib.suppress(OSError):
@@ -89,6 +93,18 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
     for folder in {path.parent for path in staged.values()}:
         remove_old_temporary_files(folder)
     return tuple(to / name for name in files)
+
+
+def _refuse_open_file(path: Path) -> None:
+    """Raise an error for an existing file that another program has open: Windows does not rename it, even to itself."""
+    if path.exists():
+        try:
+            move(path, path)
+        except PermissionError as error:
+            raise AnalysisError(
+                f"{path} cannot be replaced ({system_message(error)}): close the program that has it open, or choose "
+                "another folder with --to; nothing was written"
+            ) from error
 
 
 def _file_parts(copied: FileCopy) -> Iterator[bytes]:

@@ -22,6 +22,7 @@ from study_app.store.atomic import (
     cannot_write,
     is_there,
     make_folder,
+    move,
     remove_old_temporary_files,
     sync_folder,
     temporary_path,
@@ -41,7 +42,7 @@ from study_app.store.journals.journal import FORMAT, Journal, SessionClock
 from study_app.store.journals.journal_events import Allocated, SessionStarted, start_of
 from study_app.store.recorder import Recorder
 from study_app.store.sessions.open_session import Place, SessionStore
-from study_app.store.tables.study_files import check_study, write_description, write_participants
+from study_app.store.tables.study_files import check_study, update_participants, write_description
 from study_app.store.withdrawals import tombstones
 
 _MAX_ID_LENGTH = 32
@@ -397,7 +398,7 @@ def _unclaim(place: Place, opening: Opening) -> None:
     path = place.folder.path
     away = temporary_path(path)
     with contextlib.suppress(OSError):
-        path.rename(away)
+        move(path, away)
     shutil.rmtree(away if is_there(away) else path, ignore_errors=True)
     opening.release()
     _remove_if_empty(path.parent)
@@ -435,7 +436,7 @@ def _open(
         store.write_tables()
         if store.behind is not None:
             raise store.behind
-        write_participants(place.study_folder, place.study)
+        update_participants(place.study_folder, place.study)
         write_description(
             place.study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions)
         )

@@ -31,7 +31,7 @@ from study_app.store.missing_trials import MissingTrials
 from study_app.store.progress import progress_of
 from study_app.store.recorder import LEAVING_S, Kept, Recorder
 from study_app.store.tables import session_tables
-from study_app.store.tables.study_files import write_participants
+from study_app.store.tables.study_files import update_participants
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +216,7 @@ class SessionStore:
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1].at}
         self.write_tables()
         failures = [] if self.behind is None else [self.behind]
-        table = partial(write_participants, self.place.study_folder, self.place.study)
+        table = partial(update_participants, self.place.study_folder, self.place.study)
         for write in (self._write_proofs, table, self._exclude_if_incomplete):
             try:
                 write()

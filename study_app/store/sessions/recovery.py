@@ -43,7 +43,7 @@ from study_app.store.recorder import lost_event, recorded_event, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, session_environment
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
 from study_app.store.tables import session_tables
-from study_app.store.tables.study_files import write_description, write_participants
+from study_app.store.tables.study_files import update_participants, write_description, write_participants
 
 RESTORE = "restore the journal from a copy"
 _SHOWN_DIFFERENCES = 6
@@ -148,7 +148,7 @@ def reopen_store(
         store.note_resumed(entry)
         store.write_tables()
         write_description(study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions))
-        write_participants(study_folder, left.place.study)
+        update_participants(study_folder, left.place.study)
         failing.pop_all()
     return store
 

@@ -30,7 +30,7 @@ from study_app.store.journals.journal import SessionClock, line_bytes, line_of
 from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain_json, read_event, start_of
 from study_app.store.sessions.begin import SessionStart, check_participant, first_records, used_ids
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables.study_files import check_study, write_description, write_participants
+from study_app.store.tables.study_files import check_study, update_participants, write_description
 
 
 class SimulatedStudy:
@@ -139,7 +139,7 @@ class SimulatedStudy:
     ) -> None:
         """Update the participants table with the finished sessions."""
         try:
-            write_participants(self.folder, self.protocol.study.name)
+            update_participants(self.folder, self.protocol.study.name)
         finally:
             if self._opening is not None:
                 self._opening.release()

@@ -21,6 +21,7 @@ from study_app.store.atomic import (
     cannot_write,
     flush_entry,
     is_there,
+    move,
     open_regular,
     paths_in,
     refuse_special_files,
@@ -236,7 +237,7 @@ def _create_merged(merged: Merged, sources: tuple[_Source, ...], progress: Repor
         sync_folder(half)
         if target.is_dir():
             target.rmdir()
-        half.rename(target)
+        move(half, target)
     except OSError as error:  # shutil.Error, too
         raise cannot_write(merged.path, error) from error
     finally:
@@ -257,7 +258,7 @@ def _add_sites(merged: Merged, sources: tuple[_Source, ...], progress: ReportPro
             half = temporary_path(copy)
             copies.append(half)
             _copy(source, half, progress)
-            half.rename(copy)
+            move(half, copy)
             copies[-1] = copy
         sync_folder(place)
         write_file(merged.manifest, merged.content())

@@ -7,6 +7,7 @@ headers included, before this file.
 
 import contextlib
 import json
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -131,6 +132,19 @@ def write_participants(folder: StudyFolder, study: str) -> None:
         if again == content:
             return
         content = again
+
+
+def update_participants(folder: StudyFolder, study: str) -> None:
+    """Update the table as `write_participants`, except while another program has it open (Excel on Windows).
+
+    It is made from the journals alone, so a session does not wait for it: the next session or rebuild writes it.
+    """
+    try:
+        write_participants(folder, study)
+    except StoreError as error:
+        if not (isinstance(error.__cause__, PermissionError) and folder.participants(study).is_file()):
+            raise
+        logging.getLogger(__name__).warning("%s; the next session writes it, or liquid-study rebuild", error)
 
 
 def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:

@@ -98,7 +98,7 @@ def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) 
     assert rows_of(store, "trials")[0]["recording"] == "n/a"
 
 
-@pytest.mark.parametrize("written", ["write_participants", "write_file", "receipt.write", "write_checksums"])
+@pytest.mark.parametrize("written", ["update_participants", "write_file", "receipt.write", "write_checksums"])
 def test_an_end_that_was_half_written_is_finished_by_another_call(
     start: Start, monkeypatch: pytest.MonkeyPatch, written: str
 ) -> None:

@@ -1,0 +1,75 @@
+"""What Windows refuses, for tests on other systems."""
+
+import io
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+LONGEST_PATH = 259  # characters; the 260th ends the text
+RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
+
+
+def is_valid_on_windows(name: str) -> bool:
+    """Return whether Windows can have a file or folder with this name, by Microsoft's rules for file names."""
+    stem = name.partition(".")[0].rstrip(" ").lower()
+    return stem not in RESERVED and name[-1:] not in {".", " "} and not set(name) & set('<>:"/\\|?*')
+
+
+class Windows:
+    """The files that other programs have open, and how often each refused a change; ``calls`` limits refusals."""
+
+    def __init__(self) -> None:
+        self.held: dict[Path, int] = {}
+        self.refused: list[Path] = []
+
+    @contextmanager
+    def hold(self, path: Path, calls: int = 10_000) -> Iterator[None]:
+        """Have ``path`` open in another program, as Excel has a table, for at most so many refusals."""
+        self.held[path.resolve()] = calls
+        try:
+            yield
+        finally:
+            self.held.pop(path.resolve(), None)
+
+    def check(self, *paths: Any) -> None:
+        """Raise the error of Windows if one of the paths is, or contains, an open file, or cannot exist there."""
+        for path in map(Path, paths):
+            for name in path.resolve().relative_to(path.resolve().anchor).parts:
+                if not is_valid_on_windows(name):
+                    raise OSError(22, "Invalid argument", str(path))
+            for held in [held for held, calls in self.held.items() if calls and held.is_relative_to(path.resolve())]:
+                self.held[held] -= 1
+                self.refused.append(held)
+                raise PermissionError(13, "Permission denied", str(path))
+
+
+@pytest.fixture
+def windows(monkeypatch: pytest.MonkeyPatch) -> Windows:
+    """Refuse to rename, replace, delete or write files that another program has open, as Windows does."""
+    rules = Windows()
+
+    def refuse(name: str, checked: int) -> None:
+        real: Callable[..., Any] = getattr(os, name)
+
+        def call(*paths: Any, **given: Any) -> Any:
+            rules.check(*paths[:checked])
+            return real(*paths, **given)
+
+        monkeypatch.setattr(os, name, call)
+
+    for name, checked in (("rename", 2), ("replace", 2), ("unlink", 1), ("remove", 1), ("mkdir", 1)):
+        refuse(name, checked)
+    opened = io.open
+
+    def open_file(file: Any, mode: str = "r", *words: Any, **given: Any) -> Any:
+        if not isinstance(file, int) and set(mode) & set("wax+"):
+            rules.check(file)
+        return opened(file, mode, *words, **given)
+
+    monkeypatch.setattr(io, "open", open_file)
+    monkeypatch.setattr("builtins.open", open_file)
+    return rules
