@@ -307,7 +307,7 @@ class WindowsThread(QObject):
         asked()
 
     def _start_timer(self, period_ms: int, count: int, fire: Callable[[], object], fired: Future[int]) -> None:
-        timer, left, start_ns = QTimer(self, timerType=Qt.TimerType.PreciseTimer), count, time.monotonic_ns()
+        timer, left, start_ns = QTimer(self, timerType=Qt.TimerType.PreciseTimer), count, time.perf_counter_ns()
 
         def tick() -> None:
             nonlocal left
@@ -364,7 +364,7 @@ class _Painting(QObject):
             reach_m=max(protocol.device.workspace_m) / 2,
             pointer=False,
         )
-        participant = ParticipantWindow(words("en"), clock=time.monotonic, windowed=shown_on is operated_on)
+        participant = ParticipantWindow(words("en"), clock=time.perf_counter, windowed=shown_on is operated_on)
         place_window(operator, operated_on, corner=shown_on is operated_on)
         task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="The servo is being timed.")
         self._page = TaskPage(
@@ -381,7 +381,7 @@ class _Painting(QObject):
         self.operator.show()
         self.participant.open_on(choose_screens(None)[0])
         self.participant.show_page(self._page)
-        self._began_ns = time.monotonic_ns()
+        self._began_ns = time.perf_counter_ns()
         for timer in self._timers:
             timer.start()
 
@@ -405,7 +405,7 @@ class _Painting(QObject):
     def _draw_frame(self) -> None:
         """Advance the hand by the time since the last frame and draw it."""
         now_ns = self._servo.now_ns()
-        behind = (time.monotonic_ns() - self._began_ns) // 1_000_000 - now_ns // 1_000_000
+        behind = (time.perf_counter_ns() - self._began_ns) // 1_000_000 - now_ns // 1_000_000
         self._servo.advance(int(min(max(behind, 1), _LONGEST_FRAME_TICKS)))
         self.health.add_samples(self._reader.read())
         position_m, shown_ns = self._servo.telemetry.position_at(self._servo.now_ns())
@@ -415,4 +415,4 @@ class _Painting(QObject):
 
     def _count_frame(self, _sample_ns: int) -> None:
         self.frames += 1
-        self.health.add_frame(time.monotonic_ns())
+        self.health.add_frame(time.perf_counter_ns())

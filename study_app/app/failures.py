@@ -186,12 +186,12 @@ class Patience:
     """How long several waits may take together [s]."""
 
     def __init__(self, seconds: float) -> None:
-        self._until_s = time.monotonic() + seconds
+        self._until_s = time.perf_counter() + seconds
 
     @property
     def left_s(self) -> float:
         """The remaining time [s]; never negative."""
-        return max(self._until_s - time.monotonic(), 0.0)
+        return max(self._until_s - time.perf_counter(), 0.0)
 
 
 def log_off_signal() -> SignalInstance:

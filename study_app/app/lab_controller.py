@@ -154,7 +154,7 @@ class LabOpening(QObject):
     @property
     def elapsed_s(self) -> float:
         """The time since the device began to open [s]; 0 if none is being opened."""
-        return time.monotonic() - self._began_s if self._background.busy and self._wanted is not None else 0.0
+        return time.perf_counter() - self._began_s if self._background.busy and self._wanted is not None else 0.0
 
     def request_device(self, name: str) -> None:
         """Open a device; cancel one that is still being opened."""
@@ -176,7 +176,7 @@ class LabOpening(QObject):
 
     def _start_opening(self) -> None:
         assert self._wanted is not None  # noqa: S101 - begun only where something is wanted
-        self._cancelled, self._began_s = threading.Event(), time.monotonic()
+        self._cancelled, self._began_s = threading.Event(), time.perf_counter()
         self._background.run(partial(self._open_device, self._wanted, self._cancelled))
 
     def _open_device(self, name: str, cancelled: threading.Event) -> tuple[object, threading.Event]:

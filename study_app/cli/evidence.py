@@ -547,8 +547,8 @@ _SAID_EVERY_S: Final = 20.0
 
 def _timed_lines() -> Callable[[str], None]:
     """Return a function that writes a line on standard error, with the seconds since now."""
-    begun = time.monotonic()
-    return lambda text: click.echo(f"{time.monotonic() - begun:.0f} s: {text}", err=True)
+    begun = time.perf_counter()
+    return lambda text: click.echo(f"{time.perf_counter() - begun:.0f} s: {text}", err=True)
 
 
 def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
@@ -557,8 +557,8 @@ def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
 
     def say_sometimes(text: str) -> None:
         nonlocal said
-        if time.monotonic() - said >= _SAID_EVERY_S:
-            said = time.monotonic()
+        if time.perf_counter() - said >= _SAID_EVERY_S:
+            said = time.perf_counter()
             say(text)
 
     return say_sometimes
@@ -593,20 +593,20 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 
     make_output_folder(to)
     rates: tuple[Rate, ...] = ()
-    begun, done = time.monotonic(), 0
+    begun, done = time.perf_counter(), 0
     say = _timed_lines()
     try:
         with progress(_at_intervals(say)) as show, executor_for(workers) as executor:
             show("rehearsing every condition")
             protocol = load("rek2024")
             studied = plan(protocol, condition_features(protocol, seed=seed))
-            begun = time.monotonic()
+            begun = time.perf_counter()
             for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
                 rates = so_far
                 show(f"{done} studies")
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
-    _present_evidence(evidence(rates, f"{done} studies in {time.monotonic() - begun:.0f} s"), to)
+    _present_evidence(evidence(rates, f"{done} studies in {time.perf_counter() - begun:.0f} s"), to)
 
 
 @click.command()
@@ -647,11 +647,11 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
     except ValueError as error:
         raise click.UsageError(str(error)) from error
     make_output_folder(to)
-    begun, say = time.monotonic(), _timed_lines()
+    begun, say = time.perf_counter(), _timed_lines()
     with progress(_at_intervals(say)) as show, executor_for(workers) as executor:
         verdicts = validate_values(chosen, studies, seeds, executor, show, say)
     used_s = sum(os.times()[:4])  # with the workers', which have ended
-    took = f"{time.monotonic() - begun:.0f} s, {used_s:.0f} s of processor time"
+    took = f"{time.perf_counter() - begun:.0f} s, {used_s:.0f} s of processor time"
     heading = f"{studies} studies of each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
     _present_evidence(evidence(verdicts, heading), to)
 

@@ -75,7 +75,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         study = load.load(protocol, delay_ticks=delay_ticks)
         camera = workstation.load_or_default()[0].camera
         file = protocol_file(protocol)
-        missing = missing_on_computer(study, file.parent, camera, time.monotonic_ns)
+        missing = missing_on_computer(study, file.parent, camera, time.perf_counter_ns)
         click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
         document, _ = load.read_document(load.source_bytes(protocol), protocol)
         for sentence in (*undelivered_levels(study), *describe_untranslated(document, lists_places=True)):

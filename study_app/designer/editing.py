@@ -128,7 +128,7 @@ class Editing(QObject):
 
     def _note_edit(self) -> None:
         if self.opened is not None:
-            self.opened.note_edit(time.monotonic())
+            self.opened.note_edit(time.perf_counter())
             self.announce_edit()
 
     def announce_edit(self) -> None:

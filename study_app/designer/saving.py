@@ -146,7 +146,7 @@ class Saving(QObject):
             return
         self._show_notice(None)
         if action == "keep":
-            self._try_action(opened, lambda: opened.keep_edits(time.monotonic()))
+            self._try_action(opened, lambda: opened.keep_edits(time.perf_counter()))
         elif action == "take":
             self._try_action(opened, opened.take_file_content)
         else:
@@ -251,7 +251,7 @@ class Saving(QObject):
         if opened is None:
             return
         try:
-            written = opened.write_draft(None if at_once else time.monotonic())
+            written = opened.write_draft(None if at_once else time.perf_counter())
         except StudyError as error:
             self._drafting.setInterval(_RETRY_MS)
             if self._trouble != str(error):

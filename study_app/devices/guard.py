@@ -177,12 +177,12 @@ def watch_program(name: str, ends_force: str, *arguments: str) -> int:
     sys.stdout.flush()
     if sys.stdin.buffer.read().endswith(_WORD):
         return 0
-    ends_s = time.monotonic() + PATIENCE_S
+    ends_s = time.perf_counter() + PATIENCE_S
     while True:
         try:
             end_force(*arguments)
         except DeviceError as error:
-            if time.monotonic() > ends_s:
+            if time.perf_counter() > ends_s:
                 sys.stderr.write(f"the device '{name}' may still push: {error}; turn it off\n")
                 return 2
         else:

@@ -151,8 +151,8 @@ def paced(
     seconds: float, every_s: float, *, ending: threading.Event, progress: Callable[[str], object]
 ) -> Iterator[int]:
     """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once."""
-    began_s, shown, number = time.monotonic(), -1, 0
-    while (share := (time.monotonic() - began_s) / seconds) < 1:
+    began_s, shown, number = time.perf_counter(), -1, 0
+    while (share := (time.perf_counter() - began_s) / seconds) < 1:
         if ending.is_set():
             raise KeyboardInterrupt
         if int(100 * share) > shown:

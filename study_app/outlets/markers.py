@@ -12,7 +12,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
-from time import monotonic
+from time import perf_counter
 from typing import Any, Final, Protocol
 
 from study_app.errors import OutletError
@@ -171,7 +171,7 @@ class SinkThread:
             if self.lost or self._closing:
                 return
             since_s = self._since_s  # read once: the thread clears it at any time
-            taken_s = 0.0 if since_s is None else monotonic() - since_s
+            taken_s = 0.0 if since_s is None else perf_counter() - since_s
             if taken_s > HANGS_S:
                 self._give_up(f"a marker was not sent in {taken_s:.1f} s (limit {HANGS_S:g} s): {_ADVICE}")
             elif len(self._waiting) >= ROOM:
@@ -212,7 +212,7 @@ class SinkThread:
             self._changed.wait_for(lambda: self._waiting or self._closing or self.lost)
             if not self._waiting:
                 return None
-            self._since_s = monotonic()
+            self._since_s = perf_counter()
             return self._waiting.popleft()
 
 
@@ -277,12 +277,12 @@ class TriggerSink:
         """Send the code of an event, and 0 after `HIGH_S`; an event without a code sends nothing."""
         if marker.byte is None:
             return
-        time.sleep(max(0.0, self._clear - time.monotonic()))
+        time.sleep(max(0.0, self._clear - time.perf_counter()))
         self._port.write(marker.byte)
         self.delays_ns.append(self._now_ns() - marker.time_ns)
         time.sleep(HIGH_S)
         self._port.write(0)
-        self._clear = time.monotonic() + LOW_S
+        self._clear = time.perf_counter() + LOW_S
 
     def close(self) -> None:
         self._port.close()

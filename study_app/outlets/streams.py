@@ -101,11 +101,11 @@ class ClockMapping:
                 self._low_s, self._high_s = low_s, high_s
             else:
                 self._low_s, self._high_s = max(low_s, self._low_s), min(high_s, self._high_s)
-        self._due_s = time.monotonic() + _MEASURE_EVERY_S
+        self._due_s = time.perf_counter() + _MEASURE_EVERY_S
 
     def measure_if_due(self) -> None:
         """Measure it again if the last measurement is older than `_MEASURE_EVERY_S`."""
-        if time.monotonic() >= self._due_s:
+        if time.perf_counter() >= self._due_s:
             self.measure()
 
     @property

@@ -183,13 +183,13 @@ class Recorder:
         Then `close` returns at once.
         """
         self._end()
-        return not self._is_running() or time.monotonic() >= self._patient_until_s
+        return not self._is_running() or time.perf_counter() >= self._patient_until_s
 
     def _end(self, patience_s: float = PATIENCE_S) -> None:
         self.stop()
         with self.changed:
             if not self._closing:
-                self._patient_until_s = time.monotonic() + patience_s
+                self._patient_until_s = time.perf_counter() + patience_s
             self._closing = True
             self.changed.notify_all()
 
@@ -197,7 +197,7 @@ class Recorder:
         """End the running recording and wait up to ``patience_s`` until it is written; see `collect_results`."""
         self._end(patience_s)
         if self.thread is not None:
-            self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.monotonic())))
+            self.thread.join(max(0.0, min(patience_s, self._patient_until_s - time.perf_counter())))
         with self.changed:
             reason = "the disk was too slow" if self._is_running() else "its thread had ended"
             self._kept += [lost_event(which, reason) for which in self._expected]

@@ -218,7 +218,7 @@ class _Numbers:
 
 def _age_ns(stamp_s: float | None) -> int | None:
     """Return the age of a frame with this time stamp [ns], by the system clock of the stamps."""
-    for clock in (time.monotonic, time.time):
+    for clock in (time.perf_counter, time.time):
         if stamp_s is not None and -0.001 <= (age_s := clock() - stamp_s) < _MOST_AGE_S:
             return max(0, round(age_s * SECOND_NS))
     return None

@@ -92,10 +92,10 @@ def test_a_signal_waits_two_seconds_at_most_for_a_device_that_is_being_opened(
     monkeypatch.setattr(live_session, "open_rig", hang)
     visit.window.place("home").session_asked.emit(CHOSEN)
     assert opening.wait(10)
-    begun = time.monotonic()
+    begun = time.perf_counter()
     visit.end_by_signal(15)
     visit.end()
-    took_s = time.monotonic() - begun
+    took_s = time.perf_counter() - begun
     may_open.set()
     assert took_s < 2.0 + 1.0
     assert visit.code == 128 + 15

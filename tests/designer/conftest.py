@@ -25,8 +25,8 @@ def designer(qtbot: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Ite
 def story(designer: Designer, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Story]:
     """Return what begins a story: the participant's page stands still, typing is one step, and drafts are due."""
     for module in ("document.document", "editing", "participant.preview"):
-        monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(monotonic=lambda: 1000.0))
-    monkeypatch.setattr("study_app.designer.saving.time", SimpleNamespace(monotonic=lambda: 2000.0))
+        monkeypatch.setattr(f"study_app.designer.{module}.time", SimpleNamespace(perf_counter=lambda: 1000.0))
+    monkeypatch.setattr("study_app.designer.saving.time", SimpleNamespace(perf_counter=lambda: 2000.0))
     for timer in ("saving.DRAFT", "form.fields.HAND_ON", "form.fields.CLICK", "file.HAND_ON", "problems.REST"):
         monkeypatch.setattr(f"study_app.designer.{timer}_MS", NEVER_MS)  # each is let go by the story, after an act
     spoken: list[str] = []

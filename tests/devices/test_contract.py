@@ -392,7 +392,7 @@ from study_app.devices.registry import open_device
 from tests.devices.subjects import Ticks
 device = open_device(sys.argv[1], options=json.loads(sys.argv[2]))
 print("pushes", flush=True)
-ticks = Ticks(device, time.monotonic_ns(), 0.001)
+ticks = Ticks(device, time.perf_counter_ns(), 0.001)
 while True:
     ticks.take((0.0, 0.0, 2.0))
 """

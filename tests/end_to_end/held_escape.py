@@ -142,8 +142,8 @@ def count_stops(bench: SessionBench | LabBench, delay_ms: int | None, attempts: 
         bench.xdotool("keydown", "Escape")
         time.sleep(HOLD_S)
         bench.xdotool("keyup", "Escape")
-        deadline = time.monotonic() + SEEN_S
-        while bench.counts().stopped == before.stopped and time.monotonic() < deadline:
+        deadline = time.perf_counter() + SEEN_S
+        while bench.counts().stopped == before.stopped and time.perf_counter() < deadline:
             time.sleep(0.02)
         bench.xdotool("key", "Return")
         time.sleep(0.2)

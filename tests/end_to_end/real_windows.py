@@ -46,9 +46,9 @@ def virtual_display(*more: str, size: tuple[int, int] = (1920, 1080)) -> Iterato
 
 def wait_for(found: Callable[[], object], what: str, seconds: float = 60.0) -> None:
     """Look again and again until ``found()``: another process offers no signal to wait for."""
-    deadline, pause = time.monotonic() + seconds, threading.Event()
+    deadline, pause = time.perf_counter() + seconds, threading.Event()
     while not found():
-        assert time.monotonic() < deadline, f"waited {seconds:g} s in vain for {what}"
+        assert time.perf_counter() < deadline, f"waited {seconds:g} s in vain for {what}"
         pause.wait(0.05)
 
 
@@ -122,8 +122,8 @@ class Program:
 
         def click() -> bool:
             self.click(window, place)
-            deadline = time.monotonic() + 3.0
-            while not self.windows(title) and time.monotonic() < deadline:
+            deadline = time.perf_counter() + 3.0
+            while not self.windows(title) and time.perf_counter() < deadline:
                 threading.Event().wait(0.1)
             return bool(self.windows(title))
 

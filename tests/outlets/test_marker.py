@@ -89,7 +89,7 @@ def test_a_failure_is_kept_and_later_markers_are_dropped() -> None:
 
 
 class Clock:
-    """Stands in for ``monotonic``; `read` is called when a test's own thread reads it."""
+    """Stands in for ``perf_counter``; `read` is called when a test's own thread reads it."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -106,7 +106,7 @@ class Clock:
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Replace the clock of sinks."""
     made = Clock()
-    monkeypatch.setattr(module, "monotonic", made)
+    monkeypatch.setattr(module, "perf_counter", made)
     return made
 
 
@@ -210,7 +210,7 @@ def test_it_is_measured_again_when_it_is_due(monkeypatch: pytest.MonkeyPatch) ->
     clocks.offset_s = 3.0
     mapping.measure_if_due()
     assert mapping.offset_s == pytest.approx(2.0, abs=1e-5)
-    monkeypatch.setattr("study_app.outlets.streams.time.monotonic", lambda: float("inf"))
+    monkeypatch.setattr("study_app.outlets.streams.time.perf_counter", lambda: float("inf"))
     mapping.measure_if_due()
     assert mapping.offset_s == pytest.approx(3.0, abs=mapping.uncertainty_s)
     assert mapping.uncertainty_s < 2e-6

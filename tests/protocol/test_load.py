@@ -231,9 +231,9 @@ def test_the_fade_belongs_to_format_2(tmp_path: Path) -> None:
 def test_a_file_that_is_larger_than_any_study_is_refused_at_once(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "large.toml"
     file.write_bytes(content)
-    begun_s = time.monotonic()
+    begun_s = time.perf_counter()
     with pytest.raises(ProtocolError, match=r"has 1\.\d MB; a study has at most 1 MB"):
         load(str(file))
     with pytest.raises(ProtocolError, match="check that it is a study file"):
         parse(content, "large")
-    assert time.monotonic() - begun_s < 2.0
+    assert time.perf_counter() - begun_s < 2.0

@@ -60,16 +60,16 @@ def main() -> None:
         stream = container.add_stream("mjpeg", rate=RATE_HZ)
         stream.width, stream.height, stream.pix_fmt = width, height, "yuvj420p"
         stream.time_base = stream.codec_context.time_base = microsecond
-        began = time.monotonic()
+        began = time.perf_counter()
         for number, frame in enumerate(frames):
-            time.sleep(max(0.0, began + number / RATE_HZ - time.monotonic()))
-            now = time.monotonic()
+            time.sleep(max(0.0, began + number / RATE_HZ - time.perf_counter()))
+            now = time.perf_counter()
             stamp = now - began if asked.relative else now - 1e-3 * asked.age_ms
             frame.pts, frame.time_base = round(1e6 * stamp), microsecond
             packets = stream.encode(frame)
             if asked.lose and number % asked.lose == asked.lose - 1:
                 continue
-            sent.append(f"{number} {time.monotonic()}")
+            sent.append(f"{number} {time.perf_counter()}")
             container.mux(packets)
     if asked.prints:
         sys.stdout.write("\n".join(sent))

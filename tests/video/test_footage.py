@@ -43,8 +43,8 @@ def pixels_of(frame: Any) -> Any:
 
 def shown(footage: Footage, moment_ns: int, number: int | None = None) -> Any:
     """Return the frame of a moment, once it, or the one of a number, is decoded."""
-    until = time.monotonic() + 10
-    while time.monotonic() < until:
+    until = time.perf_counter() + 10
+    while time.perf_counter() < until:
         frame = footage.frame_at(moment_ns)
         if frame is not None and number in (None, frame.number):
             return frame

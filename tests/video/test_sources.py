@@ -83,10 +83,10 @@ def test_a_camera_that_fails_before_its_first_frame_is_refused_at_once(monkeypat
         raise OSError("device is busy")
 
     monkeypatch.setattr(sources, "open_video", refuse)
-    began = time.monotonic()
+    began = time.perf_counter()
     with pytest.raises(VideoError, match="v4l2:/dev/video9 cannot be used: device is busy"):
-        Camera("v4l2:/dev/video9", time.monotonic_ns, 0.5)
-    assert time.monotonic() - began < sources.OPENS_S / 2
+        Camera("v4l2:/dev/video9", time.perf_counter_ns, 0.5)
+    assert time.perf_counter() - began < sources.OPENS_S / 2
 
 
 def videos(study: Protocol, camera: str = "v4l2:/dev/video0") -> Videos:
@@ -245,7 +245,7 @@ def test_a_video_that_stops_can_be_reconnected() -> None:
 def test_the_age_of_a_frame_is_by_the_clock_that_its_stamp_is_from(
     stamp_s: float | None, age_ns: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sources, "time", SimpleNamespace(monotonic=lambda: 100.0, time=lambda: 1e6))
+    monkeypatch.setattr(sources, "time", SimpleNamespace(perf_counter=lambda: 100.0, time=lambda: 1e6))
     assert sources._age_ns(stamp_s) == age_ns
 
 

@@ -38,17 +38,17 @@ class Camera:
         StudyError
             It did not come.
         """
-        deadline = time.monotonic() + PATIENCE_S
+        deadline = time.perf_counter() + PATIENCE_S
         while not (it := found()):
-            if time.monotonic() > deadline:
+            if time.perf_counter() > deadline:
                 raise StudyError(f"no picture could be taken: {what} did not appear within {PATIENCE_S:g} s")
             self._turn()
         return it
 
     def wait(self, milliseconds: int) -> None:
         """Process events for this time."""
-        deadline = time.monotonic() + milliseconds / 1000
-        while time.monotonic() < deadline:
+        deadline = time.perf_counter() + milliseconds / 1000
+        while time.perf_counter() < deadline:
             self._turn()
 
     def take(self, window: QWidget, name: str, size: tuple[int, int] | None = None, *, at_once: bool = False) -> None:

@@ -205,10 +205,10 @@ class Document:
         if not splices:
             return
         last, then = self.last
-        if key is not None and key == last and time.monotonic() - then < _JOIN_S and self.done:
+        if key is not None and key == last and time.perf_counter() - then < _JOIN_S and self.done:
             joined = self.done.pop()
             splices, before = (*joined.splices, *splices), joined.before
-        self.study, self.undone, self.last = study, [], (key, time.monotonic())
+        self.study, self.undone, self.last = study, [], (key, time.perf_counter())
         self.done = [*self.done, DoneStep(name, splices, before, selected)][-_MOST_STEPS:]
 
     def end_step(self) -> None:

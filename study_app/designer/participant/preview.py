@@ -141,7 +141,7 @@ class _LivePage(Coloured, QGraphicsView):
             return
         another = (view.step, view.moment) != (before.step, before.moment)
         if another:
-            self._since_s = time.monotonic()
+            self._since_s = time.perf_counter()
         window = self.page_window
         if window is None or view.language != before.language or view.photodiode != before.photodiode:
             window = self._open_page(view)
@@ -209,7 +209,7 @@ class _LivePage(Coloured, QGraphicsView):
         self.close_page()
         made = ParticipantWindow(
             words(view.language),
-            clock=lambda: time.monotonic() - self._since_s,
+            clock=lambda: time.perf_counter() - self._since_s,
             windowed=True,
             text_scale=self._screen.text_scale,
             photodiode=view.photodiode,
@@ -663,11 +663,11 @@ class ParticipantPreview(Card):
         if tank != self._ball_of:
             self._ball_of = tank
             self._ball = ProgrammedBall(page.task, page.workspace_m, hidden_after_lead=hides)
-            self._since_s = time.monotonic()
+            self._since_s = time.perf_counter()
 
     def _move_ball(self) -> None:
         if self._ball is not None:
-            self.page.show_tank(self._ball.view(time.monotonic() - self._since_s))
+            self.page.show_tank(self._ball.view(time.perf_counter() - self._since_s))
 
     # the widgets
 

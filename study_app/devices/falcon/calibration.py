@@ -248,7 +248,7 @@ class Grip:
     def __init__(self, device: Any, *, virtual: bool = False) -> None:
         self._device = device
         self._virtual = virtual
-        self._now_ns = 0 if virtual else time.monotonic_ns()
+        self._now_ns = 0 if virtual else time.perf_counter_ns()
         self._reading, self._command = new_reading(), new_command()
         self._read_m = self._reading["position_m"][0]
         self._asked_n, self._sent_n = self._command["force_n"][0], self._command["sent_n"][0]
@@ -273,7 +273,7 @@ class Grip:
             elapsed_s = _TICK_S
         else:
             time.sleep(_TICK_S)
-            before_ns, self._now_ns = self._now_ns, time.monotonic_ns()
+            before_ns, self._now_ns = self._now_ns, time.perf_counter_ns()
             elapsed_s = (self._now_ns - before_ns) * 1e-9
         device = self._device
         reading, command = self._addresses

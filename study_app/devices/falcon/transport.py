@@ -58,7 +58,7 @@ class Transport(Protocol):
         """Return handle and function address for compiled code, valid until `close` or `reopen`."""
 
     def now_s(self) -> float:
-        return time.monotonic()
+        return time.perf_counter()
 
     def pause(self, seconds: float) -> None:
         time.sleep(seconds)
@@ -201,7 +201,7 @@ class PyUsbTransport(Transport):
 
     def now_s(self) -> float:
         own = getattr(self._backend, "now_s", None)
-        return time.monotonic() if own is None else float(own())
+        return time.perf_counter() if own is None else float(own())
 
     def pause(self, seconds: float) -> None:
         getattr(self._backend, "pause", time.sleep)(seconds)

@@ -267,13 +267,13 @@ class Library:
         call, device = self._functions, self.id
         if call.dhdEnableForce(1, device) < 0:
             raise FAILURES.failure("force-off", self._last_error())
-        patience = time.monotonic() + _ENABLE_S
+        patience = time.perf_counter() + _ENABLE_S
         while True:
             call.dhdSetForce(0.0, 0.0, 0.0, device)
             status = self._status()
             if status[FORCE]:
                 return
-            if time.monotonic() > patience:
+            if time.perf_counter() > patience:
                 raise FAILURES.failure("force-off", CAUSES.get(status[FORCE_OFF_CAUSE], ""))
             time.sleep(0.01)
 

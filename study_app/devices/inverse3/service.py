@@ -62,7 +62,7 @@ class SocketLink(io.RawIOBase):
     """A TCP connection to ``host:port`` without Nagle's algorithm; after ``within_s`` only `calls` may be used."""
 
     def __init__(self, host: str = HOST, port: int = PORT, within_s: float = OPENS_S) -> None:
-        self._within_s, self._until_s = within_s, time.monotonic() + within_s
+        self._within_s, self._until_s = within_s, time.perf_counter() + within_s
         try:
             self._socket = socket.create_connection((host, port), within_s)
         except OSError as error:
@@ -78,7 +78,7 @@ class SocketLink(io.RawIOBase):
     @contextmanager
     def _in_time(self) -> Iterator[None]:
         """Limit a call to the remaining time, and convert its errors."""
-        left_s = self._until_s - time.monotonic()
+        left_s = self._until_s - time.perf_counter()
         late = FAILURES.failure("no-reply", f"not all within {self._within_s:g} s")
         if left_s <= 0.0:
             raise late
@@ -111,14 +111,14 @@ class SocketLink(io.RawIOBase):
         return len(data)
 
     def now_s(self) -> float:
-        return time.monotonic()
+        return time.perf_counter()
 
     def close(self) -> None:
         with suppress(OSError):
             self._socket.shutdown(socket.SHUT_WR)
             self._socket.settimeout(_CLOSE_S)
-            until_s = time.monotonic() + _CLOSE_S
-            while self._socket.recv(1 << 16) and time.monotonic() < until_s:
+            until_s = time.perf_counter() + _CLOSE_S
+            while self._socket.recv(1 << 16) and time.perf_counter() < until_s:
                 pass
         self._socket.close()
 
@@ -182,11 +182,11 @@ def _get_json(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
 
     The connection uses no proxy of the system: the service is in the local network.
     """
-    until_s = time.monotonic() + ANSWER_S
+    until_s = time.perf_counter() + ANSWER_S
     for port in ports:
         with (
             suppress(DeviceFailure, HTTPException, ValueError, RecursionError),
-            closing(SocketLink(host, port, max(until_s - time.monotonic(), 0.01))) as link,
+            closing(SocketLink(host, port, max(until_s - time.perf_counter(), 0.01))) as link,
         ):
             link.send(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: close\r\n\r\n".encode())
             answer = HTTPResponse(link)  # type: ignore[arg-type] # it needs no more of a socket than its file

@@ -50,7 +50,7 @@ class SpaceMouseDevice(PointedDevice):
         force_limit_n: float = 8.0,
         *,
         hid: Any = None,
-        now_s: Callable[[], float] = time.monotonic,
+        now_s: Callable[[], float] = time.perf_counter,
     ) -> None:
         super().__init__(workspace_m, force_limit_n)
         self._hid = hid

@@ -54,8 +54,8 @@ def _listen() -> dict[str, Any]:
     sys.stdout.flush()
     said: list[tuple[str, float, int]] = []
     count, last_s, worst_gap_s, hashed = 0, 0.0, 0.0, hashlib.sha256()
-    quiet_since = time.monotonic()
-    while not ending.is_set() or time.monotonic() - quiet_since < _QUIET_S:
+    quiet_since = time.perf_counter()
+    while not ending.is_set() or time.perf_counter() - quiet_since < _QUIET_S:
         time.sleep(_LOOK_S)
         texts, stamps_s = markers.pull_chunk(0.0, 64)
         now_ns = clock.now_ns()
@@ -66,7 +66,7 @@ def _listen() -> dict[str, Any]:
             count, last_s = count + len(times_s), times_s[-1]
             hashed.update(np.asarray(chunk, np.float32).tobytes())
         if times_s or texts:
-            quiet_since = time.monotonic()
+            quiet_since = time.perf_counter()
         mapping.measure_if_due()
     return {
         "samples": count,

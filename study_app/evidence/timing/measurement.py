@@ -121,7 +121,7 @@ class Ticks(NamedTuple):
 
 
 _Timer: TypeAlias = Callable[[int, int, Callable[[], object]], int]
-"""Calls a function every so many milliseconds and so many times, and returns its start by ``time.monotonic_ns``."""
+"""Calls a function every so many milliseconds and so many times, and returns its start by ``time.perf_counter_ns``."""
 
 
 class Loop(Protocol):
@@ -230,15 +230,15 @@ class _ThreadLoop:
         def take() -> None:
             nonlocal start_ns
             raise_priority(real_time=self._real_time)
-            start_ns = time.monotonic_ns()
+            start_ns = time.perf_counter_ns()
             deadline_ns = start_ns + PERIOD_NS
             for _ in range(ticks + LEAD_IN):
-                pause_ns = deadline_ns - time.monotonic_ns()
+                pause_ns = deadline_ns - time.perf_counter_ns()
                 if pause_ns > 0:
                     time.sleep(pause_ns * 1e-9)
-                began_ns = time.monotonic_ns()
+                began_ns = time.perf_counter_ns()
                 self.tick()
-                ended_ns = time.monotonic_ns()
+                ended_ns = time.perf_counter_ns()
                 times.append((began_ns, ended_ns))
                 deadline_ns += PERIOD_NS * max(1, (ended_ns - deadline_ns) // PERIOD_NS)
 
@@ -260,9 +260,9 @@ class _QtLoop:
         times: list[tuple[int, int]] = []
 
         def fire() -> None:
-            began_ns = time.monotonic_ns()
+            began_ns = time.perf_counter_ns()
             self.tick()
-            times.append((began_ns, time.monotonic_ns()))
+            times.append((began_ns, time.perf_counter_ns()))
 
         return ticks_at(self._timer(PERIOD_NS // 1_000_000, ticks + LEAD_IN, fire), times)
 
@@ -481,10 +481,10 @@ def timing(
     ticks = round(seconds / rounds * 1e9) // PERIOD_NS
 
     def measured() -> Timed:
-        frames, began_s = windows.frames if windows else 0, time.monotonic()
+        frames, began_s = windows.frames if windows else 0, time.perf_counter()
         arms = {loop: partial(_run_loop, loop, ticks) for loop in loops}
         rounds_of = take_turns(arms, rounds, ending=ending or threading.Event(), progress=progress)
-        frames_hz = ((windows.frames if windows else 0) - frames) / (time.monotonic() - began_s)
+        frames_hz = ((windows.frames if windows else 0) - frames) / (time.perf_counter() - began_s)
         each_ns = rounds * ticks * PERIOD_NS
         return Timed(
             machine=machine(),

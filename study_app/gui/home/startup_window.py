@@ -29,7 +29,7 @@ class OpeningWindow(QWidget):
     cancelled = Signal()
 
     def __init__(
-        self, title: str, who: str, *, theme: Theme = LIGHT, now_s: Callable[[], float] = time.monotonic
+        self, title: str, who: str, *, theme: Theme = LIGHT, now_s: Callable[[], float] = time.perf_counter
     ) -> None:
         super().__init__()
         self.setWindowTitle("Liquid Study")

@@ -664,7 +664,7 @@ class ResultsPlace(Place):
             self.reader = self._start_worker()
             self._orders = {}
         self._orders[self.reader.order(order)] = order
-        self._since_s = time.monotonic()
+        self._since_s = time.perf_counter()
         self._going = Progress(what, 0.0)
         self._listening.start()
 
@@ -673,7 +673,7 @@ class ResultsPlace(Place):
         if self.reader is not None and self._orders:
             for number, answer in self.reader.answers():
                 self._handle_answer(number, answer)
-            if self._orders and time.monotonic() - self._since_s > PATIENCE_S:
+            if self._orders and time.perf_counter() - self._since_s > PATIENCE_S:
                 if self._blocks and len(self._redrawn) >= self._blocks:
                     self._update_view(testing=self._going, drawing=None)
                 else:

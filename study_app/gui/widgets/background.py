@@ -29,9 +29,9 @@ def _abandon_jobs() -> None:
 
 def wait_for_jobs(seconds: float) -> None:
     """Wait a limited time for the jobs of every `Background`: Python aborts if it ends during an import."""
-    until_s = time.monotonic() + seconds
+    until_s = time.perf_counter() + seconds
     for thread in tuple(_threads):
-        thread.join(max(until_s - time.monotonic(), 0.0))
+        thread.join(max(until_s - time.perf_counter(), 0.0))
 
 
 class _Ends(QObject):

@@ -112,9 +112,9 @@ class LoopThread:
         late_ns = self._late_ns
         if late_ns <= _STUCK_NS or ticks == self._stuck_at:
             return late_ns > _STUCK_NS
-        until_s = time.monotonic() + (_THAW_S if late_ns > 2 * _STUCK_NS else 0.0)
+        until_s = time.perf_counter() + (_THAW_S if late_ns > 2 * _STUCK_NS else 0.0)
         while self._late_ns > _STUCK_NS:
-            if time.monotonic() >= until_s:
+            if time.perf_counter() >= until_s:
                 self._stuck_at = ticks
                 return True
             time.sleep(1e-3)
@@ -160,9 +160,9 @@ class LoopThread:
         With ``goes_on`` the tick takes only its parameters.
         """
         host = self.control[0]
-        patience = time.monotonic() + _PATIENCE_S
+        patience = time.perf_counter() + _PATIENCE_S
         while self.thread is not None and self.thread.is_alive() and not self._all_taken:
-            if time.monotonic() > patience:
+            if time.perf_counter() > patience:
                 raise self._silence()
             time.sleep(host.period_ns * 1e-9)
         spare = (int(host.request) + 1) % 2

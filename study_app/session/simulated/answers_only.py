@@ -108,12 +108,12 @@ def rehearse_answers(
     kept = SimulatedStudy(folder, study, source, people, seed=seed, device=DEVICE, screens=REHEARSED_SCREENS)
     if features is None:
         features = condition_features(study, seed=seed, people=REHEARSED_PEOPLE, progress=progress)
-    said_s = time.monotonic()
+    said_s = time.perf_counter()
     with kept:
         for number, person in enumerate(people, start=1):
             _answer_session(study, person, groups[person], kept, features)
-            if progress is not None and (time.monotonic() - said_s >= SAY_EVERY_S or number == participants):
-                said_s = time.monotonic()
+            if progress is not None and (time.perf_counter() - said_s >= SAY_EVERY_S or number == participants):
+                said_s = time.perf_counter()
                 progress(f"{person}: {number} of {participants} answered (simulated)")
     return folder
 

@@ -75,7 +75,11 @@ class SessionClock:
     """
 
     def __init__(
-        self, now_ns: Callable[[], int] = time.monotonic_ns, origin_at: datetime | None = None, *, shown_s: float = 0.0
+        self,
+        now_ns: Callable[[], int] = time.perf_counter_ns,
+        origin_at: datetime | None = None,
+        *,
+        shown_s: float = 0.0,
     ) -> None:
         self._now_ns = now_ns
         self.origin_ns = now_ns() - round(shown_s * 1e9)

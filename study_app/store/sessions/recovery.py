@@ -75,7 +75,7 @@ def reopen_store(
     motors_masked: Mapping[str, Any] | None = None,
     outlets: Mapping[str, Any] | None = None,
     video: Mapping[str, Any] | None = None,
-    now_ns: Callable[[], int] = time.monotonic_ns,
+    now_ns: Callable[[], int] = time.perf_counter_ns,
     now: datetime | None = None,
 ) -> SessionStore:
     """Open an unfinished session to resume it; ``progress.progress_of(store.lines)`` gives its progress.

@@ -51,8 +51,8 @@ def stroke(loop):
     loop.set_liquid("honey")
     times_s = np.arange(0.0, 20.0, 0.01)
     loop.follow(times_s, 0.03 * np.stack([np.sin(6 * times_s), 0 * times_s, 0 * times_s], axis=1))
-    until_s = time.monotonic() + 20.0
-    while time.monotonic() < until_s:
+    until_s = time.perf_counter() + 20.0
+    while time.perf_counter() < until_s:
         time.sleep(0.05)
         samples = loop.read()
         if np.linalg.norm(samples["device_force_n"][-1]) > 0.5 and any(at_device()):

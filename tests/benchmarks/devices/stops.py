@@ -105,8 +105,8 @@ def stop_again_and_again(name: str, seconds: float) -> Found:
         servo.start()
         late: list[float] = []
         scene = load("rek2024").scene_for("honey")
-        end, side = time.monotonic() + seconds, 1.0
-        while time.monotonic() < end and not found.faults:
+        end, side = time.perf_counter() + seconds, 1.0
+        while time.perf_counter() < end and not found.faults:
             reader = servo.telemetry.reader()
             servo.load(scene)
             servo.fade_in()
@@ -133,8 +133,8 @@ def _stop(servo: Servo, stand: Stand, found: Found, *, whole: bool) -> None:
     (servo.stop if whole else servo.stop_force)()
     time.sleep(IN_FORCE_S)
     reader, commands = servo.telemetry.reader(), stand.commands()
-    end = time.monotonic() + WATCHED_S - IN_FORCE_S
-    while time.monotonic() < end:
+    end = time.perf_counter() + WATCHED_S - IN_FORCE_S
+    while time.perf_counter() < end:
         acting = stand.acting(not whole)
         if any(acting):
             found.lost.append(f"stop {found.stops}: {acting} acts")

@@ -309,9 +309,9 @@ def main() -> None:
             copies.put(_copy(Path(temporary) / str(number)))
 
         def judge(fault: Fault) -> tuple[Fault, str, float]:
-            copy, begun = copies.get(), time.monotonic()
+            copy, begun = copies.get(), time.perf_counter()
             try:
-                return fault, noticed_by(fault, given.folder.resolve(), copy), time.monotonic() - begun
+                return fault, noticed_by(fault, given.folder.resolve(), copy), time.perf_counter() - begun
             finally:
                 copies.put(copy)
 

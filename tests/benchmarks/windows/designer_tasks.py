@@ -180,13 +180,13 @@ def act_tasks(kind: str, folder: Path, *numbers: str) -> None:
     def act(user: User) -> None:
         tasks = Tasks(user, folder)
         for task in (TASKS[int(number) - 1] for number in numbers):
-            before, since = user.actions, time.monotonic()
+            before, since = user.actions, time.perf_counter()
             try:
                 task(tasks)
             except AssertionError as error:
                 print(f"not done ({error})\t{task.__doc__}", flush=True)
             else:
-                print(f"{user.actions - before} in {time.monotonic() - since:.0f} s\t{task.__doc__}", flush=True)
+                print(f"{user.actions - before} in {time.perf_counter() - since:.0f} s\t{task.__doc__}", flush=True)
 
     use(kind, act)
 
@@ -209,12 +209,12 @@ def act_continued(kind: str, folder: Path) -> None:
     """Continue a study after a kill."""
 
     def act(user: User) -> None:
-        since = time.monotonic()
+        since = time.perf_counter()
         user.press("Continue Killed, killed")
         wait_until(lambda: user.sees("Save"), "the study")
         save(user, folder / "protocols" / "killed.toml")
         assert "before the kill" in (folder / "protocols" / "killed.toml").read_text("utf-8")
-        print(f"{user.actions} in {time.monotonic() - since:.0f} s\t{AFTER_A_KILL}", flush=True)
+        print(f"{user.actions} in {time.perf_counter() - since:.0f} s\t{AFTER_A_KILL}", flush=True)
 
     use(kind, act)
 

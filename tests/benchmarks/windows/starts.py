@@ -73,10 +73,10 @@ def main() -> None:
     if not surroundings.get("DISPLAY") and not surroundings.get("WAYLAND_DISPLAY"):
         surroundings["QT_QPA_PLATFORM"] = "offscreen"
     ends: Counter[tuple[str, str]] = Counter()
-    began = time.monotonic()
+    began = time.perf_counter()
     with suppress(KeyboardInterrupt):  # Ctrl+C prints what there is
         count(asked.starts, asked.kind or list(KINDS), surroundings, ends)
-    print(f"{ends.total()} starts in {(time.monotonic() - began) / 60:.0f} min\n\n| started | ended | times |")
+    print(f"{ends.total()} starts in {(time.perf_counter() - began) / 60:.0f} min\n\n| started | ended | times |")
     print("| --- | --- | --: |")
     for (kind, how), times in sorted(ends.items()):
         print(f"| {kind} | {how} | {times} |")
@@ -103,14 +103,14 @@ def said_until_its_end(program: subprocess.Popen[str]) -> str:
 
     A busy computer makes no start hang: what counts is a time without any progress, or the program's own time.
     """
-    used_s, since_s = 0.0, time.monotonic()
+    used_s, since_s = 0.0, time.perf_counter()
     while True:
         with suppress(subprocess.TimeoutExpired):
             return program.communicate(timeout=LOOK_S)[1]
         now_s = sum(psutil.Process(program.pid).cpu_times()[:2])
         if now_s > used_s:
-            used_s, since_s = now_s, time.monotonic()
-        if used_s > PATIENCE_S or time.monotonic() - since_s > PATIENCE_S:
+            used_s, since_s = now_s, time.perf_counter()
+        if used_s > PATIENCE_S or time.perf_counter() - since_s > PATIENCE_S:
             program.send_signal(signal.SIGABRT)
 
 

@@ -45,7 +45,7 @@ def test_problems_are_those_of_check(old: str, new: str) -> None:
 
 def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = 0.0
-    monkeypatch.setattr("study_app.designer.document.document.time", SimpleNamespace(monotonic=lambda: now_s))
+    monkeypatch.setattr("study_app.designer.document.document.time", SimpleNamespace(perf_counter=lambda: now_s))
     opened = Document(DEMO)
     for now_s, key in ((1.0, "title"), (1.5, "title"), (3.0, "title"), (3.1, "other"), (3.2, None), (3.3, None)):
         opened.edit("Type", Set(("study", "title"), f"New at {now_s}"), key=key)

@@ -163,9 +163,9 @@ def compiled() -> None:
 )
 def test_every_kind_of_service_ends_in_its_failure_within_three_seconds(kind: Kind) -> None:
     with serving(partial(answers, kind)) as port:
-        began_s = time.monotonic()
+        began_s = time.perf_counter()
         report = examine(f"inverse3:127.0.0.1:{port}", progress=str)
-        assert time.monotonic() - began_s < MOST_S
+        assert time.perf_counter() - began_s < MOST_S
         assert [one.id for one in report.found] == [kind.mode]
         assert report.failure is not None
         assert report.failure.isprintable()
@@ -175,10 +175,10 @@ def test_every_kind_of_service_ends_in_its_failure_within_three_seconds(kind: Ki
 @pytest.mark.parametrize("kind", [pytest.param(kind, id=name) for name, kind in HANGS.items() if kind.http])
 def test_a_probe_of_a_service_that_hangs_ends_soon(kind: Kind) -> None:
     with serving(partial(answers, kind)) as port:
-        began_s = time.monotonic()
+        began_s = time.perf_counter()
         assert force_scale("127.0.0.1", (port, port, port)) is None
         assert "start Haply Hub" in probe(ports=(port,)).why
-        assert time.monotonic() - began_s < MOST_S
+        assert time.perf_counter() - began_s < MOST_S
 
 
 @pytest.mark.parametrize(

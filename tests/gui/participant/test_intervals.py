@@ -108,9 +108,9 @@ def test_a_key_that_is_held_steps_eight_times_a_second_and_stops_with_it(opened:
     for _ in range(20):  # the system's own repetition, 30 a second or another rate
         QApplication.sendEvent(opened.window, QKeyEvent(QEvent.Type.KeyPress, KEY.Key_Right, NONE, "", True))
     assert steps(opened) == [1]
-    began_s = time.monotonic()
+    began_s = time.perf_counter()
     qtbot.waitUntil(lambda: len(steps(opened)) >= 5)
-    assert time.monotonic() - began_s >= 0.95 * 4 * STEP_MS / 1000
+    assert time.perf_counter() - began_s >= 0.95 * 4 * STEP_MS / 1000
     QTest.keyPress(opened.window, KEY.Key_Left)
     QTest.keyRelease(opened.window, KEY.Key_Right)
     right = len(steps(opened))

@@ -22,8 +22,8 @@ window = QWidget()
 window.resize(1200, 800)
 window.show()
 def turn(seconds):
-    until = time.monotonic() + seconds
-    while time.monotonic() < until:
+    until = time.perf_counter() + seconds
+    while time.perf_counter() < until:
         app.processEvents()
 turn(0.5)
 capture = PointerCapture()

@@ -197,7 +197,7 @@ def _monotonic_ns() -> Any:
 
 
 def now(_context: int) -> Any:
-    """``NOW``: CLOCK_MONOTONIC, as Python's ``time.monotonic_ns``."""
+    """``NOW``: CLOCK_MONOTONIC, as Python's ``time.perf_counter_ns``."""
     return _monotonic_ns()
 
 

@@ -33,9 +33,9 @@ def sleep(clock, deadline_ns):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere Python's clock may be another one")
 def test_the_system_clock_is_pythons_monotonic_clock():
-    before = time.monotonic_ns()
+    before = time.perf_counter_ns()
     now = SystemClock().now_ns()
-    assert before <= now <= time.monotonic_ns()
+    assert before <= now <= time.perf_counter_ns()
 
 
 def test_a_sleep_ends_at_its_deadline_or_later_and_says_when():
