@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 LONGEST_PATH = 259  # characters; the 260th ends the text
+LONGEST_FOLDER = 247  # leaves room for a name of 8 and 3 letters
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
 
 
@@ -25,23 +26,33 @@ class Windows:
     def __init__(self) -> None:
         self.held: dict[Path, int] = {}
         self.refused: list[Path] = []
+        self.shared: set[Path] = set()
 
     @contextmanager
-    def hold(self, path: Path, calls: int = 10_000) -> Iterator[None]:
-        """Have ``path`` open in another program, as Excel has a table, for at most so many refusals."""
+    def hold(self, path: Path, calls: int = 10_000, *, shared: bool = False) -> Iterator[None]:
+        """Have ``path`` open in another program, as Excel has a table, for at most so many refusals.
+
+        A ``shared`` file can be written by others, too, as those of Python can.
+        """
         self.held[path.resolve()] = calls
+        if shared:
+            self.shared.add(path.resolve())
         try:
             yield
         finally:
             self.held.pop(path.resolve(), None)
 
-    def check(self, *paths: Any) -> None:
+    def check(self, *paths: Any, longest: int = LONGEST_PATH, writes: bool = False) -> None:
         """Raise the error of Windows if one of the paths is, or contains, an open file, or cannot exist there."""
         for path in map(Path, paths):
             for name in path.resolve().relative_to(path.resolve().anchor).parts:
                 if not is_valid_on_windows(name):
                     raise OSError(22, "Invalid argument", str(path))
+            if len(str(path.resolve())) > longest:
+                raise FileNotFoundError(2, "No such file or directory", str(path))
             for held in [held for held, calls in self.held.items() if calls and held.is_relative_to(path.resolve())]:
+                if writes and held in self.shared:
+                    continue
                 self.held[held] -= 1
                 self.refused.append(held)
                 raise PermissionError(13, "Permission denied", str(path))
@@ -56,7 +67,7 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> Windows:
         real: Callable[..., Any] = getattr(os, name)
 
         def call(*paths: Any, **given: Any) -> Any:
-            rules.check(*paths[:checked])
+            rules.check(*paths[:checked], longest=LONGEST_FOLDER if name == "mkdir" else LONGEST_PATH)
             return real(*paths, **given)
 
         monkeypatch.setattr(os, name, call)
@@ -67,9 +78,17 @@ def windows(monkeypatch: pytest.MonkeyPatch) -> Windows:
 
     def open_file(file: Any, mode: str = "r", *words: Any, **given: Any) -> Any:
         if not isinstance(file, int) and set(mode) & set("wax+"):
-            rules.check(file)
+            rules.check(file, writes=True)
         return opened(file, mode, *words, **given)
 
+    create = os.open
+
+    def open_descriptor(path: Any, flags: int, *words: Any, **given: Any) -> int:
+        if flags & (os.O_WRONLY | os.O_RDWR):
+            rules.check(path, writes=True)
+        return create(path, flags, *words, **given)
+
+    monkeypatch.setattr(os, "open", open_descriptor)
     monkeypatch.setattr(io, "open", open_file)
     monkeypatch.setattr("builtins.open", open_file)
     return rules

@@ -78,8 +78,9 @@ def main() -> None:
     ended: list[int] = []
     atexit.register(_exit_at_once, ended)  # registered first, so it is called last
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none is used, and searching them reads every package
-    if isinstance(sys.stdout, io.TextIOWrapper):  # a pipe or an old console may lack a letter
-        sys.stdout.reconfigure(errors="backslashreplace")
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # an old console may lack a letter; a pipe or file is UTF-8
+            stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="backslashreplace")
     try:
         with naming_the_extra():
             code = commands.main(standalone_mode=False)

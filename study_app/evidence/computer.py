@@ -31,7 +31,12 @@ LoadName: TypeAlias = Literal["none", "gui", "gui+cpu"]
 
 T = TypeVar("T")
 
-_BUSY: Final = "import os\nparent = os.getppid()\nwhile os.getppid() == parent:\n    sum(range(100_000))\n"
+_BUSY: Final = """\
+import os, sys, threading
+threading.Thread(target=lambda: (sys.stdin.read(), os._exit(0)), daemon=True).start()
+while True:
+    sum(range(100_000))
+"""  # ends when this program closes the pipe, or ends: the parent's ID of a process never changes on Windows
 
 
 class Windows(Protocol):
@@ -61,11 +66,11 @@ def under_load(load: LoadName, windows: Windows | None, work: Callable[[], T]) -
 def busy_cores(count: int | None = None) -> Iterator[None]:
     """Keep every core busy with a process of Python; those end with this one, however it ends."""
     command = [sys.executable, "-S", "-c", _BUSY]
-    busy = [subprocess.Popen(command) for _ in range(count or os.cpu_count() or 1)]  # noqa: S603 - our own words
+    busy = [subprocess.Popen(command, stdin=subprocess.PIPE) for _ in range(count or os.cpu_count() or 1)]  # noqa: S603 - our own words
     try:
         yield
     finally:
         for process in busy:
             process.terminate()
         for one in busy:
-            one.wait()
+            one.communicate()

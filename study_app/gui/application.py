@@ -1,5 +1,6 @@
 """The one Qt application of this program, made when the first window is asked for."""
 
+import ctypes
 import os
 import sys
 from pathlib import Path
@@ -25,6 +26,8 @@ def application_here() -> QApplication:
         return instance
     check_display()
     os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")  # its idle thread delays the end by seconds under load
+    if sys.platform == "win32":  # else the taskbar shows Python's icon
+        ctypes.windll.shell32.SetCurrentProcessExplicitAppUserModelID("LiquidStudy")
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     application = QApplication(["liquid-study"])
     application.setApplicationName("liquid-study")

@@ -7,6 +7,7 @@ that polls the lines reads them while the code is held. The serial port (pyseria
 """
 
 import os
+import re
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
@@ -150,9 +151,12 @@ class _SerialPort:
 
 
 def _cause(error: Exception) -> str:
-    """Return the system's message for an error with a number, else its own message."""
+    """Return the system's message: of the error's number, or as pyserial quotes it on Windows; else the error's own."""
     number = getattr(error, "errno", None)
-    return os.strerror(number) if isinstance(number, int) else str(error)
+    if isinstance(number, int):
+        return os.strerror(number)
+    quoted = re.search(r"Error\(\d+, (['\"])(.+?)\.?\1", str(error))
+    return str(error) if quoted is None else quoted[2]
 
 
 def _port(kind: Callable[[str], TriggerPort]) -> Callable[[str, Callable[[], int]], TriggerSink]:

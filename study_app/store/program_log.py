@@ -49,7 +49,12 @@ class _PlainFormatter(logging.Formatter):
 
 
 class _Quiet(RotatingFileHandler):
-    """A log file whose write errors do not disturb a session."""
+    """A log file whose write errors do not disturb a session, and that several programs may write."""
+
+    def rotate(self, source: str, dest: str) -> None:
+        """Rename the file; keep writing to it while another program has it open, since Windows then refuses."""
+        with suppress(PermissionError):
+            super().rotate(source, dest)
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - logging's name
         """Do nothing."""

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
@@ -152,6 +153,16 @@ def test_an_address_where_nothing_is_is_refused_in_a_line(address: str, words: s
     with pytest.raises(OutletError, match=words) as refused:
         open_sink(address, time.perf_counter_ns)
     assert "\n" not in str(refused.value)
+
+
+def test_a_serial_port_that_is_missing_on_windows_is_said_in_its_words(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The exception of pyserial carries no number there, but the representation of the system's error."""
+    serial = pytest.importorskip("serial", reason="pyserial is not installed")
+    message = "could not open port 'COM9': FileNotFoundError(2, 'The system cannot find the file specified.', None, 2)"
+    monkeypatch.setattr(serial, "Serial", mock.Mock(side_effect=serial.SerialException(message)))
+    with pytest.raises(OutletError) as refused:
+        open_sink("serial:COM9", time.perf_counter_ns)
+    assert str(refused.value) == "serial:COM9 cannot be opened: The system cannot find the file specified"
 
 
 @pytest.mark.parametrize(

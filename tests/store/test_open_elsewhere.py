@@ -1,16 +1,19 @@
-"""Files that another program has open, on Windows: nothing is half-written, and messages name the file."""
+"""Files that another program has open, and paths that are too long, on Windows: messages name the file."""
 
+import logging
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from study_app.errors import AnalysisError
+from study_app.errors import AnalysisError, DeviceError, StoreError
+from study_app.store import program_log
 from study_app.store.atomic import copy_folder, create_folder, write_file
 from study_app.store.output_files import write_files
 from study_app.store.verification.verify_study import verify_study
 from tests.store.conftest import Start
-from tests.windows_rules import Windows, windows
+from tests.windows_rules import LONGEST_PATH, Windows, windows
 
 __all__ = ["windows"]
 
@@ -70,3 +73,34 @@ def test_sessions_begin_and_end_while_the_participants_table_is_open_elsewhere(
         third.finish("completed")
     assert [b"P002" in before, b"P002" in table.read_bytes()] == [False, True]
     assert verify_study(study.path).errors == ()
+
+
+def test_a_session_whose_paths_would_be_too_long_does_not_begin(start: Start, tmp_path: Path, windows: Windows) -> None:
+    """The longest path is that of the table of responses while it is written, of 104 characters below the results."""
+    for room, begins in ((103, False), (104, True)):
+        results = tmp_path / ("r" * (LONGEST_PATH - room - len(str(tmp_path)) - 1))
+        if begins:
+            start(results=results).close()
+        else:
+            with pytest.raises(StoreError, match=r"_data\.csv.*; 260 characters\): move the workspace to a folder"):
+                start(results=results)
+            assert not list(results.rglob("sub-*"))
+    assert windows.refused == []
+
+
+def test_two_programs_write_one_log(tmp_path: Path, windows: Windows, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While another program has it open, it cannot be renamed: it grows, and no record is lost."""
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path))
+    logger = logging.getLogger("study_app")
+    monkeypatch.setattr(logger, "handlers", [])
+    monkeypatch.setattr(program_log, "_MOST_BYTES", 1000)
+    monkeypatch.setattr(logging, "lastResort", None)
+    program_log.start_log()
+    with windows.hold(program_log.log_file(), shared=True):
+        for number in range(30):
+            logger.info("record %s", DeviceError(f"number {number:02d}"))
+    logger.info("the other program has ended")
+    logger.handlers[0].close()
+    assert re.findall("number ([0-9]+)", program_log.read_log()) == [f"{number:02d}" for number in range(30)]
+    assert "ended" in program_log.log_file().read_text("utf-8")
+    assert program_log.log_file().stat().st_size < 1000

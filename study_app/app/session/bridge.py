@@ -19,6 +19,7 @@ from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QScreen
 from PySide6.QtWidgets import QWidget
 
+from study_app.app.awake import Awake
 from study_app.app.failures import PAINTING, ThreadExceptions, UncaughtExceptions, guarded_session_slot
 from study_app.app.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.devices.hand import HandOrders, hand_of
@@ -205,7 +206,7 @@ class SessionBridge(QObject):
         self._thread_exceptions.ended.connect(self._report_thread_failure)
         self.frames = Frames(refresh_hz, parent=self)
         self.frames.due.connect(self.draw_frame)
-        self._thread_priority = ThreadPriority()
+        self._thread_priority, self._awake = ThreadPriority(), Awake()
         self.budget = FrameBudget(
             ((self.show_tiles, _TILES_S), (self.show_traces, _TRACES_S), (self.show_forces, _TRACES_S))
         )
@@ -249,6 +250,7 @@ class SessionBridge(QObject):
         self._thread_exceptions.install()
         freeze_garbage()
         self._thread_priority.raise_priority()
+        self._awake.begin()
         self.frames.start()
         self._begin_session()
 
@@ -575,6 +577,7 @@ class SessionBridge(QObject):
         self._gone = True
         self.frames.stop()
         self._thread_priority.restore()
+        self._awake.end()
         unfreeze_garbage()
         self.uncaught.remove()
         self._thread_exceptions.remove()

@@ -25,6 +25,7 @@ from study_app.store.atomic import (
     move,
     remove_old_temporary_files,
     sync_folder,
+    system_message,
     temporary_path,
 )
 from study_app.store.blinded.allocation import Allocation, allocate, allocation_of, check_session
@@ -147,6 +148,7 @@ def begin_session(
     sealed = not reveals(study_folder.path)
     opening = _claim(place)
     try:
+        _check_path_length(place)
         allocation = allocate(study_folder, key, start.participant, group=start.group, row_of=start.row_of)
         group = None if allocation is None else allocation.group
         own_protocol(protocol, group, start.session)  # raises an error if the group does not have this session
@@ -402,6 +404,23 @@ def _unclaim(place: Place, opening: Opening) -> None:
     shutil.rmtree(away if is_there(away) else path, ignore_errors=True)
     opening.release()
     _remove_if_empty(path.parent)
+
+
+def _check_path_length(place: Place) -> None:
+    """Raise an error if the system cannot create the longest path of a session (Windows permits 259 characters)."""
+    tables = (place.folder.table(place.study, name) for name in ("responses", "intervals"))
+    recording = place.folder.recordings / "trial-0000_attempt-00_interval-0_frames.parquet"
+    longest = temporary_path(max(*tables, recording, key=lambda path: len(str(path))))
+    try:
+        longest.parent.mkdir(exist_ok=True)
+        longest.touch()
+        longest.unlink()
+        _remove_if_empty(place.folder.recordings)
+    except OSError as error:
+        raise StoreError(
+            f"{longest} cannot be created ({system_message(error)}; {len(str(longest))} characters): move the "
+            "workspace to a folder with a shorter path, such as C:\\Studies, or free disk space"
+        ) from error
 
 
 def _remove_if_empty(folder: Path) -> None:

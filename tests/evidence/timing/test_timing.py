@@ -1,5 +1,6 @@
 """How loops are timed: by the same rule, in ticks. No time is judged here."""
 
+import subprocess
 import sys
 import threading
 
@@ -11,6 +12,7 @@ if numba.config.DISABLE_JIT:
 
 
 from study_app.cli import main
+from study_app.evidence.computer import busy_cores
 from study_app.evidence.timing.measurement import FULL, LEAD_IN, PERIOD_NS, PlayedHand, granted, ticks_at, timing
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
@@ -102,3 +104,19 @@ def test_without_a_display_windows_are_refused_in_one_line(run, monkeypatch):
     code, said, complaint = run("--seconds", "0.5", "--load", "gui")
     assert (code, said) == (2, "")
     assert "no display" in complaint
+
+
+def test_processes_that_keep_cores_busy_end_with_this_one_where_a_parents_id_never_changes(monkeypatch):
+    """On Windows; a program that is killed closes its pipes, as this test does."""
+    start, started = subprocess.Popen, []
+
+    def start_on_windows(command, **given):
+        unchanging = f"import os\nos.getppid = lambda: 1\n{command[-1]}"
+        started.append(start([*command[:-1], unchanging], **given))
+        return started[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start_on_windows)
+    with busy_cores(1):
+        (busy,) = started
+        busy.stdin.close()
+        assert busy.wait(60) == 0

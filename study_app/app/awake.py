@@ -1,0 +1,91 @@
+"""Keep the screen and the computer awake while a session runs."""
+
+import ctypes
+import os
+import sys
+from pathlib import Path
+from typing import Any, Final
+
+REASON: Final = "a session is running"
+CONTINUOUS, SYSTEM, DISPLAY = 0x80000000, 0x1, 0x2  # of SetThreadExecutionState
+USER_INITIATED, LATENCY_CRITICAL, SCREEN_ON = 0x00FFFFFF, 0xFF00000000, 1 << 40  # of NSProcessInfo's activities
+_CONNECTION: Final = "liquid-study-awake"
+
+
+class Awake:
+    """Prevents sleep between `begin` and `end`; where the system does not offer this, nothing happens."""
+
+    def __init__(self) -> None:
+        self._activity: int | None = None
+
+    def begin(self) -> bool:
+        """Keep screen and computer awake; return whether the system agreed. Windows wants both calls in one thread."""
+        if sys.platform == "win32":
+            return _set_execution_state(CONTINUOUS | SYSTEM | DISPLAY)
+        if sys.platform == "darwin":
+            self._activity = _begin_activity()
+            return bool(self._activity)
+        return _inhibit_screen_saver()
+
+    def end(self) -> None:
+        """Let screen and computer sleep again."""
+        if sys.platform == "win32":
+            _set_execution_state(CONTINUOUS)
+        elif sys.platform == "darwin" and self._activity:
+            _send(_process_info(), "endActivity:", ctypes.c_void_p(self._activity))
+            self._activity = None
+        elif sys.platform == "linux":
+            from PySide6.QtDBus import QDBusConnection  # noqa: PLC0415 - loaded by sessions alone
+
+            QDBusConnection.disconnectFromBus(_CONNECTION)  # the service forgets programs that leave the bus
+
+
+def _set_execution_state(state: int) -> bool:
+    windows: Any = getattr(ctypes, "windll", None)
+    return windows is not None and bool(windows.kernel32.SetThreadExecutionState(ctypes.c_uint(state)))
+
+
+def _inhibit_screen_saver() -> bool:
+    """Ask the desktop's service (GNOME, KDE, Xfce …) to inhibit blanking, as long as the connection lasts."""
+    runtime = os.environ.get("XDG_RUNTIME_DIR", "")
+    if "DBUS_SESSION_BUS_ADDRESS" not in os.environ and not (runtime and Path(runtime, "bus").exists()):
+        return False
+    from PySide6.QtDBus import QDBusConnection, QDBusInterface, QDBusMessage  # noqa: PLC0415 - loaded by sessions alone
+
+    bus = QDBusConnection.connectToBus(QDBusConnection.BusType.SessionBus, _CONNECTION)
+    name = "org.freedesktop.ScreenSaver"
+    service = QDBusInterface(name, "/org/freedesktop/ScreenSaver", name, bus)
+    service.setTimeout(1000)
+    return service.call("Inhibit", "liquid-study", REASON).type() == QDBusMessage.MessageType.ReplyMessage
+
+
+def _begin_activity() -> int | None:
+    """Begin an activity without App Nap and idle sleep (macOS; never run); return the object to end it with."""
+    reason = _send(_class("NSString"), "stringWithUTF8String:", ctypes.c_char_p(REASON.encode()))
+    options = ctypes.c_uint64(USER_INITIATED | LATENCY_CRITICAL | SCREEN_ON)
+    activity = _send(_process_info(), "beginActivityWithOptions:reason:", options, ctypes.c_void_p(reason))
+    return _send(activity, "retain") if activity else None
+
+
+def _process_info() -> int | None:
+    return _send(_class("NSProcessInfo"), "processInfo")
+
+
+def _class(name: str) -> int | None:
+    library = _objective_c()
+    library.objc_getClass.restype = ctypes.c_void_p
+    found: int | None = library.objc_getClass(name.encode())
+    return found
+
+
+def _send(receiver: int | None, message: str, *given: Any) -> int | None:
+    """Send a message to an object of Objective-C and return the object that it returns."""
+    library = _objective_c()
+    library.sel_registerName.restype = library.objc_msgSend.restype = ctypes.c_void_p
+    selector = ctypes.c_void_p(library.sel_registerName(message.encode()))
+    result: int | None = library.objc_msgSend(ctypes.c_void_p(receiver), selector, *given)
+    return result
+
+
+def _objective_c() -> Any:
+    return ctypes.CDLL("/usr/lib/libobjc.dylib")
