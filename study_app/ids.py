@@ -25,6 +25,26 @@ MAX_FROM_TEXT: Final = 24
 _ANY_LENGTH: Final = 10_000
 
 
+_RESERVED: Final = re.compile(r"(con|prn|aux|nul|com[1-9]|lpt[1-9]) *(\..*)?", re.IGNORECASE | re.DOTALL)
+_RESERVED_NAMES: Final = {"con", "prn", "aux", "nul", *(f"{port}{n}" for port in ("com", "lpt") for n in range(1, 10))}
+
+
+def file_name_fault(name: str) -> str:
+    """Return why Windows cannot have a file or folder with this name, "" if it can: studies are shared.
+
+    Examples
+    --------
+    >>> [file_name_fault(name) for name in ("con", "aux.toml", "waves.", "why?.mp4", "control")]
+    ['is a device on Windows', 'is a device on Windows', 'ends with "."', 'contains "?"', '']
+    """
+    if _RESERVED.fullmatch(name):
+        return "is a device on Windows"
+    if name.endswith((".", " ")) and name not in {".", ".."}:
+        return f'ends with "{name[-1]}"'
+    letter = next((letter for letter in name if letter in '<>:"|?*'), "")
+    return f'contains "{letter}"' if letter else ""
+
+
 def read_as(text: str) -> str:
     """Return what other programs read a participant's id as, "a number" of "007"; "" where they keep it.
 
@@ -66,7 +86,7 @@ def short_name_of(text: str) -> str:
 def free_short_name(taken: Iterable[str], name: str) -> str:
     """Return a short name of a study that is free, as `free_id` does: "kitchen2"; a year stays: "rek2024v2"."""
     stem = re.sub("(?<=[0-9])v[0-9]+$|(?<=[a-z])[0-9]{1,2}$", "", name)
-    return _free(taken, name, stem, "v" if stem[-1:].isdigit() else "", MAX_SHORT_NAME)
+    return _free({*taken, *_RESERVED_NAMES}, name, stem, "v" if stem[-1:].isdigit() else "", MAX_SHORT_NAME)
 
 
 def _free(taken: Iterable[str], name: str, stem: str, mark: str, longest: int) -> str:

@@ -23,6 +23,7 @@ from study_app.protocol.source.files import (
     FOOTAGE_TABLE,
     TABLE,
     check_size,
+    file_path_fault,
     is_footage,
     is_utf16,
     known_protocols,
@@ -213,7 +214,9 @@ def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]
     conditions = dict(document["conditions"])
     faults: list[Fault] = []
     for path, view in shown:
-        if view in hashes:
+        if fault := file_path_fault(view):
+            faults.append(Fault(path, fault, "rename the file: a study is shared"))
+        elif view in hashes:
             conditions[path[1]] = {**conditions[path[1]], "footage_sha256": hashes[view]}
         else:
             message = f'there is no file "{view}" in this folder'
@@ -229,6 +232,8 @@ def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
     """Return the only liquid of a liquid file as a study's table, with the file's ball."""
     if not isinstance(file, str):
         raise _LiquidFileFault("must be a string", "the path of a liquid file, relative to this file")
+    if fault := file_path_fault(file):
+        raise _LiquidFileFault(fault, "rename the file: a study is shared")
     if file not in texts:
         raise _LiquidFileFault(
             f'there is no UTF-8 text file "{file}" in this folder', "give the path of the liquid file"

@@ -24,6 +24,7 @@ from study_app.haptics.model.scene import (
     Scene,
     SceneScale,
 )
+from study_app.ids import file_name_fault
 from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
 from study_app.protocol.groups import Group, GroupAssignment, Sequences, Steps, every_step
 from study_app.protocol.questionnaires import Questionnaire
@@ -127,6 +128,12 @@ class StudyHead(Table):
         "who participants are, such as experts and novices, and the operator enters the group in each session.",
     )
     credits: Credits | None = later(default=None, description="Authors, licence and citation that exports state.")
+
+    @model_validator(mode="after")
+    def _name_can_be_a_file(self) -> Self:
+        if fault := file_name_fault(self.name):
+            raise invalid(f'"{self.name}" {fault}: a study is shared, so use another name', "name")
+        return self
 
 
 class DeviceNeeds(Table):

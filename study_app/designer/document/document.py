@@ -19,7 +19,7 @@ from study_app.designer.document.toml_edits import Edit, Set
 from study_app.designer.document.toml_text import Refused, Splices, revert_splices
 from study_app.designer.templates import FOLDER, templates
 from study_app.errors import StoreError
-from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
+from study_app.ids import MAX_SHORT_NAME, file_name_fault, free_short_name, short_name_of
 from study_app.number_text import counted
 from study_app.protocol.source.document import Path as Place
 from study_app.protocol.source.document import value_at
@@ -135,6 +135,8 @@ def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
         rule = f"write at most {MAX_SHORT_NAME} small letters and digits, a letter first"
         raise _refusal(f'"{name}" is not a short name: {rule}', name)
+    if fault := file_name_fault(name):
+        raise _refusal(f'"{name}" {fault}', name)
     if name in shipped():
         raise _refusal(f'"{name}" is a study that ships with the program', name)
 

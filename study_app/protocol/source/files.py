@@ -15,11 +15,12 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from functools import lru_cache
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from types import MappingProxyType
 from typing import Any, Final
 
 from study_app.errors import Problem, ProtocolError
+from study_app.ids import file_name_fault
 from study_app.protocol.source.problems import did_you_mean
 from study_app.workspace import workspace
 
@@ -94,6 +95,12 @@ def _table_bytes(header: bytes, texts: Mapping[str, str]) -> bytes:
 def liquid_file_name(liquid: Any) -> Any:
     """Return the file name in a liquid's table; None if it has none."""
     return liquid.get("file") if isinstance(liquid, Mapping) else None
+
+
+def file_path_fault(path: str) -> str:
+    """Return why Windows cannot have a file that a study names, "" if it can."""
+    names = (part for part in PureWindowsPath(path).parts if part != PureWindowsPath(path).anchor)
+    return next((f'"{name}" {fault}' for name in names if (fault := file_name_fault(name))), "")
 
 
 def _footage_names(study: bytes) -> list[str]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from study_app.errors import StoreError
+from study_app.ids import file_name_fault
 from study_app.store import receipt
 from study_app.store.atomic import (
     cannot_read,
@@ -125,6 +126,8 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
                 f"site {name!r} cannot be used as a name: only letters A-Z, a-z and digits 0-9 are permitted, at most "
                 f"{_MAX_SITE_LENGTH}; for example A or Utrecht"
             )
+        if fault := file_name_fault(name):
+            raise StoreError(f"site {name!r} {fault}, so it cannot be the name of a folder: use another name")
         if (other := used.get(name.lower())) is not None:
             held = "is merged already" if merged is not None and other in merged.names else "is given twice"
             raise StoreError(f"site {name!r} {held} (capitals are ignored): use another name")
