@@ -7,7 +7,6 @@ has a line for every output. Results folders hold no such list: reading them nev
 import contextlib
 import hashlib
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -18,6 +17,7 @@ from study_app.errors import AnalysisError, StoreError
 from study_app.store.atomic import (
     append_line,
     cannot_write,
+    flush_file,
     make_folder,
     move,
     open_regular,
@@ -69,7 +69,7 @@ def write_files(to: Path, files: Mapping[str, bytes | FileCopy]) -> tuple[Path, 
                 with staged[name].open("xb", buffering=0) as file:
                     for part in _file_parts(content):
                         write_all(file, part)
-                    os.fsync(file.fileno())
+                    flush_file(file.fileno())
             else:
                 write_new_file(staged[name], content)
         for name in files:

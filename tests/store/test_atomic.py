@@ -1,4 +1,5 @@
 import os
+import sys
 import time
 from pathlib import Path
 
@@ -74,3 +75,25 @@ def test_a_file_is_on_the_disk_before_it_takes_its_place_and_its_place_after(
     monkeypatch.setattr("os.fsync", lambda _: seen.append((path.read_bytes(), len(names_in(tmp_path)))))
     write_file(path, b"new\n")
     assert seen == [(b"old\n", 2), (b"new\n", 1)]
+
+
+@pytest.mark.parametrize("offered", [True, False])
+def test_macos_flushes_the_drive_itself_where_it_can(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, offered: bool
+) -> None:
+    """By a double: F_FULLFSYNC is 51 in <sys/fcntl.h>, and fails with ENOTTY where a drive lacks it."""
+    fcntl = pytest.importorskip("fcntl", reason="POSIX")
+    flushed: list[str] = []
+
+    def full(_descriptor: int, command: int) -> None:
+        assert command == 51
+        if not offered:
+            raise OSError(25, "Inappropriate ioctl for device")
+        flushed.append("drive")
+
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(fcntl, "F_FULLFSYNC", 51, raising=False)
+    monkeypatch.setattr(fcntl, "fcntl", full)
+    monkeypatch.setattr(os, "fsync", lambda _: flushed.append("system"))
+    write_file(tmp_path / "table.csv", b"1\n")
+    assert flushed == ["drive" if offered else "system"] * 2

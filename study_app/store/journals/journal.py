@@ -30,6 +30,7 @@ from study_app.errors import StoreError
 from study_app.protocol.source.files import without_byte_order_mark
 from study_app.store.atomic import (
     cannot_write,
+    flush_file,
     parse_json,
     read_own,
     read_regular,
@@ -441,7 +442,7 @@ class Journal:
                 waiting = len(self._unflushed)
             if waiting:
                 try:
-                    os.fsync(self.file.fileno())
+                    flush_file(self.file.fileno())
                 except OSError:
                     with self._changed:
                         self._torn = True

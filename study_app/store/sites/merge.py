@@ -5,7 +5,6 @@ they do not count; then its list of sites is replaced in one step. A program tha
 new one, and perhaps folders that the next merge removes. Each site keeps its key: as sealed, or as opened, as it was.
 """
 
-import os
 import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from study_app.store.atomic import (
     cannot_read,
     cannot_write,
     flush_entry,
+    flush_file,
     is_there,
     move,
     open_regular,
@@ -300,7 +300,7 @@ def _copy_file(source: str, to: str) -> str:
     with open_regular(Path(source)) as file, Path(to).open("xb") as copy:
         shutil.copyfileobj(file, copy)
         copy.flush()
-        os.fsync(copy.fileno())
+        flush_file(copy.fileno())
     shutil.copystat(source, to)
     return to
 
