@@ -1,14 +1,29 @@
 """What tests need of the operating system."""
 
 import os
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 import pytest
 
 from study_app.gui.display.display_check import missing_for_windows
 
 needs_window_system = pytest.mark.skipif(bool(missing_for_windows()), reason=missing_for_windows())
+
+
+def _can_link() -> bool:
+    """Return whether this user can make links: Windows demands a right, and Wine makes none without an error."""
+    with tempfile.TemporaryDirectory() as folder:
+        link = Path(folder, "link")
+        with suppress(OSError, NotImplementedError):
+            link.symlink_to(folder)
+        return link.is_symlink()
+
+
+needs_links = pytest.mark.skipif(not _can_link(), reason="this user cannot make links")
+needs_posix = pytest.mark.skipif(os.name != "posix", reason="POSIX")
 needs_fork = pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
 
 

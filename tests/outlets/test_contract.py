@@ -3,6 +3,7 @@
 import itertools
 import json
 import os
+import re
 import select
 import sys
 import time
@@ -143,7 +144,7 @@ def test_the_other_end_gets_each_event_in_order(kind: str, parport: str) -> None
         ("serial:/dev/ttyUSB0@fast", "write serial:NAME or serial:NAME@BAUD"),
         ("serial:/dev/ptmx@99999999999999999999", "^serial:/dev/ptmx@9+ cannot be opened: "),
         ("parallel:/dev/\0x", r"^'parallel:/dev/\\x00x' is not an address of markers: "),
-        ("parallel:/nowhere/parport0", "parallel:/nowhere/parport0 cannot be opened: No such file"),
+        ("parallel:/nowhere/parport0", "parallel:/nowhere/parport0 cannot be opened: "),
         ("usb:1", "'usb:1' is not an address of markers: use one like lsl, parallel:/dev/par"),
     ],
 )
@@ -201,7 +202,7 @@ def test_a_serial_port_that_fails_is_lost_in_a_line(how: str) -> None:
 @pytest.mark.parametrize("fails_at", [PPCLAIM, PPWDATA])
 def test_a_parallel_port_that_does_not_answer_is_named_and_released(parport: str, fails_at: int) -> None:
     ioctl = Ioctl(fails_at)
-    with pytest.raises(OutletError, match=f"parallel:{parport} failed: No such device or address; is another"):
+    with pytest.raises(OutletError, match=re.escape(f"parallel:{parport} failed: ")):
         TriggerSink(ParallelPort(parport, ioctl), time.perf_counter_ns)
     assert fails_at == PPCLAIM or ioctl.calls[-1] == (PPRELEASE,)
 

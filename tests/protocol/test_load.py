@@ -1,6 +1,5 @@
 """Which files a study names as its liquids, however the key is written."""
 
-import os
 import time
 from pathlib import Path
 
@@ -20,6 +19,7 @@ from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.protocol.scene_file import scene_text
 from study_app.protocol.source.files import bundle, source_bytes, unbundle
+from tests.platforms import needs_posix
 from tests.protocol.sound import EVERY_ORDER, SOUND
 
 
@@ -42,7 +42,7 @@ def test_a_name_is_looked_up_in_the_working_folder_first(tmp_path: Path, monkeyp
         ("folder/rek2024.toml", "no such file"),
         ("rek2024.toml", "no such file"),
         (".", "is a folder"),
-        (os.devnull, "is a pipe or a device"),
+        pytest.param("/dev/null", "is a pipe or a device", marks=needs_posix),
     ],
 )
 def test_a_protocol_that_is_not_there(name: str, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -15,7 +15,7 @@ from study_app.store.atomic import (
     temporary_path,
     write_file,
 )
-from tests.platforms import files_up_to
+from tests.platforms import files_up_to, needs_posix
 
 
 def names_in(folder: Path) -> list[str]:
@@ -65,6 +65,7 @@ def test_lines_are_appended_after_a_torn_one_without_losing_either(tmp_path: Pat
     assert path.read_bytes() == b"1\ntor\n2\n3\n"
 
 
+@needs_posix
 def test_a_file_is_on_the_disk_before_it_takes_its_place_and_its_place_after(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

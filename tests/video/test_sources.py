@@ -155,10 +155,7 @@ def test_of_an_address_scheme_and_host_alone_are_shown(source: str, shown: str) 
 
 @pytest.mark.parametrize(
     ("installed", "words"),
-    [
-        (True, "Note: the camera tcp://127.0.0.1:9 cannot be used: Connection refused. Sessions of this"),
-        (False, "pip install 'liquid-study[video]'"),
-    ],
+    [(True, "Note: the camera tcp://127.0.0.1:9 cannot be used: "), (False, "pip install 'liquid-study[video]'")],
 )
 def test_check_notes_what_keeps_this_machine_from_showing_the_camera(
     camera_study: Path, installed: bool, words: str, monkeypatch: pytest.MonkeyPatch

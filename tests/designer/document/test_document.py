@@ -24,6 +24,7 @@ from study_app.store.study_runs import Run, keep_run_content, runs_of_study
 from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save_study
 from study_app.user_folder import data_folder
 from tests.designer.document.grown import PROTOCOLS
+from tests.platforms import needs_links
 
 DEMO = read_study((PROTOCOLS / "demo.toml").read_bytes())
 
@@ -217,6 +218,7 @@ def test_next_version_raises_the_last_number(version: str, following: str) -> No
     assert next_version(version) == following
 
 
+@needs_links
 def test_save_replaces_the_file_keeps_its_permissions_and_its_previous_content(tmp_path: Path) -> None:
     file, link = tmp_path / "study.toml", tmp_path / "link.toml"
     file.write_bytes(b"a = 1\r\n")

@@ -136,7 +136,7 @@ def test_the_safety_layer_bears_delays_that_the_law_alone_does_not() -> None:
         ("import sys; sys.exit(7)", "ended with code 7"),
         ("import time; time.sleep(60)", "gave no answer within 0.5 s"),
         ("import os, time; os.close(1); time.sleep(60)", "gave no answer within 0.5 s"),
-        (None, "cannot be started: No such file or directory"),
+        (None, "cannot be started: "),
         ("changed", "is not the published table: its checksum is not in SHA256SUMS"),
     ],
 )

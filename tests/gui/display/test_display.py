@@ -11,7 +11,7 @@ from study_app import app
 from study_app.errors import DisplayError
 from study_app.gui.display.display_check import check_display, missing_library
 from study_app.gui.display.screens import LEAD_NS, STALE_REFRESHES, Frames
-from tests.platforms import needs_window_system
+from tests.platforms import needs_posix, needs_window_system
 
 MS = 1_000_000
 
@@ -100,7 +100,7 @@ def test_without_swaps_the_clock_goes_on(screen):
     "environment",
     [
         {},
-        pytest.param({"DISPLAY": ":7654"}, marks=needs_window_system),
+        pytest.param({"DISPLAY": ":7654"}, marks=[needs_window_system, needs_posix]),
         {"QT_QPA_PLATFORM": "xcb", "WAYLAND_DISPLAY": "wayland-0"},
     ],
     ids=["none", "not served", "xcb by name"],
@@ -123,6 +123,7 @@ def test_platforms_without_an_x_server_are_left_to_qt():
         check_display({}, platform)
 
 
+@needs_posix
 def test_a_missing_library_is_named_with_the_packages_that_bring_it():
     error = ImportError("libEGL.so.1: cannot open shared object file: No such file or directory")
     said = str(missing_library(error))

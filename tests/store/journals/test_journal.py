@@ -18,6 +18,7 @@ from study_app.store.journals import journal_events
 from study_app.store.journals.journal import Journal, SessionClock, read, scan
 from study_app.store.journals.journal_events import journal_schema, line_problem, unknown_events
 from tests.journal_lines import event_of, raw
+from tests.platforms import needs_posix
 from tests.store.conftest import AWKWARD, Start
 
 
@@ -99,7 +100,7 @@ def test_a_journal_is_neither_written_over_nor_continued_after_another_program(t
     assert path.read_bytes() == before
     with pytest.raises(StoreError, match="cannot be written"):
         Journal.create(tmp_path / "gone" / "journal.jsonl")
-    with pytest.raises(StoreError, match=r"none\.jsonl cannot be read \(No such file or directory\)"):
+    with pytest.raises(StoreError, match=r"none\.jsonl cannot be read \("):
         read(tmp_path / "none.jsonl")
 
 
@@ -132,6 +133,7 @@ def test_times_come_from_the_monotonic_clock_which_may_go_on() -> None:
     assert abs(datetime.fromisoformat(resumed.at(3600.0)) - datetime.now().astimezone()) < timedelta(minutes=1)
 
 
+@needs_posix
 def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_back(tmp_path: Path) -> None:
     path, away = tmp_path / "journal.jsonl", tmp_path / "away.jsonl"
     with Journal.create(path) as journal:

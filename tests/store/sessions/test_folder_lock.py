@@ -17,7 +17,7 @@ from study_app.store.folder_lock import is_open, lock_folder, markers, process_s
 from study_app.store.folders import StudyFolder, locate_session, study_folder
 from study_app.store.sessions.begin import used_ids
 from tests.faults.support.racers import race
-from tests.platforms import needs_fork
+from tests.platforms import needs_fork, needs_links, needs_posix
 
 
 def other(folder: Path, **changes: Any) -> Path:
@@ -68,6 +68,7 @@ def test_the_marker_of_a_program_that_is_gone_is_passed_over(tmp_path: Path, cha
     mine.release()
 
 
+@needs_posix
 def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as program:
         other(tmp_path, pid=program.pid, began=process_start_s(program.pid))
@@ -166,6 +167,7 @@ def test_a_used_session_is_refused_with_three_ways_to_go_on(tmp_path: Path) -> N
     used_ids(folder).check_unused("P004", 1)
 
 
+@needs_links
 def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:
     study = StudyFolder(tmp_path.resolve() / "rek2024")
     session = study.session("P007", 3)

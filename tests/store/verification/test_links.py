@@ -23,7 +23,7 @@ from study_app.store.verification.verify_session import session_discrepancies
 from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import forked
-from tests.platforms import needs_fork
+from tests.platforms import needs_fork, needs_links
 from tests.store.conftest import Start
 
 
@@ -51,6 +51,7 @@ def test_a_study_that_is_called_by_a_path_is_not_exported(tmp_path: Path, finish
 
 
 @pytest.mark.parametrize("name", ["../escaped.csv", "within/../../escaped.csv", "/escaped.csv", "linked/escaped.csv"])
+@needs_links
 def test_nothing_is_written_outside_of_the_folder_asked_for(tmp_path: Path, name: str) -> None:
     to = tmp_path / "out"
     to.mkdir()
