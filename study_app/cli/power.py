@@ -2,37 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
 
-from study_app.cli.options import (
-    EXIT_CANCELLED,
-    FILE,
-    ShowProgress,
-    Target,
-    echo_files,
-    executor_for,
-    progress,
-    takes_workers,
-)
+from study_app.analysis.planning import MOST_PARTICIPANTS, SIZES, STUDIES, THRESHOLD_STUDIES
+from study_app.cli.options import EXIT_CANCELLED, FILE, Target, echo_files, executor_for, progress, takes_workers
 from study_app.workers.executors import Workers
 
 if TYPE_CHECKING:
-    from concurrent.futures import Executor
+    from study_app.analysis.planning.power_estimates import PowerEstimate
 
-    from study_app.analysis.planning.power_curves import Powers
-    from study_app.analysis.planning.threshold_studies import PrecisionPlans, Precisions
-    from study_app.protocol.model import Protocol
-
-SIZES, MOST = (5, 8, 12, 16, 20, 24), 1000
-
-
-TRIALS = (1, 1000)
-STUDIES, THRESHOLD_STUDIES = 1000, 200
+_TRIALS = (1, 1000)
 
 
 def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, ...]:
@@ -52,14 +35,14 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
     "--sizes",
     default=",".join(map(str, SIZES)),
     show_default=True,
-    callback=lambda _context, _option, value: _parse_numbers(value, 2, MOST, "numbers of participants"),
+    callback=lambda _context, _option, value: _parse_numbers(value, 2, MOST_PARTICIPANTS, "numbers of participants"),
     metavar="N,N,…",
     help="Numbers of participants; by default also the planned one.",
 )
 @click.option(
     "--trials",
     callback=lambda _context, _option, value: (
-        () if value is None else _parse_numbers(value, *TRIALS, "numbers of trials")
+        () if value is None else _parse_numbers(value, *_TRIALS, "numbers of trials")
     ),
     metavar="N,N,…",
     help="Number of trials per standard, comparison or rated level, for studies of thresholds, d′, ratings or "
@@ -97,14 +80,14 @@ def power(
         workers = Workers(workers.count)
     elif engine == "dask" and workers.cluster is None:
         raise click.UsageError("--engine dask needs a cluster: give --cluster tcp://HOST:8786")
-    from study_app.analysis.planning.simulated_studies import compares_statements
+    from study_app.analysis.planning.power_estimates import estimate_power, planned_sizes
     from study_app.analysis.planning.threshold_studies import plans
     from study_app.protocol.load import load
+    from study_app.session.simulated.rehearsal import condition_features
     from study_app.store.atomic import make_folder
 
     study = load(protocol)
-    planned = plans(study, trials)
-    if trials and not planned:
+    if trials and not plans(study, trials):
         raise click.UsageError(
             f"--trials: {study.study.name} does not have a main block of thresholds, d′, ratings or magnitude "
             f"estimation"
@@ -112,22 +95,23 @@ def power(
     if to is not None:
         make_folder(to, waits=False)
     stated = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
-    if looks := () if study.analysis is None else study.analysis.looks:
-        if stated:
-            raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}; omit --sizes")
-        sizes = looks
-    elif study.analysis is not None and not stated and 1 < (study.analysis.participants or 0) <= MOST:
-        sizes = tuple(sorted({*sizes, study.analysis.participants or 0}))
-    estimate: Powers | Precisions | None = None
-    steps: Iterator[Powers] | Iterator[Precisions]
+    if stated and study.analysis is not None and (looks := study.analysis.looks):
+        raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}; omit --sizes")
+    sizes = sizes if stated else planned_sizes(study)
+    estimate: PowerEstimate | None = None
     cancelled = False
     try:
         with progress() as show, executor_for(workers) as executor:
-            if planned and (trials or not compares_statements(study)):
-                steps = _threshold_precision(study, planned, sizes, studies or THRESHOLD_STUDIES, seed, show, executor)
-            else:
-                steps = _statement_power(study, sizes, studies or STUDIES, seed, show, executor)
-            for estimate in steps:
+            for estimate in estimate_power(
+                study,
+                executor,
+                sizes=sizes,
+                trials=trials,
+                studies=studies,
+                seed=seed,
+                rehearse=lambda: condition_features(study, seed=seed, progress=show),
+                progress=show,
+            ):
                 show(f"{estimate.studies} of {estimate.asked} studies of each size", estimate.studies / estimate.asked)
     except KeyboardInterrupt:
         cancelled = True
@@ -138,52 +122,21 @@ def power(
         click.get_current_context().exit(EXIT_CANCELLED)
 
 
-def _statement_power(
-    study: Protocol, sizes: tuple[int, ...], studies: int, seed: int, show: ShowProgress, executor: Executor
-) -> Iterator[Powers]:
-    """Yield the power of the statements' tests, from more and more studies."""
-    from study_app.analysis.planning.power_curves import powers
-    from study_app.analysis.planning.simulated_studies import plan, sweep
-    from study_app.session.simulated.rehearsal import condition_features
-
-    show("simulating every condition")
-    planned = plan(study, condition_features(study, seed=seed, progress=show))
-    for done, counts in sweep(planned, sizes, studies, seed, executor):
-        yield powers(planned, sizes, done, studies, seed, counts)
-
-
-def _threshold_precision(
-    study: Protocol,
-    planned: PrecisionPlans,
-    sizes: tuple[int, ...],
-    studies: int,
-    seed: int,
-    show: ShowProgress,
-    executor: Executor,
-) -> Iterator[Precisions]:
-    """Yield the precision of thresholds, from more and more studies."""
-    from study_app.analysis.planning.threshold_studies import Precisions, sweep
-
-    show("simulating observers")
-    for done, precision in sweep(planned, sizes, studies, seed, executor):
-        yield Precisions(protocol=study, sizes=sizes, studies=done, asked=studies, seed=seed, found=precision)
-
-
-def _write_estimate(estimate: Powers | Precisions, to: Path | None) -> None:
+def _write_estimate(estimate: PowerEstimate, to: Path | None) -> None:
     """Print the tables; write them and the figures into a folder."""
-    from study_app.analysis.planning.power_curves import Powers, power_markdown, write_power
-    from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown
+    from study_app.analysis.planning.power_curves import Powers, write_power
+    from study_app.analysis.planning.power_estimates import estimate_markdown
+    from study_app.analysis.planning.threshold_studies import threshold_csv
     from study_app.store.output_files import write_files
 
+    text = estimate_markdown(estimate)
+    click.echo(text, nl=False)
+    if to is None:
+        return
     if isinstance(estimate, Powers):
-        click.echo(power_markdown(estimate), nl=False)
-        written = write_power(estimate, to) if to is not None else ()
+        echo_files(write_power(estimate, to))
     else:
-        text = threshold_markdown(estimate)
-        click.echo(text, nl=False)
-        files = {"power.md": text.encode(), "power.csv": threshold_csv(estimate)}
-        written = write_files(to, files) if to is not None else ()
-    echo_files(written)
+        echo_files(write_files(to, {"power.md": text.encode(), "power.csv": threshold_csv(estimate)}))
 
 
 @click.command()

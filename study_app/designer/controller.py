@@ -92,7 +92,7 @@ class DesignerController(QObject):
         self.saving.compare_asked.connect(self.changes.compare_with)
         self.runs.changed.connect(self._show_header)
         self._repairs.found.connect(place.show_repairs)
-        self.measures = MeasuresController(editing, place, self._repairs)
+        self.measures = MeasuresController(editing, place)
         self.measures.warned.connect(self._show_header)
         self.measures.warned.connect(self._show_warnings)
 

@@ -439,11 +439,7 @@ class DesignerPlace(Place):
         self.outline, self.new_page = OutlineCard(), NewStudyPage()
         self.pane = _RightPane()
         self.measures = MeasuresPage()
-        self.pane.add_page(
-            PanePage(
-                name="measures", words="Measures", body=self.measures, aside=self.measures.controls, with_facts=False
-            )
-        )
+        self.pane.add_page(PanePage(name="measures", words="Measures", body=self.measures, with_facts=False))
         self.pane.add_page(
             PanePage(name="file", words="File", body=self.file, aside=self.file.aside, tip=command_tip("file"))
         )

@@ -1,1 +1,10 @@
 """Before a study: how many participants it needs, how precise thresholds will be, and its preregistration."""
+
+from typing import Final
+
+MOST_PARTICIPANTS: Final = 1000
+SIZES: Final = (5, 8, 12, 16, 20, 24)
+"""Numbers of participants of simulated studies, beside the planned one."""
+STUDIES: Final = 1000
+THRESHOLD_STUDIES: Final = 200
+"""Simulated studies of each size: of statements, and of thresholds, d′, ratings or magnitude estimation."""

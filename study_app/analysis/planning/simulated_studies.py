@@ -35,7 +35,7 @@ from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulat
 from study_app.protocol.table import text_in
 
 LOWEST, HIGHEST = 1, POINTS
-_ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
+ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 """(Block, condition) → features of rehearsed trials."""
 
 
@@ -91,7 +91,7 @@ class Plan:
         return tuple(dict.fromkeys(it.id for block in self.blocks for it in block.items if it.id not in OPINIONS))
 
 
-def plan(protocol: Protocol, features: _ConditionFeatures) -> Plan:
+def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     """Return what can be planned of a protocol; AnalysisError says that no block compares settings and asks of them."""
     language = spoken({"study": {"languages": protocol.study.languages}})
     asked = _compared(protocol)
@@ -140,7 +140,7 @@ def _compared(protocol: Protocol) -> list[Block]:
     return [block for block in protocol.main_blocks if _statements(protocol, block) and len(block.conditions) > 1]
 
 
-def _planned(protocol: Protocol, block: Block, features: _ConditionFeatures, language: str) -> Planned:
+def _planned(protocol: Protocol, block: Block, features: ConditionFeatures, language: str) -> Planned:
     conditions = {name: protocol.conditions[name] for name in block.conditions}
     kind = protocol.compared_in(block.id)
     assert kind is not None  # noqa: S101 - a main block

@@ -19,13 +19,12 @@ from study_app.designer.measures.levels import (
     LevelWords,
     Limit,
     Ticks,
+    block_of,
     even_ticks,
-    level_block,
     limit_colour,
     log_ticks,
     rounded,
 )
-from study_app.designer.measures.simulation import focus_of
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import font
 from study_app.gui.theme.themed import Themed
@@ -33,9 +32,10 @@ from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.numbers import Range
 from study_app.number_text import capitalised, duration, exact_duration
 from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
+from study_app.protocol.presented.presented_levels import level_limits, levels
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.tracks import design_of, method_of
-from study_app.protocol.trials.designs import ORDINALS, default_design
+from study_app.protocol.trials.designs import ORDINALS
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tasks import AnyTask
@@ -82,7 +82,7 @@ def _level_axis(study: Study, row: Row) -> _LevelAxis | None:
         stimulus = Stimulus.model_validate(value_at(study.document, row.path[:-1]))
     except ValidationError:
         return None
-    scale = LevelWords(stimulus, default_design("2ifc"))
+    scale = LevelWords(stimulus)
     low, high = stimulus.levels
     standard, limits = _limits(study, row, scale)
     log = stimulus.spacing == "log"
@@ -120,17 +120,17 @@ def _level_axis(study: Study, row: Row) -> _LevelAxis | None:
 def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit, _AxisLimit]]:
     """Return the highest standard in words, and the limits of the block that presents the levels."""
     protocol = study.formed
-    focus = focus_of(protocol, row.path[:-1])
-    of = None if protocol is None or focus.block is None else level_block(protocol, focus.block)
-    if of is None:
+    block = block_of(protocol, row.path[:-1])
+    if protocol is None or block is None or block.stimulus is None or block.design is None:
         return "", {}
-    standard = "" if of.standard is None else f"standard {rounded(of.standard)} {scale.value_unit}".rstrip()
+    highest = max((level.standard for level in levels(protocol, block.id) if level.standard is not None), default=None)
+    standard = "" if highest is None else f"standard {rounded(highest)} {scale.value_unit}".rstrip()
     limits: dict[Limit, _AxisLimit] = {}
-    if of.limits is not None:
-        values: dict[Limit, float | None] = {"norm": of.limits.force, "slope": of.limits.loop}
+    if (reached := level_limits(protocol, block)) is not None:
+        values: dict[Limit, float | None] = {"norm": reached.force, "slope": reached.loop}
         for name, value in values.items():
             if value is not None:
-                level = scale.stimulus.level_between(of.standard, value)
+                level = scale.stimulus.level_between(highest, value)
                 if math.isfinite(level) and level > 0:
                     limits[name] = _AxisLimit(
                         f"{LIMIT_NAMES[name]} {rounded(value)} {scale.value_unit}".rstrip(), level

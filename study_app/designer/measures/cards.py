@@ -1,7 +1,7 @@
 """Cards of measures: words, numbers, bars and tables, as values and as the widgets that show them."""
 
 from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 from PySide6.QtCore import QEvent, QRectF, Qt
@@ -15,7 +15,7 @@ from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
-from study_app.gui.widgets.labels import Elided, Ink, figures, label, set_ink
+from study_app.gui.widgets.labels import Elided, Ink, figures, label
 from study_app.protocol.source.document import Path
 
 UNKNOWN: Final = "–"
@@ -26,20 +26,6 @@ INKS: dict[Tone, Ink] = {"ok": "ok", "warn": "warn", "bad": "bad", "accent": "ac
 _NAME_PX = 132
 _MOST_LINES = 7
 NARROW_CODES = 3
-NUMBERS, ONE_ROW_FROM = 4, 600
-
-
-@dataclass(frozen=True, slots=True)
-class NumberCard:
-    """One number with its verdict or a note, and a sentence below it; grey while another one is ``simulated``."""
-
-    title: str
-    number: str
-    _: KW_ONLY
-    unit: str = ""
-    note: Verdict = ("neutral", "", "")
-    more: str = ""
-    simulated: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +65,9 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Lines with bars; grey while others are simulated."""
+    """Lines with bars."""
 
     lines: tuple[Line, ...]
-    grey: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,80 +92,6 @@ class MeasureCard:
     aside: str = ""
     parts: tuple[Part, ...] = ()
     wide: bool = False
-
-
-class _NumberPart(Card):
-    """One number; grey while another one is computed."""
-
-    def __init__(self) -> None:
-        super().__init__(padding=14, gap=2)
-        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.shown: tuple[NumberCard, str] | None = None
-        self.title = Elided("small", "text2")
-        self.number, self.unit = figures("", "number"), label("", "small", "text2")
-        self.icon, self.note = Icon("info", "text2", 14), label("", "small", "text2", wraps=True)
-        self.more = label("", "small", "text2", wraps=True)
-        across = hbox(self.number, (self.unit, 0, Qt.AlignmentFlag.AlignBottom), STRETCH, spacing=6)
-        below = hbox((self.icon, 0, Qt.AlignmentFlag.AlignTop), (self.note, 1), spacing=6)
-        add_parts(self.column, self.title, across, below, self.more, STRETCH)
-
-    def show_card(self, shown: NumberCard, waiting: str) -> None:
-        waiting = waiting if shown.simulated else ""
-        if (shown, waiting) == self.shown:
-            return
-        self.shown = (shown, waiting)
-        self.title.show_text(shown.title)
-        self.number.setText(shown.number)
-        set_ink(self.number, "text3" if waiting else "text")
-        self.unit.setText(shown.unit)
-        note: Verdict = ("neutral", "clock", waiting)
-        tone, icon, text = note if waiting else shown.note
-        self.icon.show_icon(icon or "info", INKS[tone])
-        self.note.setText(text)
-        self.more.setText(shown.more)
-        self.more.setVisible(bool(shown.more) and not waiting)
-        also = f". {shown.more}" if self.more.isVisibleTo(self) else ""
-        self.setAccessibleName(f"{shown.title}: {shown.number} {shown.unit}, {text}{also}")
-        self._fit()
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._fit()
-
-    def _fit(self) -> None:
-        margins = self.column.contentsMargins()
-        room = self.width() - margins.left() - margins.right() - self.unit.sizeHint().width() - 6
-        self.number.setFont(font("number", tabular=True))
-        if self.number.sizeHint().width() > room:
-            self.number.setFont(font("card", tabular=True))
-
-
-class NumbersRow(QWidget):
-    """Four numbers side by side, in narrow places two by two."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.grid = grid_of(8, 8, margins=0, parent=self)
-        self.parts = [_NumberPart() for _ in range(NUMBERS)]
-        self._columns = 0
-        self._lay_out(NUMBERS)
-
-    def show_numbers(self, shown: tuple[NumberCard, ...], waiting: str) -> None:
-        self.setVisible(bool(shown))
-        for part, card in zip(self.parts, shown, strict=False):
-            part.show_card(card, waiting)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        super().resizeEvent(event)
-        self._lay_out(NUMBERS if self.width() >= ONE_ROW_FROM else NUMBERS // 2)
-
-    def _lay_out(self, columns: int) -> None:
-        if columns != self._columns:
-            self._columns = columns
-            for at, part in enumerate(self.parts):
-                self.grid.addWidget(part, at // columns, at % columns)
-            for at in range(NUMBERS):
-                self.grid.setColumnStretch(at, int(at < columns))
 
 
 class _Strip(Themed, QWidget):
@@ -318,17 +229,16 @@ class _Cell(Themed, QWidget):
 
 def _lines_widget(shown: Lines) -> QWidget:
     made = QWidget()
-    ink: Ink = "text3" if shown.grey else "text"
     grid = QGridLayout(made)
     grid.setContentsMargins(0, 0, 0, 0)
     grid.setVerticalSpacing(4)
     grid.setColumnStretch(1, 1)
     for at, line in enumerate(shown.lines[:_MOST_LINES]):
-        name, bar = Elided("label", ink), Bar(6)
+        name, bar = Elided("label"), Bar(6)
         name.setFixedWidth(_NAME_PX)
         name.show_text(line.title)
         bar.show_share(line.share)
-        number = figures(line.number, ink=ink)
+        number = figures(line.number)
         tone, icon, text = line.verdict
         number.setAccessibleName(f"{line.title}: {line.number}{f', {text}' if text else ''}")
         grid.addWidget(name, at, 0)

@@ -14,11 +14,14 @@ from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Set, Unset, meant_document
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
+from study_app.protocol.blocks import Block
 from study_app.protocol.json_schema import schema
 from study_app.protocol.load import validate_document
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.balance import Evenness, balances, numbered_participants
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
+from study_app.protocol.sequences import row_count
 from study_app.protocol.source.document import Path, frozen, has, value_at
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.warnings.study_warnings import warnings
@@ -27,6 +30,10 @@ from study_app.protocol.wording.languages import languages_of
 from study_app.store.verification.leaks import Telltales
 from study_app.store.workstation import device_without_force
 
+_PLANNED: Final = ("analysis", "participants")
+PARTICIPANTS: Final = 12
+"""Participants of a study without `analysis.participants`."""
+_SEED: Final = 1
 _SHORTEST: Final = 3
 """Letters of an id that does not stand in a text by chance."""
 READ: Final = ("pages", "blocks", "tasks", "designs")
@@ -314,3 +321,24 @@ def facts(study: Study) -> Facts:
         breaks=sum(block.breaks for block in orders.blocks),
         warnings=(*warned, *translate),
     )
+
+
+def planned_participants(study: Study) -> int | None:
+    """Return the number of participants that the file plans, even if other parts are faulty; None if it states none."""
+    planned = value_at(study.document, _PLANNED)
+    faulty = any(fault.path == _PLANNED for fault in study.faults)
+    return planned if isinstance(planned, int) and not faulty else None
+
+
+def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str, Evenness, int | None] | None:
+    """Return order and evenness of a block, and the participants per round of its square, if it has one.
+
+    None where the block has one code.
+    """
+    for judged in balances(protocol, numbered_participants(participants), _SEED):
+        for judged_block in judged.blocks:
+            if judged_block.id == block.id:
+                order, codes = judged_block.order, judged_block.evenness.codes
+                rows = row_count(order, len(codes)) if order in ("williams", "latin") else None
+                return order, judged_block.evenness, rows
+    return None

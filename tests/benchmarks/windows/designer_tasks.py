@@ -161,7 +161,7 @@ class Tasks:
         user = self.user
         user.select("Viscosity", "Session, in order")
         user.choose("View of the study", "Measures")
-        wait_until(lambda: any("planned in ±" in label.text() for label in user.window.findChildren(QLabel)
+        wait_until(lambda: any("studies within ±" in label.text() for label in user.window.findChildren(QLabel)
                                if label.isVisible()), "the numbers", 120_000)  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Repairs of faults, numbers that follow every edit, and what simulated observers show."""
+"""Repairs of faults, numbers that follow every edit, and levels as limits clip them."""
 
 import math
 from dataclasses import replace
@@ -11,9 +11,14 @@ from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures import simulation
-from study_app.designer.measures.simulation import balance_of, focus_of, measurable_thresholds, simulate_observers
-from study_app.designer.measures.study_facts import facts, revealing_texts, text_keys, texts_by_language, valid_part
+from study_app.designer.measures.study_facts import (
+    balance_of,
+    facts,
+    revealing_texts,
+    text_keys,
+    texts_by_language,
+    valid_part,
+)
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.describe import describe
 from study_app.protocol.load import load
@@ -241,44 +246,6 @@ def plan_of(trials: int = 40, *changes: Set) -> ThresholdPlan:
     return plan.with_trials(trials)
 
 
-@pytest.mark.slow
-def test_planted_observers_are_found_as_precisely_as_check_expects() -> None:
-    plan = plan_of()
-    found = simulate_observers(plan, 0.2, 0.02)
-    assert found is not None
-    low, middle, high = (found.course[-1][1][at] for at in (0, 2, 4))
-    assert low < 0.2 < high
-    assert middle == pytest.approx(0.2, rel=0.1)
-    assert found.course[-1][0] == plan.trials == found.trials
-    known = expected(plan)
-    assert known is not None
-    assert found.error == pytest.approx(2.303 * known.spreads["as assumed"], rel=0.4)  # of 20 observers
-    spreads = [quantiles[4] / quantiles[0] for _, quantiles in found.course]
-    assert spreads[-1] < 0.6 * max(spreads)
-    assert sum(share for _, share in found.asked) == pytest.approx(1.0)
-    assert [one.trial for one in found.one] == list(range(1, plan.trials + 1))
-    assert {one.track for one in found.one} == {1, 2}
-    grid = {round(level, 9) for level in plan.stimulus.grid}
-    assert {round(one.level, 9) for one in found.one} <= grid
-    assert found.at_threshold == pytest.approx(0.5 + 0.48 / 2, abs=1e-6)  # half the way from guessing to lapsing
-    assert found.found[0][30] > found.planted[30] > found.found[4][30]  # a lower threshold is a higher function
-
-
-def test_observers_show_the_same_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulation, "OBSERVERS", 200)
-    found, again = (simulate_observers(plan_of(4), 0.2, 0.02) for _ in range(2))
-    assert found is not None
-    assert repr(found) == repr(again)
-    assert (found.observers, found.trials) == (200, 4)
-    levels, shares = np.array(found.asked).T
-    assert shares.sum() == pytest.approx(1.0)
-    assert (np.diff(levels) > 0).all()
-    assert [trials for trials, _ in found.course] == [2, 4]
-    assert all((np.diff(quantiles) > 0).all() for _, quantiles in found.course)
-    assert [(one.trial, one.track) for one in found.one] == [(1, 1), (2, 2), (3, 1), (4, 2)]
-    assert (found.levels[30], found.planted[30]) == pytest.approx((0.109545, 0.632946), abs=1e-6)
-
-
 @pytest.mark.parametrize(
     ("changes", "asked", "presented"),
     [
@@ -306,21 +273,18 @@ def test_no_clipped_level_is_a_threshold_that_can_be_measured() -> None:
     for changes, most in ((CLIPPED, FULL), (unpaced, 8 / 0.3 / 12 - 1)):
         protocol = template("viscosity-jnd").with_edits(*changes)[0].formed
         assert protocol is not None
-        focus = focus_of(protocol, ("blocks", "viscosity"))
-        assert focus.plan is not None
+        plan = threshold_plan(protocol, protocol.blocks["viscosity"])
+        assert plan is not None
         clips = clipping(protocol, protocol.blocks["viscosity"])
         assert clips is not None
-        assert clips.highest(focus.plan.stimulus) == pytest.approx(most, rel=1e-4)
-        assert (focus.plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
+        assert clips.highest(plan.stimulus) == pytest.approx(most, rel=1e-4)
+        assert (plan.clipping is None) == (changes is unpaced)  # fast motions are repeated, not answered
     limits = LevelLimits(force=None, loop=40.0, hand_mps=0.1)
     known = clipping(protocol, protocol.blocks["viscosity"], limits)
     assert known is not None
     assert known.limit == 40.0  # limits that are known are not looked for again
     down = Set(("stimuli", "damping", "standards"), [60]), Set(("stimuli", "damping", "direction"), "down")
     assert not plan_of(4, *down).measures(np.array(-1.0))  # the standard itself is clipped
-    found = measurable_thresholds(plan_of(4, *CLIPPED), 0.02, 0.02, most=0.03)
-    assert found is not None
-    assert [one.threshold for one in found.planted] == pytest.approx([0.02], rel=0.01)
 
 
 def test_no_level_of_a_late_force_is_clipped_though_a_limit_clips_the_force() -> None:
@@ -332,27 +296,11 @@ def test_no_level_of_a_late_force_is_clipped_though_a_limit_clips_the_force() ->
 
 
 @pytest.mark.slow
-def test_clipped_levels_make_the_error_larger(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulation, "OBSERVERS", 100)
-    clipped, full = plan_of(24, *CLIPPED), plan_of(24, *CLIPPED)
-    found = [simulate_observers(one, 0.6, 0.02) for one in (clipped, replace(full, clipping=None))]
-    assert found[0] is not None
-    assert found[1] is not None
-    assert found[0].error > 1.2 * found[1].error
-    assert max(found[0].planted) < found[0].at_threshold + 0.05 < max(found[1].planted)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("standard", [52, 60])
-def test_a_threshold_whose_levels_are_clipped_has_no_error_and_no_precision(
-    standard: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(simulation, "OBSERVERS", 100)
+def test_a_threshold_whose_levels_are_clipped_has_no_precision(standard: float) -> None:
     plan = plan_of(24, Set(("stimuli", "damping", "standards"), [standard]))
-    observed, known = simulate_observers(plan, 0.19, 0.02), expected(plan)
-    assert observed is not None
+    known = expected(plan)
     assert known is not None
-    assert math.isinf(observed.error)
     assert not known.measured
     assert (known.participants_for(0.15), known.trials_for(0.15, 12)) == (None, None)
     found = threshold_studies.study_batch(threshold_studies.Case("viscosity", plan, (1,)), (12,))
@@ -381,40 +329,3 @@ def test_each_standard_is_simulated_as_limits_clip_it() -> None:
     )
     own_errors, same_errors = (np.concatenate(one.errors) for one in studies)
     assert own_errors[:, 1].std() < 0.9 * same_errors[:, 1].std()
-
-
-@pytest.mark.slow
-def test_more_lapses_lower_the_function_and_raise_the_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(simulation, "OBSERVERS", 100)
-    plan = plan_of(24)
-    few, many = simulate_observers(plan, 0.2, 0.0), simulate_observers(plan, 0.2, 0.15)
-    assert few is not None
-    assert many is not None
-    assert few.planted[-1] > many.planted[-1] + 0.1
-    assert many.error > few.error
-
-
-@pytest.mark.nightly
-@pytest.mark.slow
-def test_thresholds_beyond_the_levels_are_not_measurable_and_none_below_the_error_of_a_trial() -> None:
-    found = measurable_thresholds(plan_of(60), 0.02, least=0.1)
-    assert found is not None
-    assert found.ends is not None
-    assert min(one.threshold for one in found.planted) >= 0.1 == pytest.approx(found.ends[0], rel=0.5)
-    assert all(one.coverage > 0.9 for one in found.planted)
-
-
-def test_a_simulation_is_given_up_when_asked() -> None:
-    asked = 0
-
-    def check() -> None:
-        nonlocal asked
-        asked += 1
-        if asked > 3:
-            raise InterruptedError
-
-    with pytest.raises(InterruptedError):
-        simulate_observers(plan_of(4), 0.2, 0.02, check)
-    with pytest.raises(InterruptedError):
-        measurable_thresholds(plan_of(4), 0.02, 0.0, check)
-    assert asked == 5

@@ -16,7 +16,7 @@ from study_app.designer.document.toml_edits import Edit, Set, Unset
 from study_app.designer.file import file_text
 from study_app.designer.form.form import form_of
 from study_app.designer.measures.measures_view import measures_view
-from study_app.designer.measures.simulation import Controls, Simulated
+from study_app.designer.measures.simulation import Simulated
 from study_app.designer.measures.study_facts import facts, restored_part
 from study_app.designer.outline import outline_rows
 from study_app.designer.participant.playable import NotPlayableError, first_showing, part_to_play
@@ -89,7 +89,7 @@ def test_a_value_of_a_wrong_type_is_a_fault_that_every_view_shows(name: str, pat
         if not isinstance(value_at(study.document, selected), dict):
             continue
         form_of(study, selected)
-        measures_view(study, known, selected, Controls(), Simulated(), dict.fromkeys(problems, ()))
+        measures_view(study, known, selected, Simulated())
         if protocol is not None:
             first_showing(protocol, selected)
         with pytest.raises(NotPlayableError):

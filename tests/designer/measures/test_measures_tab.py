@@ -1,73 +1,98 @@
-"""The tab Measures in its window: what follows an edit, what is ordered and given up, and the repair of levels."""
+"""The tab Measures in its window: the cards of an element, and the power that another process simulates."""
 
 from typing import Any
 
 import pytest
-from PySide6.QtCore import Qt
-from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QLabel, QWidget
+from PySide6.QtWidgets import QWidget
 
-from study_app.designer.measures.simulation import hypotheses_of
-from tests.designer.measures.conftest import Worker, jnd
+from study_app.designer.document.steps import RetypeFile
+from study_app.designer.document.toml_edits import Set
+from study_app.workers.server import Crashed
+from tests.designer.measures.conftest import Worker, open_viscosity_block
 
 pytestmark = pytest.mark.slow
+WAITING = "simulating …"
 
 
-def click(button: Any) -> None:
-    QTest.mouseClick(button, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier, button.rect().center())
-
-
-def test_what_is_simulated_is_typed_at_the_right(qtbot: Any, designer: Any, worker: Worker) -> None:
-    jnd(designer)
+def test_power_is_shown_in_parts_cancelled_by_an_edit_and_kept(qtbot: Any, designer: Any, worker: Worker) -> None:
+    open_viscosity_block(designer)
+    power = designer.place.measures.power
     qtbot.waitUntil(lambda: bool(worker.orders))
-    controls = designer.place.measures.controls
-    for control, typed in ((controls.threshold, "30"), (controls.lapses, "5"), (controls.participants, "8")):
-        designer.fill(control.field, typed)
-    qtbot.waitUntil(lambda: worker.orders[-1].controls.participants == 8)
-    wanted = worker.orders[-1].controls
-    assert (wanted.threshold, wanted.lapses) == (0.3, 0.05)
-    qtbot.keyClick(controls.participants.field, Qt.Key.Key_Up)
-    qtbot.waitUntil(lambda: worker.orders[-1].controls.participants == 9)
-    designer.editing.select(("pages", "welcome"))
-    qtbot.waitUntil(lambda: not controls.threshold.isVisible())
-    assert controls.participants.isVisible()
-
-
-@pytest.mark.parametrize("path", [("sequence",), ("blocks", "viscosity_2")])
-def test_the_hypothesis_comes_first_with_what_the_planned_participants_show(
-    qtbot: Any, designer: Any, worker: Worker, path: tuple[str, ...]
-) -> None:
-    jnd(designer)
-    designer.place.duplicate()
-    designer.go_to("sequence")
-    designer.click_on(designer.field("analysis", "contrasts").add)
-    designer.go_to(*path)
-    above = designer.place.measures.hypotheses
-
-    def texts() -> list[str]:
-        return [part.text() for part in above.findChildren(QLabel) if part.text()]
-
-    qtbot.waitUntil(lambda: texts()[:2] == ["Hypotheses", "24 planned"])
-    qtbot.waitUntil(lambda: bool(worker.orders and worker.orders[-1].block))
-    qtbot.waitUntil(lambda: bool(hypotheses_of(worker.orders[-1].protocol)))
+    assert worker.orders[0].power
+    assert power.progress.text() == WAITING
+    assert not power.table.isVisible()
+    worker.answer("10 of 200 studies of each size")
+    qtbot.waitUntil(lambda: power.progress.text() == "10 of 200 studies of each size")
+    assert "| 12 | 80% |" in power.table.text()
+    assert designer.place.header.problems.words == "1 warning"  # that of the precision is simulated
     worker.answer()
-    words = "Threshold is higher in viscosity than in viscosity_2: 80 % of studies of 12 show a ratio of 1.2"
-    qtbot.waitUntil(lambda: words in texts())
-    assert designer.place.measures.numbers.isVisible()
-    assert above.mapTo(designer.place, above.pos()).y() < designer.place.measures.numbers.mapTo(
-        designer.place, designer.place.measures.numbers.pos()).y()  # fmt: skip
-    designer.go_to("pages", "welcome")
-    qtbot.waitUntil(lambda: "Hypotheses" not in texts())
+    qtbot.waitUntil(lambda: not power.progress.isVisible())
+
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: len(worker.orders) == 2)
+    assert power.progress.text() == WAITING
+    assert power.table.isVisible()  # the earlier table stays until there is another one
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 100))
+    qtbot.waitUntil(lambda: worker.stops == 1)
+    qtbot.waitUntil(lambda: len(worker.orders) == 3)
+    assert worker.orders[2].protocol.methods["adaptive"].trials == 100
+    designer.editing.undo()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not power.progress.isVisible())
+    designer.editing.make_step("Change", Set(("pages", "welcome", "title"), "Hello"))
+    qtbot.wait(120)
+    assert len(worker.orders) == 3  # the answer is kept, and does not depend on a text
+
+    designer.window.go("home")
+    assert not worker.works  # nothing is simulated during a session
+    assert not designer.controller.measures.rest.isActive()
 
 
-@pytest.mark.usefixtures("worker")
-def test_the_number_of_participants_is_simulated_beside_the_planned_one(designer: Any) -> None:
-    jnd(designer)
-    control = designer.place.measures.controls.participants
-    for typed, planned in (("8", "(24 planned)"), ("24", "planned")):
-        designer.fill(control.field, typed)
-        assert (control.field.text(), control.unit.text()) == (typed, planned)
-    assert b"participants = 24" in designer.editing.opened.source()
+def test_other_tabs_order_the_warnings_without_the_power(qtbot: Any, designer: Any, worker: Worker) -> None:
+    designer.controller.begin_study("template:viscosity-jnd", "thicker")
+    designer.place.pane.show_tab("file")
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    assert not worker.orders[-1].power
+    designer.place.pane.show_tab("measures")
+    qtbot.waitUntil(lambda: worker.orders[-1].power)
+
+
+@pytest.mark.parametrize("starts", [True, False])
+def test_a_failed_simulation_says_why(qtbot: Any, designer: Any, worker: Worker, starts: bool) -> None:
+    def fail() -> Any:
+        raise OSError
+
+    if not starts:
+        designer.controller.measures.make = fail
+    open_viscosity_block(designer)
+    progress = designer.place.measures.power.progress
+    if starts:
+        qtbot.waitUntil(lambda: bool(worker.orders))
+        worker.given.append((1, Crashed(1)))
+        sentence = "The process ended with exit code 1; the terminal may show why."
+    else:
+        sentence = "The simulation process does not start."
+    qtbot.waitUntil(lambda: progress.text() == sentence)
+    designer.controller.measures.make = lambda: worker
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 60))
+    qtbot.waitUntil(lambda: progress.text() == WAITING)
+
+
+def test_numbers_of_a_broken_study_are_of_its_last_valid_state(qtbot: Any, designer: Any, worker: Worker) -> None:
+    open_viscosity_block(designer)
+    page = designer.place.measures
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.answer()
+    qtbot.waitUntil(page.power.table.isVisible)
+    cards = page.grid.cards
+    designer.editing.handle_request(RetypeFile(designer.text.replace("[study]", "[study")))
+    qtbot.waitUntil(page.earlier.isVisible)
+    assert page.grid.cards == cards
+    assert not page.grid.isEnabled()
+    assert page.power.table.isVisible()
+    designer.editing.undo()
+    qtbot.waitUntil(lambda: not page.earlier.isVisible())
+    assert page.grid.isEnabled()
 
 
 def test_a_screen_reader_hears_each_count_of_the_balance(qtbot: Any, designer: Any, worker: Worker) -> None:
@@ -75,8 +100,8 @@ def test_a_screen_reader_hears_each_count_of_the_balance(qtbot: Any, designer: A
     designer.editing.select(("blocks", "liquids"))
     designer.place.pane.show_tab("measures")
 
-    def heard() -> bool:
+    def has_counts() -> bool:
         names = [part.accessibleName() for part in designer.place.measures.findChildren(QWidget)]
         return any("1, position 1: " in name and name.endswith(" times") for name in names)
 
-    qtbot.waitUntil(heard)
+    qtbot.waitUntil(has_counts)
