@@ -16,7 +16,7 @@ from study_app.workers.client import WorkerClient
 
 @dataclass(frozen=True, slots=True)
 class EffectCost:
-    """The time of an effect per tick [ns]; None with the reason if it is absent."""
+    """The computation time of an effect per tick [ns], or None and the reason why the effect is absent."""
 
     effect: str
     ns: float | None
@@ -25,7 +25,7 @@ class EffectCost:
 
 @dataclass(frozen=True, slots=True)
 class Costs:
-    """The time of a scene per tick, of a scene without liquids, and of each effect [ns]."""
+    """The computation time per tick [ns] of a scene, of a scene without liquids, and of each effect."""
 
     tick_ns: float
     rest_ns: float
@@ -34,13 +34,13 @@ class Costs:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Errors:
-    """The errors of a scene against the exact definition (``evidence.reference_model``), along programmed paths.
+    """The errors of a scene along programmed paths, against the exact definition (``evidence.reference_model``).
 
-    ``wake`` is the largest difference as a share of Σ|e|/S, ``force_n`` that of the forces [N]; None where there is no
-    reference. ``lag_s`` is the lag of the velocity filter under constant acceleration. ``left_out`` are effects that
-    were not compared. ``withheld`` is the share of the force that safety withholds in the requested stroke
-    (``evidence.appraisal_measurement``), None without one. ``velocity`` is the relative error of the velocity, and
-    what it would be if nothing of the device's dynamics were unknown; None if nothing is.
+    ``wake`` is the largest wake error as a fraction of Σ|e|/S and ``force_n`` the largest force error [N]; None without
+    a reference. ``lag_s`` is the lag of the velocity filter under constant acceleration. ``left_out`` lists effects
+    that were not compared. ``withheld`` is the fraction of the force that the safety layer withholds in the requested
+    stroke (``evidence.appraisal_measurement``), None without a stroke. ``velocity`` holds the relative velocity error
+    on the device and on a device with fully known dynamics; None if the dynamics are known.
     """
 
     wake: float | None
@@ -53,7 +53,7 @@ class Errors:
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """A scene to appraise, and optionally a stroke in it, on a device of these dynamics."""
+    """A scene to appraise and, optionally, a stroke in it, on a device with these dynamics."""
 
     scene: Scene
     stroke: Stroke | None = None
@@ -62,7 +62,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class DeliveryQuestion:
-    """A study of which the trials that would not be delivered are predicted, for a delay [ticks]."""
+    """A study whose undelivered trials are to be predicted for a device delay [ticks]."""
 
     protocol: Protocol
     delay_ticks: int
@@ -72,5 +72,5 @@ AppraisalClient: TypeAlias = WorkerClient[Question | DeliveryQuestion, Costs | E
 
 
 def start_appraisal_worker() -> AppraisalClient:
-    """Start a worker process for questions; a new question cancels the last one."""
+    """Start a worker process that answers questions; a new question cancels the previous one."""
     return WorkerClient("study_app.evidence.appraisal_measurement:appraise", name="appraisal", background=True)

@@ -53,7 +53,7 @@ def costs(scene: Scene, *, batches: int = _BATCHES) -> Costs:
 
 
 def errors(scene: Scene) -> Errors:
-    """Return the errors of a scene with one liquid against the definition: its drag and wake, everywhere."""
+    """Return the errors of a one-liquid scene against the definition of its drag and wake."""
     scene = resolve(scene)
     liquid = scene.liquids[0]
     kept = tuple(effect for effect in liquid.effects if effect in _COMPARED)
@@ -83,9 +83,10 @@ def _lag_s(scene: Scene) -> float:
 
 
 def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
-    """Return the relative error of the velocity on a device, and on one of which nothing is unknown; RMS over RMS.
+    """Return the relative RMS velocity error on a device, and on the same device with fully known dynamics.
 
-    The hand moves by `HAND_M` at `HAND_HZ`. An unknown encoder count is taken to be `FINE_M`, an unknown delay a tick.
+    The hand moves by `HAND_M` at `HAND_HZ`. An unknown encoder count is assumed to be `FINE_M`, an unknown delay one
+    tick.
     """
     known = dynamics._replace(
         delay_s=ASSUMED_TICKS / scene.rate_hz if dynamics.delay_s is None else dynamics.delay_s,
@@ -109,7 +110,7 @@ def _velocity_error(scene: Scene, dynamics: Dynamics, count_m: float) -> float:
 
 
 def _difference(scene: Scene, motion: Motion) -> tuple[float, float]:
-    """Return the largest differences of wake, as a share of Σ|e|/S, and force [N] along a motion."""
+    """Return the largest wake difference, as a fraction of Σ|e|/S, and force difference [N] along a motion."""
     table = simulate(scene, motion)
     true = reference_model.respond(scene, motion)
     wake_mps = np.column_stack([table[f"wake_{axis}_mps"] for axis in "xyz"])
@@ -121,10 +122,10 @@ def _difference(scene: Scene, motion: Motion) -> tuple[float, float]:
 
 
 def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
-    """Return Σ|F_a - F_b| / Σ|F_a| along a stroke that is imposed on the position, from rest; 0 without a force.
+    """Return Σ|F_a - F_b| / Σ|F_a| along a prescribed stroke that starts at rest; 0 without a force.
 
-    The stroke is centred on the device's origin, and the loop is that of a device of these ``dynamics``.
-    F_a is the force after norm clamp and fades, F_b the force after slope limits, passivity controller and slew limit.
+    The stroke is centred on the device's origin, and the loop has these ``dynamics``. F_a is the force after norm clamp
+    and fades, F_b the force after slope limits, passivity controller and slew limit.
     """
     t_s = np.arange(round(_LASTS_S * scene.rate_hz)) / scene.rate_hz
     along_m = scene.scale * stroke.amplitude_m * np.cos(2.0 * math.pi * stroke.frequency_hz * t_s)
@@ -136,9 +137,9 @@ def withheld_share(scene: Scene, stroke: Stroke, dynamics: Dynamics) -> float:
 
 
 def appraise(question: Question | DeliveryQuestion, send: Send, stop: Stop) -> Errors | PredictedDelivery | None:
-    """Send the `Costs` of a scene, then return its `Errors`; None if another question waits.
+    """Send the `Costs` of a scene, then return its `Errors`; None if another question is waiting.
 
-    Of a study return the trials that would not be delivered.
+    For a study, return the trials that would not be delivered.
     """
     if stop():
         return None

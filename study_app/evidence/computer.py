@@ -17,7 +17,7 @@ import numpy as np
 
 
 def machine() -> str:
-    """Return the environment of the times: processor, cores, system, versions."""
+    """Return a description of the machine for reported times: processor, cores, system and versions."""
     name = platform.processor() or platform.machine()
     cpus = Path("/proc/cpuinfo")
     if cpus.exists():
@@ -40,10 +40,10 @@ while True:
 
 
 class Windows(Protocol):
-    """The windows' thread, lent by those who may open windows.
+    """Access to the GUI thread for a measurement.
 
-    ``during`` runs ``work`` in another thread while the windows live in this one, and returns or raises what it does.
-    ``timer`` is a timer of theirs, to be used by ``work``; ``frames`` counts those that were painted.
+    ``during`` runs ``work`` in another thread while this one runs the event loop, and returns or raises its result.
+    ``timer`` is a timer of the GUI thread for ``work``; ``frames`` counts the painted frames.
     """
 
     @property
@@ -53,7 +53,7 @@ class Windows(Protocol):
 
 
 def under_load(load: LoadName, windows: Windows | None, work: Callable[[], T]) -> T:
-    """Return what ``work`` returns, done while ``windows``, if there are any, live in this thread under this load."""
+    """Run ``work`` under a load and return its result; ``windows``, if any, are kept open in this thread meanwhile."""
     if windows is None:
         return work()
     if load == "gui+cpu":
@@ -64,7 +64,7 @@ def under_load(load: LoadName, windows: Windows | None, work: Callable[[], T]) -
 
 @contextmanager
 def busy_cores(count: int | None = None) -> Iterator[None]:
-    """Keep every core busy with a process of Python; those end with this one, however it ends."""
+    """Keep every core busy with a Python process; the processes end when this one does."""
     command = [sys.executable, "-S", "-c", _BUSY]
     busy = [subprocess.Popen(command, stdin=subprocess.PIPE) for _ in range(count or os.cpu_count() or 1)]  # noqa: S603 - our own words
     try:

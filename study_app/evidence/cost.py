@@ -24,9 +24,10 @@ _WARM_UP: Final = 10_000
 
 
 class Cost(NamedTuple):
-    """Medians over batches of 1,000 ticks [ns per tick]: the scene, the scene without liquids, and each effect.
+    """Median times per tick [ns] over batches of 1,000 ticks: the scene, the scene without liquids, and each effect.
 
-    An effect's cost is what it adds to its liquid without effects, or with the one that it acts through.
+    The cost of an effect is the time that it adds to its liquid without other effects, or with the effect that it
+    requires.
     """
 
     scene_ns: float
@@ -35,7 +36,7 @@ class Cost(NamedTuple):
 
 
 def measure(scene: Scene, *, batches: int = _BATCHES) -> Cost:
-    """Measure a scene and its variants in alternating batches, so that other load on the machine affects all alike."""
+    """Measure a scene and its variants in alternating batches, so that other load affects all alike."""
     scene = resolve(scene)
     rest = scene.model_copy(update={"liquids": ()})
     pairs = _pairs(scene)
@@ -61,7 +62,7 @@ def report(scene: Scene, *, batches: int = _BATCHES) -> str:
 
 
 def hand(ticks: int = _WARM_UP) -> Floats:
-    """Return positions (ticks, 3) of a hand [m] at 1 kHz: circles of 30 mm that slow down, turn back and rest."""
+    """Return hand positions (ticks, 3) [m] at 1 kHz: circles of 30 mm that slow down, reverse and stop."""
     t_s = np.arange(ticks) / 1000
     angle = 4 * np.sin(2 * np.pi * np.minimum(t_s % 10, 8.0) / 4)
     return 0.03 * np.column_stack([np.cos(angle), 0.2 * np.sin(3 * angle), np.sin(angle)])
@@ -102,7 +103,7 @@ def _take(model: Any, safety: Record, sample: Record, positions_m: Any, start: i
 
 
 def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
-    """Return for each effect a scene with and one without it."""
+    """Return, for each effect, a scene with it and one without it."""
     pairs: dict[tuple[str, Effect], tuple[Scene, Scene]] = {}
     for liquid in scene.liquids:
         for effect in bounds(scene, liquid):

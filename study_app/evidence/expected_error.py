@@ -45,11 +45,11 @@ _SETTLED: Final = 2 / 3
 
 
 class Causes(NamedTuple):
-    """What each cause changes of a force along the same strokes: RMS of the change over the RMS of the reference.
+    """The change in force due to each cause along the same strokes: RMS of the change over RMS of the reference.
 
-    From the reference to the force sent, one step each: the scene's effects with exact velocities (``law``), dw/dt
-    smoothed (``acceleration``), velocities estimated from encoder counts (``velocity``), and the safety layer of a
-    device with this delay (``limits``).
+    The causes lead from the reference to the force sent, one step each: the scene's effects with exact velocities
+    (``law``), smoothed dw/dt (``acceleration``), velocities estimated from encoder counts (``velocity``), and the
+    safety layer for a device with this delay (``limits``).
     """
 
     velocity: float = 0.0
@@ -59,7 +59,7 @@ class Causes(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """The time of a scene's choice per tick, and the RMS error of its force, relative to the reference's RMS and in N.
+    """The time per tick of the scene's effects, and the RMS error of the force, relative to the reference and in N.
 
     ``causes`` splits the error, ``against`` describes the reference.
     """
@@ -72,14 +72,14 @@ class Expected(NamedTuple):
 
 
 def expected(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> Expected:
-    """Measure a scene's cost and predict its error; of several liquids that with the greatest one."""
+    """Measure a scene's cost and predict its error; with several liquids, the greatest error."""
     share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
     cost_ns = measure(scene).scene_ns
     return Expected(cost_ns=cost_ns, error_share=share, error_n=error_n, causes=causes, against=against)
 
 
 def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
-    """Return the expected error on a device with a delay as a line of text."""
+    """Return the expected error on a device with a delay as one line of text."""
     error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
     split = (f"{name} {f'{100 * it:.2g} %' if it > ROUNDING else 'none'}" for name, it in causes._asdict().items())
     return (
@@ -95,7 +95,7 @@ def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
 
 
 def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
-    """Return the errors of one liquid, as if it were the only one, everywhere and without a current."""
+    """Return the errors of one liquid, as if it filled the scene without a current."""
     liquid = scene.liquids[index].model_copy(update={"region": Everywhere(), "current": None})
     named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
     kept = tuple(it for it in named if it not in {"current", "surface"})
@@ -132,7 +132,7 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, C
 
 
 def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats]:
-    """Yield the forces (n, 3) [N] of which each differs from the one before by one more cause, as `Causes` lists."""
+    """Yield the forces (n, 3) [N], each with one more of the causes in `Causes` than the previous one."""
     yield samples_along(scene, motion, dynamics).force_n
     yield samples_along(scene, motion, dynamics, smooths=True).force_n
     step_m = dynamics.count_m * scene.scale
@@ -147,8 +147,8 @@ def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats
 def physical_n(scene: Scene, speed_mps: float, rate_per_s: float, t_s: Floats) -> Floats:
     """Return the best-known force (n, 3) [N] on a ball in strokes along x, v = speed · sin ωt.
 
-    Steady drag by experiment, −½ρV dv/dt of the added mass, −6πµR (R/δ)(v + (dv/dt)/ω) of the history, which is exact
-    in creeping flow (Landau & Lifshitz §24) and an upper bound in faster flow, and net buoyancy.
+    It is the sum of steady drag from experiments, the added mass −½ρV dv/dt, the history −6πµR (R/δ)(v + (dv/dt)/ω),
+    which is exact in creeping flow (Landau & Lifshitz §24) and an upper bound in faster flow, and net buoyancy.
     """
     liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
     mu, rho, volume_m3 = liquid.viscosity_pa_s or math.nan, liquid.density_kg_m3, scene.body.volume_m3
@@ -165,7 +165,7 @@ def _stroke(speed_mps: float, rate_per_s: float, t_s: Floats) -> tuple[Floats, F
 
 
 def _non_newtonian_n(scene: Scene, motion: Motion, speed_mps: float, rate_per_s: float) -> Floats:
-    """Return non-Newtonian drag by its equations, added mass and buoyancy, (n, 3) [N]."""
+    """Return the sum of non-Newtonian drag, added mass and buoyancy (n, 3) [N]."""
     liquid, t_s = scene.liquids[0], motion.t_s
     v, dv = _stroke(speed_mps, rate_per_s, t_s)
     added_n = 0.5 * liquid.density_kg_m3 * scene.body.volume_m3 * dv
@@ -179,7 +179,7 @@ def _lift_n(scene: Scene) -> float:
 
 
 def _defined_n(scene: Scene, motion: Motion) -> Floats:
-    """Return drag and wake by the literal definition, (n, 3) [N]."""
+    """Return drag and wake (n, 3) [N] from the exact definition."""
     liquid = scene.liquids[0]
     if "drag" not in liquid.effects:
         return np.zeros_like(motion.position_m)

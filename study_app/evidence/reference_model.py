@@ -24,7 +24,7 @@ from study_app.haptics.model.scene import Ewma, Knee, Scene
 
 
 class Response(NamedTuple):
-    """The results of the definition for each row of a motion, (n, 3) except the last."""
+    """The exact velocity, wake and force at each row of a motion, (n, 3) except the last."""
 
     velocity_mps: Floats
     wake_mps: Floats
@@ -33,7 +33,7 @@ class Response(NamedTuple):
 
 
 def respond(scene: Scene, motion: Motion) -> Response:
-    """Return velocity, wake and force along ``motion`` in a scene of one liquid that is everywhere: drag and wake."""
+    """Return velocity, wake and force along ``motion`` in a scene with one liquid everywhere: drag and wake."""
     liquid = scene.liquids[0]
     interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
     interval_s[0] = 1 / scene.rate_hz
@@ -51,7 +51,7 @@ def respond(scene: Scene, motion: Motion) -> Response:
 
 
 def resistance_nspm(scene: Scene, speed_mps: float) -> float:
-    """Return |F|/|w| [N·s/m] by the liquid's law of drag, from C_d itself; at rest its limit."""
+    """Return |F|/|w| [N·s/m] of the liquid's drag law, computed from C_d itself; at rest its limit."""
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     pressure_kg_m = 0.5 * liquid.density_kg_m3 * math.pi * (diameter_m / 2) ** 2
     if liquid.drag.law == "linear":
@@ -84,7 +84,7 @@ def _filtered(scene: Scene, motion: Motion, interval_s: Floats) -> Floats:
 
 
 def lowered(velocity_mps: Floats, knee: Knee) -> Floats:
-    """Return one velocity (3,) after the speed knee."""
+    """Return one velocity (3,) after applying the speed knee."""
     speed = float(np.linalg.norm(velocity_mps))
     excess = speed - knee.threshold_mps
     if excess <= 0 or knee.law == "none":
@@ -126,7 +126,7 @@ _REST_MPS: Final = 1e-3
 
 
 def new_wake_list(wake: Wake, rate_hz: float) -> tuple[Any, Any]:
-    """Return the empty list of a wake: `_WAKE_LIST` (1,) and its elements (N,) `_ELEMENT`."""
+    """Return an empty wake list: `_WAKE_LIST` (1,) and its elements (N,) `_ELEMENT`."""
     made, length = records(_WAKE_LIST, 1), max(1, math.floor(wake.length * rate_hz / 1000))
     made.length, made.scaling = length, max(wake.scaling * rate_hz / 1000, length)
     made.exponent, made.resolution_m = wake.exponent, wake.resolution_m
@@ -138,7 +138,7 @@ def new_wake_list(wake: Wake, rate_hz: float) -> tuple[Any, Any]:
 def wakes(
     h_mps: Floats, position_m: Floats, interval_s: Floats, wake: Wake, rate_hz: float = 1000.0
 ) -> tuple[Floats, Floats]:
-    """Return v_wake (n, 3) as each tick's drag meets it, and Σ|e|/S (n,), for velocities (n, 3) of the tail."""
+    """Return v_wake (n, 3) used by each tick's drag, and Σ|e|/S (n,), for velocities (n, 3) of the tail."""
     wake_mps, size_mps = np.zeros_like(h_mps), np.zeros(len(h_mps))
     made, elements = new_wake_list(wake, rate_hz)
     _wakes(made[0], elements, h_mps, position_m, np.rint(interval_s * 1e9).astype(np.int64), wake_mps, size_mps)
@@ -176,7 +176,7 @@ def store_element(wake: Any, elements: Any, h_mps: Any, position_m: Any, interva
 
 @kernel
 def _breaks(wake: Any, elements: Any, h_mps: Any, speed_mps: float) -> bool:
-    """Return whether a velocity begins a new segment: looked for from the newest element back."""
+    """Return whether a velocity begins a new segment; the search starts at the newest element."""
     reference = -1
     for number in range(wake.stored - 1, wake.stored - wake.held - 1, -1):
         element = elements[number % wake.length]
@@ -198,7 +198,7 @@ def _breaks(wake: Any, elements: Any, h_mps: Any, speed_mps: float) -> bool:
 
 @kernel
 def sum_elements(wake: Any, elements: Any, wake_mps: Any) -> float:
-    """Write v_wake into ``wake_mps`` (3,) as the next tick's drag meets it; return Σ|e|/S."""
+    """Write the v_wake that the next tick's drag uses into ``wake_mps`` (3,); return Σ|e|/S."""
     sums, newest = wake.sums, -1
     sums[:] = 0.0
     for number in range(wake.stored - 1, wake.stored - wake.held - 1, -1):
@@ -228,7 +228,7 @@ def sum_elements(wake: Any, elements: Any, wake_mps: Any) -> float:
 
 @kernel
 def _add_segment(sums: Any, elements: Any, newest: int) -> None:
-    """Add the magnitudes of a segment in the direction of its newest element, and begin another."""
+    """Add the magnitudes of a segment in the direction of its newest element, and begin another segment."""
     if newest >= 0:
         for axis in range(3):
             along = elements[newest].velocity_mps[axis] / elements[newest].speed_mps
@@ -238,7 +238,7 @@ def _add_segment(sums: Any, elements: Any, newest: int) -> None:
 
 @kernel
 def _add(sums: Any, row: int, value: float) -> None:
-    """Add to a sum, whose rounding error is in the next column."""
+    """Add to a compensated sum, whose rounding error is in the next column."""
     total = sums[row, 0] + value
     if abs(sums[row, 0]) >= abs(value):
         sums[row, 1] += (sums[row, 0] - total) + value
@@ -259,10 +259,10 @@ def local_wakes(
     reach_m: float,
     spreading_m2ps: float,
 ) -> Any:
-    """Return v_wake (n, 3) of a local wake in which every element keeps its own place and age, in any number.
+    """Return v_wake (n, 3) of a local wake in which every element keeps its own position and age.
 
-    v_tail = (1/S) Σ_j (σ_0/σ_j)³ exp(−r_j²/2σ_j²) λ^age_j e_j over the newest N elements, zero ones included, with
-    σ_j² = σ_0² + 2ν age_j; then the response to the fill, whose mean speed is weighted likewise.
+    v_tail = (1/S) Σ_j (σ_0/σ_j)³ exp(−r_j²/2σ_j²) λ^age_j e_j over the newest N elements, including zero ones, with
+    σ_j² = σ_0² + 2ν age_j; then the fill response is applied, with the mean speed weighted in the same way.
     """
     ticks = len(h_mps)
     wake_mps = np.zeros((ticks, 3))
@@ -287,7 +287,7 @@ def local_wakes(
 
 @kernel
 def _gain(fill: float, exponent: float) -> float:
-    """Return the factor of the tail by the response to a fill."""
+    """Return the gain of the tail for a fill."""
     return float(fill ** (exponent - 1.0) if exponent >= 1.0 else (fill**2 + 0.05**2) ** ((exponent - 1.0) / 2.0))
 
 
@@ -296,7 +296,7 @@ _WEIGHTS_RPS: Final = np.array([0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.
 
 
 class Constants(NamedTuple):
-    """The constants that ``liquid-study cfd --refit`` fits to the fluid solver: c_m, c_y, c_z, c_s, β and R₀."""
+    """The constants c_m, c_y, c_z, c_s, β and R₀ that ``liquid-study cfd --refit`` fits to the fluid solver."""
 
     c_m: float
     c_y: float
@@ -323,8 +323,8 @@ def unsteady_n(
 ) -> Floats:
     """Return the force (n, 3) [N] in the scene's first liquid, which has a viscosity, at rest and everywhere.
 
-    ``w_mps`` (n, 3) are velocities [m/s, scene], and ``acceleration_mps2`` their derivatives; the body begins as if it
-    had always moved at the first.
+    ``w_mps`` (n, 3) are velocities [m/s, scene], and ``acceleration_mps2`` their derivatives. Before the first row, the
+    body is assumed to have moved at the first velocity.
     """
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     density_kg_m3, viscosity_pa_s = liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan
@@ -338,7 +338,7 @@ def unsteady_n(
 def late_mps(
     w_mps: Floats, acceleration_mps2: Floats, interval_s: Floats, diameter_m: float, nu_m2ps: float, of: Constants
 ) -> Floats:
-    """Return y + h (n, d) [m/s]: the excess drag and the history over Stokes drag per speed, in d dimensions."""
+    """Return y + h (n, d) [m/s], excess drag and history over the Stokes drag per unit speed, in d dimensions."""
     result = np.empty_like(w_mps)
     z, s = w_mps[0].copy(), w_mps[0].copy()
     y = (over_stokes(math.sqrt((z**2).sum()) * diameter_m / nu_m2ps) - 1) * z
@@ -372,8 +372,8 @@ _STEPS: Final = 50
 def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m: float = 0.0) -> Floats:
     """Return the force (n, 3) [N] in the scene's first liquid, which has a flow curve, at rest and everywhere.
 
-    ``w_mps`` (n, 3) are velocities [m/s, scene], ``interval_s`` (n,) the times since the tick before [s]. Motion within
-    ``slack_m`` [m, scene] relaxes no elastic stress: two encoder counts in the servo.
+    ``w_mps`` (n, 3) are velocities [m/s, scene], ``interval_s`` (n,) the times since the previous tick [s]. Motion
+    within ``slack_m`` [m, scene], two encoder counts in the servo, does not relax elastic stress.
     """
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     law = liquid.non_newtonian
@@ -394,7 +394,7 @@ def non_newtonian_n(scene: Scene, w_mps: Floats, interval_s: Floats, *, slack_m:
 
 
 def _relaxed(w_mps: Floats, interval_s: Floats, relaxation_s: float) -> Floats:
-    """Return v of v' = (w − v)/λ, (n, 3) [m/s], exactly for a velocity that is constant in each tick."""
+    """Return v (n, 3) [m/s] that solves v' = (w − v)/λ, exact for a constant velocity in each tick."""
     v = np.zeros_like(w_mps)
     for k, w in enumerate(w_mps):
         before = v[k - 1] if k else np.zeros(3)
@@ -404,7 +404,7 @@ def _relaxed(w_mps: Floats, interval_s: Floats, relaxation_s: float) -> Floats:
 
 @evidence_kernel
 def _strains(w_mps: Any, interval_s: Any, per_m: float, slack_m: float) -> Any:
-    """Return s/s_y (n, 3) of ds = dp − |dp| s/s_y, with |dp| counted beyond the slack."""
+    """Return s/s_y (n, 3) that solves ds = dp − |dp| s/s_y, with |dp| counted beyond the slack."""
     strains = np.zeros(w_mps.shape)
     strain, ahead_m = np.zeros(3), np.zeros(3)
     for k in range(len(w_mps)):

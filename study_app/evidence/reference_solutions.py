@@ -24,13 +24,13 @@ from study_app.lab.identify.measured_force import vectors_x
 
 
 def with_effects(scene: Scene, *effects: Effect, law: Law | None = None) -> Scene:
-    """Return the scene with other effects, and perhaps another law of drag."""
+    """Return the scene with other effects and, if given, another drag law."""
     changes: dict[str, Any] = {"effects": effects} | ({} if law is None else {"drag": Drag(law=law)})
     return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update=changes),)})
 
 
 def without_buoyancy(scene: Scene) -> Scene:
-    """Return the scene with its liquid's other effects, named."""
+    """Return the scene without buoyancy, with its liquid's other effects named explicitly."""
     scene = resolve(scene)
     return with_effects(scene, *(name for name in scene.liquids[0].effects if name != "buoyancy"))
 
@@ -43,7 +43,7 @@ _STRETCHES: Final = 3
 
 
 def stir(scale: float, rate_hz: float) -> Motion:
-    """Return a stirring hand: 1.5 circles of 30 mm in 3 s, a rest, the same backward, a rest, and forward again.
+    """Return a stirring motion: 1.5 circles of 30 mm in 3 s, a rest, the same backward, a rest, and forward again.
 
     Each segment has minimum jerk (Flash & Hogan 1985) with a small vertical motion: up to 0.18 m/s at the hand. In the
     scene, it is ``scale`` times as large.
@@ -69,7 +69,7 @@ def stroke(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> 
 
 
 def with_velocity(motion: Motion) -> Motion:
-    """Return the motion with its velocities; without any, with those of central differences."""
+    """Return the motion with its velocities, computed by central differences if it has none."""
     if motion.velocity_mps is not None or len(motion.t_s) < 2:
         return motion
     return Motion(motion.t_s, motion.position_m, velocity_mps=np.gradient(motion.position_m, motion.t_s, axis=0))
@@ -122,7 +122,7 @@ CYCLES: Final = 6
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A motion with its exact velocities, the true force (n, 3) [N], and which rows of it count (n,)."""
+    """A motion with its exact velocities, the true force (n, 3) [N], and the rows that are compared (n,)."""
 
     motion: Motion
     force_n: Floats
@@ -131,10 +131,10 @@ class Case:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Truth:
-    """A reference by its name on tables and figures, with its ``source``.
+    """A reference solution; ``name`` is used in tables and figures, ``source`` cites it.
 
-    ``computing_s`` is the time of a fluid solver per second of the motion, with its machine; else None. ``left_out``
-    are the constants of unsteady drag that were fitted without this truth; None where it is in no fit.
+    ``computing_s`` is the solver's time per second of motion, with its machine; otherwise None. ``left_out`` are the
+    constants of unsteady drag that were fitted without this reference; None if it is in no fit.
     """
 
     name: str
@@ -146,17 +146,17 @@ class Truth:
 
 
 def definition(scene: Scene, motion: Motion) -> Truth:
-    """Return drag and wake of the scene's liquid by the literal definition, for a motion with its velocities."""
+    """Return drag and wake of the scene's liquid from the exact definition, for a motion with its velocities."""
     force_n = respond(scene, motion).force_n
     source = "exact definition of the wake: full length, full rate, float64, exact sums"
     return Truth(name="definition", source=source, cases=(Case(motion, force_n, np.ones(len(force_n), bool)),))
 
 
 def measured_drag_n(liquid: Liquid, diameter_m: float, speed_mps: Floats) -> Floats:
-    """Return the drag [N] of a sphere at steady speeds (n,) by `DRAG_POINTS`.
+    """Return the drag [N] of a sphere at steady speeds (n,), interpolated between `DRAG_POINTS`.
 
-    Between the points log C_d over log Re is interpolated smoothly and monotonically (Fritsch & Carlson 1980); below
-    them the force is proportional to the speed, above them to its square.
+    Between the points, log C_d is a smooth monotonic interpolation over log Re (Fritsch & Carlson 1980); below them the
+    force is proportional to the speed, above them to its square.
     """
     per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
     points = np.log(np.array(DRAG_POINTS))
@@ -170,7 +170,7 @@ def measured_drag_n(liquid: Liquid, diameter_m: float, speed_mps: Floats) -> Flo
 
 
 def steady(scene: Scene) -> Truth | None:
-    """Return the steady drag by experiment up to the scene's greatest speed, or None where it is slower than them."""
+    """Return measured steady drag up to the scene's greatest speed, or None if all measurements are at higher Re."""
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
     fastest_mps = scene.motion_in(liquid).speed_mps or 0.0
@@ -193,10 +193,10 @@ def steady(scene: Scene) -> Truth | None:
 
 
 def oscillation(scene: Scene) -> Truth:
-    """Return the force on a sphere that oscillates in creeping flow, after the transient of its start.
+    """Return the force on a sphere that oscillates in creeping flow, after the initial transient.
 
-    Landau & Lifshitz, Fluid Mechanics, §24: F = −6πµR(1 + R/δ) u − 3πR²√(2µρ/ω)(1 + 2R/9δ) du/dt, δ = √(2µ/ρω).
-    The frequency is that of a stroke with the greatest speed and acceleration of the scene.
+    Landau & Lifshitz, Fluid Mechanics, §24: F = −6πµR(1 + R/δ) u − 3πR²√(2µρ/ω)(1 + 2R/9δ) du/dt, δ = √(2µ/ρω). The
+    frequency is that of a stroke with the greatest speed and acceleration of the scene.
     """
     liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
     rate_per_s, speed_mps = strokes_per_s(scene), creeping_mps(scene)
@@ -214,7 +214,7 @@ def oscillation(scene: Scene) -> Truth:
 
 
 def start(scene: Scene) -> Truth:
-    """Return the force on a sphere that starts within a tick, in creeping flow, from 10 ms on.
+    """Return the force on a sphere that starts within one tick in creeping flow, from 10 ms onwards.
 
     Basset 1888: F = −6πµR U (1 + R/√(πνt)); with the start spread over one tick T, 1/√t becomes 2(√t − √(t−T))/T.
     """
@@ -232,13 +232,13 @@ def start(scene: Scene) -> Truth:
 
 
 def creeping_mps(scene: Scene) -> float:
-    """Return a speed [m/s] of creeping flow: Re = 0.01."""
+    """Return a speed [m/s] at which the flow is creeping: Re = 0.01."""
     liquid = scene.liquids[0]
     return _CREEPING_REYNOLDS * (liquid.viscosity_pa_s or math.nan) / (liquid.density_kg_m3 * scene.body.diameter_m)
 
 
 def strokes_per_s(scene: Scene) -> float:
-    """Return ω [1/s] of a stroke with the greatest speed and acceleration of the scene."""
+    """Return the angular frequency ω [1/s] of a stroke with the scene's greatest speed and acceleration."""
     box = scene.motion_in(scene.liquids[0])
     return (box.acceleration_mps2 or math.nan) / (box.speed_mps or math.nan)
 
@@ -251,9 +251,9 @@ ROUNDING: Final = 1e-9
 
 
 class Error(NamedTuple):
-    """The errors of a force: root mean square and greatest [N], relative to those of the reference, and direction.
+    """The RMS and the greatest error of a force [N], the same relative to the reference, and the error of direction.
 
-    ``direction_deg`` is the root mean square angle where the reference is perceptible, or else not near zero.
+    ``direction_deg`` is the RMS angle where the reference is perceptible or, if it never is, clearly above zero.
     """
 
     rms_n: float
@@ -265,7 +265,7 @@ class Error(NamedTuple):
 
 
 def error_of(forces_n: Sequence[Floats], truth: Truth) -> Error:
-    """Return the errors of forces, one (n, 3) array for each case of the reference."""
+    """Return the errors of forces, one (n, 3) array per case of the reference."""
     true_n = np.concatenate([case.force_n[case.counted] for case in truth.cases])
     felt_n = np.concatenate([force[case.counted] for force, case in zip(forces_n, truth.cases, strict=True)])
     sizes_n = np.linalg.norm(true_n, axis=1)

@@ -26,7 +26,7 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells below headings; the first ``left`` columns, or those named, are words, the others numbers."""
+    """Rows of cells below headings; the first ``left`` columns, or those named, are text, the others numbers."""
 
     headings: Sequence[str]
     rows: Sequence[Sequence[object]]
@@ -53,7 +53,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a command of evidence prints, what it writes, and whether a limit is missed, or undecided.
+    """The output of an evidence command: printed text, files, and whether a limit is missed or undecided.
 
     ``files`` are texts by file name; ``figures`` draws the others; ``closing`` is printed last.
     """
@@ -78,7 +78,7 @@ class Evidence:
 
 
 def plot_files(name: str, title: str, draw: Callable[..., Figure], *of: Any) -> Callable[[], Mapping[str, bytes]]:
-    """Return what draws a figure ``of`` these results as ``name.png`` and ``name.svg``."""
+    """Return a function that draws a figure as ``name.png`` and ``name.svg``."""
 
     def files() -> Mapping[str, bytes]:
         figure = draw(*of)
@@ -88,7 +88,7 @@ def plot_files(name: str, title: str, draw: Callable[..., Figure], *of: Any) -> 
 
 
 def duration(ns: float) -> str:
-    """Return a time on an axis: 10 ns, 1 µs, 100 s."""
+    """Return a time as an axis label: 10 ns, 1 µs, 100 s."""
     for unit, size in (("s", 1e9), ("ms", 1e6), ("µs", 1e3)):
         if ns >= size:
             return f"{ns / size:g} {unit}"
@@ -101,7 +101,7 @@ def run(
     executor: Executor | None = None,
     progress: Callable[[int], object] = lambda _done: None,
 ) -> tuple[Found, ...]:
-    """Return what ``measure`` returns for the arguments of each case, by an executor or here.
+    """Return the results of ``measure`` for each case; in parallel with an executor.
 
     ``progress`` is called with the number of finished cases.
     """
@@ -113,7 +113,7 @@ def run(
 
 
 def check_seconds(seconds: float, what: str) -> None:
-    """Refuse a duration out of range.
+    """Raise an error if a duration is out of range.
 
     Raises
     ------
@@ -132,9 +132,9 @@ def take_turns(
     progress: Callable[[str], object] = lambda _line: None,
     alternating: bool = False,
 ) -> dict[Arm, list[Found]]:
-    """Run each arm once a round, so that other load on the machine affects all alike; return what each gave.
+    """Run each arm once per round, so that other load affects all alike; return the results by arm.
 
-    An arm is called with the number of the round; ``alternating``: every second round is in reverse order.
+    An arm is called with the number of the round; with ``alternating``, every second round is in reverse order.
     """
     rows: dict[Arm, list[Found]] = {arm: [] for arm in arms}
     for number in range(rounds):
@@ -150,7 +150,7 @@ def take_turns(
 def paced(
     seconds: float, every_s: float, *, ending: threading.Event, progress: Callable[[str], object]
 ) -> Iterator[int]:
-    """Yield 0, 1, 2 … for so many seconds, with a pause after each, and report each per cent once."""
+    """Yield 0, 1, 2 … for ``seconds``, with a pause after each, and report progress once per percent."""
     began_s, shown, number = time.perf_counter(), -1, 0
     while (share := (time.perf_counter() - began_s) / seconds) < 1:
         if ending.is_set():

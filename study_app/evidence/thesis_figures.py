@@ -43,13 +43,13 @@ class _Run:
 
     @cached_property
     def table(self) -> Table:
-        """What is felt, a row a tick (see ``offline.simulate``)."""
+        """The simulated force and state, one row per tick (see ``offline.simulate``)."""
         return simulate(self.scene, self.motion)
 
 
 @dataclass(frozen=True, eq=False)
 class ThesisFigure:
-    """What a figure shows: its runs, when something happens in them [s], and what it states."""
+    """The content of a figure: its runs, the times of events in them [s], and its statement."""
 
     number: int
     title: str
@@ -63,7 +63,7 @@ class ThesisFigure:
 
 
 def tank(**wake: Any) -> Scene:
-    """Return the evaluation's liquid; ``wake`` changes parameters of its tail."""
+    """Return the liquid of the thesis' evaluation; ``wake`` changes parameters of its tail."""
     tail = Wake(**{"length": LENGTH, "scaling": LENGTH, "breaking_span_m": 0.0, **wake})
     return _scene(Liquid(id="liquid", density_kg_m3=1000, effects=("drag", "wake"), wake=tail))
 
@@ -100,7 +100,7 @@ def figure_4() -> ThesisFigure:
 
 
 def figure_5() -> ThesisFigure:
-    """Return Fig. 5: three circles, then against the flow."""
+    """Return Fig. 5: three circles, then motion against the flow."""
     motion = paths.reverse(_RATE_HZ)
     turn_s = _stop_s(paths.circle(_RATE_HZ))
     return ThesisFigure(
@@ -114,7 +114,7 @@ def figure_5() -> ThesisFigure:
 
 
 def _figure_6() -> ThesisFigure:
-    """Return Fig. 6: steps that alternate by 90°, with two breaking angles."""
+    """Return Fig. 6: steps with 90° turns, for two breaking angles."""
     motion = paths.zigzag(_RATE_HZ)
     return ThesisFigure(
         6,
@@ -141,7 +141,7 @@ def _figure_7() -> ThesisFigure:
 
 
 def figure_8() -> ThesisFigure:
-    """Return Fig. 8: a straight line with five responses of the wake."""
+    """Return Fig. 8: a straight line with five wake responses."""
     motion = paths.line(_RATE_HZ, moving_s=8.0)
     return ThesisFigure(
         8,
@@ -157,7 +157,7 @@ FIGURES: Final[tuple[Callable[[], ThesisFigure], ...]] = (figure_3, figure_4, fi
 
 
 def _stop_s(motion: Motion) -> float:
-    """Return the time of the first tick from which the body no longer moves [s]."""
+    """Return the time of the first tick after which the body is at rest [s]."""
     rests = ~np.diff(motion.position_m, axis=0).any(axis=1)
     return float(motion.t_s[int(np.argmax(rests))])
 
@@ -199,7 +199,7 @@ def figures(to: Path) -> tuple[Path, ...]:
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(shown: ThesisFigure) -> Figure:
-    """Draw one figure: title, force over time, what explains it (the path, or the liquid's speed), caption."""
+    """Draw one figure: title, force over time, the path or the liquid's speed, and caption."""
     caption = textwrap.wrap(shown.caption, _CAPTION_LETTERS)
     height_pt = _TOP_PT + _PLOT_PT + _FOOT_PT + _LINE_PT * len(caption)
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
@@ -224,7 +224,7 @@ def draw(shown: ThesisFigure) -> Figure:
 
 
 def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
-    """Draw the axes of each run's force in a plot of its own, and their path."""
+    """Draw the force of each run in its own plot, and their common path."""
     path_pt = _PLOT_PT
     width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - path_pt - _RIGHT_PT) / len(shown.runs) - _GAP_PT
     plots = []
@@ -238,7 +238,7 @@ def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> N
 
 
 def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
-    """Draw the force of all runs along the straight motion, and how much of its speed the liquid takes up."""
+    """Draw the force of all runs along the straight motion, and the fraction of its speed that the liquid reaches."""
     width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - _GAP_PT - _RIGHT_PT) / 2
     force, liquid = place(_SIDE_PT, width_pt), place(_SIDE_PT + width_pt + _GAP_PT, width_pt)
     colours = style.STEPS if len(shown.runs) == len(style.STEPS) else style.STEPS[::2]
@@ -262,7 +262,7 @@ def _time_axis(axes: Axes, until_s: float) -> None:
 
 
 def _name_curves(axes: Axes, *, shorter: bool = False) -> None:
-    """Name the curves in a row under the heading, never over the data."""
+    """Draw the legend in a row below the heading, so that it never covers data."""
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(
         handles,
@@ -280,7 +280,7 @@ def _name_curves(axes: Axes, *, shorter: bool = False) -> None:
 
 
 def _components(axes: Axes, run: _Run, events: Sequence[tuple[float, str]], *, several: bool) -> None:
-    """Draw the force of one run, a line per axis."""
+    """Draw the force of one run, one line per axis."""
     table = run.table
     _time_axis(axes, float(table.t_s[-1]))
     axes.set_title(f"Force [N], {run.label}" if several else "Force [N]", pad=_HEADING_PT)

@@ -52,7 +52,7 @@ _LOOKS: Final[dict[str, dict[str, Any]]] = {
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(accuracy: Accuracy) -> Figure:
-    """Draw the results: a panel for each kind of reference, the legend below."""
+    """Draw one panel for each kind of reference, with a legend below."""
     kinds: tuple[Kind, ...] = ("numerical", "physical")
     panels = [_Panel(accuracy, kind) for kind in kinds if accuracy.of(kind)]
     key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in accuracy.notes), _LETTERS)
@@ -83,7 +83,6 @@ _KEY: Final = (
 
 
 def _span(accuracy: Accuracy) -> tuple[float, float]:
-    """Return the least and the greatest time on the axis [ns]."""
     times = [row.ns_per_ms for row in accuracy.rows] + [
         it.computing_s * 1e6 for it in accuracy.truths if it.computing_s
     ]
@@ -91,7 +90,7 @@ def _span(accuracy: Accuracy) -> tuple[float, float]:
 
 
 class _Panel:
-    """All candidates against one kind of reference."""
+    """The plot of all candidates against one kind of reference."""
 
     def __init__(self, accuracy: Accuracy, kind: Kind) -> None:
         rows = accuracy.of(kind)
@@ -154,7 +153,7 @@ class _Panel:
             axes.plot(times, errors, color=style.ZERO, linewidth=1.2, zorder=2)
 
     def _main(self, axes: Axes) -> None:
-        """Draw the points with errors, their labels in a column to the right or next to them, and the target."""
+        """Draw the points with error bars, their labels, and the accuracy target."""
         shown = [row for row in self._points.values() if row.error.rms >= _ROUNDED]
         target = 100 * min(row.error.target for row in self._rows)
         lows = [100 * row.error.rms for row in self._rows if row.error.rms >= _ROUNDED]
@@ -194,7 +193,6 @@ class _Panel:
             it.plot([-0.012, 0.012], [edge - 0.01, edge + 0.01], **slash)
 
     def _beside(self, row: Row) -> dict[str, Any]:
-        """Return the place of a label in the strip: that of the chosen below, others alternately above and below."""
         lists = sorted((it for it in self._strip if not it.chosen and it.error.rms < ROUNDING), key=_time)
         if row.chosen:
             return {"xytext": (0, -6), "textcoords": "offset points", "ha": "center", "va": "top"}
@@ -211,7 +209,7 @@ class _Panel:
         axes.scatter(*at, s=17, edgecolor=style.TEXT, linewidth=0.7, zorder=4, **look)
 
     def _label(self, axes: Axes, shown: Sequence[Row]) -> None:
-        """Name the points: those of lower rates next to them, the others in a column, joined by hairlines."""
+        """Label the points: those at lower rates next to them, the others in a column, joined by thin lines."""
         low, high = np.log(axes.get_ylim())
         near = [row for row in shown if row.candidate.family == "rate"]
         for row in near:
@@ -251,7 +249,7 @@ def _height(row: Row) -> float:
 
 
 def spread(wanted: Sequence[float], gap: float, most: float) -> list[float]:
-    """Return places near those that are ``wanted``, in their order, at least ``gap`` apart and none above ``most``."""
+    """Return positions close to ``wanted``, in the same order, at least ``gap`` apart and at most ``most``."""
     places: list[float] = []
     for place in wanted:
         places.append(max(place, places[-1] + gap) if places else place)
@@ -282,7 +280,7 @@ def _values(row: Row) -> tuple[str | float, ...]:
 
 
 def evidence(accuracy: Accuracy) -> Evidence:
-    """Return the tables, as Markdown with the source of each reference and as CSV, and the figure."""
+    """Return the tables (Markdown with the source of each reference, and CSV) and the figure."""
     parts = [f"Machine: {accuracy.machine}.", f"Motion: {accuracy.motion}.", _WHAT]
     parts += [f"**{truth.name}**: {truth.source}." for truth in accuracy.truths]
     parts += [f"Note: {note}." for note in accuracy.notes]
@@ -333,7 +331,6 @@ def _markdown_table(rows: Sequence[Row]) -> str:
 
 
 def _count(value: float) -> str:
-    """Return a number to three digits, with separated thousands."""
     if not math.isfinite(value):
         return "–"
     digits = 0 if value == 0 else 2 - math.floor(math.log10(abs(value)))
@@ -341,7 +338,6 @@ def _count(value: float) -> str:
 
 
 def _digits(value: float) -> str:
-    """Return a number to two digits, small ones as powers of ten."""
     if not math.isfinite(value):
         return "–"
     if value != 0 and abs(value) < 1e-4:

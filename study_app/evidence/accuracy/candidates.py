@@ -45,7 +45,7 @@ _TAIL: Final = np.dtype(
 
 
 def _new_list(length: int, dtype: type[np.floating[Any]]) -> tuple[Any, Any, Any, Any]:
-    """Return an empty list for compiled code: TAIL, elements (N, 3), arcs (N,), segments (N,); -1 is no segment."""
+    """Return an empty wake list for compiled code: TAIL, elements (N, 3), arcs (N,) and segments (N,; -1 for none)."""
     tail = records(_TAIL, 1)
     tail[0].newest = length - 1
     return tail, np.zeros((length, 3), dtype), np.zeros(length), np.full(length, -1)
@@ -53,7 +53,7 @@ def _new_list(length: int, dtype: type[np.floating[Any]]) -> tuple[Any, Any, Any
 
 @kernel
 def list_wake(wake: Record, tail: Record, element: Any, segment: Any) -> None:
-    """Set ``tail.wake_mps`` from all elements, newest first, in sums of the elements' own precision."""
+    """Set ``tail.wake_mps`` to the sum over all elements, newest first, in the precision of the elements."""
     zero = element[0, 0] - element[0, 0]
     tx = ty = tz = dx = dy = dz = summed = speeds = squares = zero
     inside, row = -1, tail.newest
@@ -81,7 +81,7 @@ def list_wake(wake: Record, tail: Record, element: Any, segment: Any) -> None:
 def list_follow(
     wake: Record, tail: Record, element: Any, arc: Any, segment: Any, h: Any, place_m: Any, interval_s: float
 ) -> None:
-    """Let every element decay, and store the tick's velocity if the rules require it."""
+    """Let every element decay, and store the velocity of this tick if the rules require it."""
     keep = math.exp(wake.log_decay_per_s * interval_s)
     rows = len(segment)
     for row in range(tail.held):
@@ -126,10 +126,10 @@ Family: TypeAlias = Literal["tick", "list", "rate", "estimator", "law", "effects
 
 @dataclass(eq=False)
 class Candidate:
-    """A way to get the force, here by the servo's tick: ``name`` on tables, ``label`` on figures, of one liquid.
+    """A method that computes the force of one liquid; this base class uses the servo's tick.
 
-    ``every`` takes one tick where the motion has so many, and holds the force between; ``counted`` gives positions in
-    whole counts of an encoder, in place of exact ones.
+    ``name`` appears in tables and ``label`` in figures. ``every`` runs the tick only at every n-th sample and holds the
+    force in between; ``counted`` rounds positions to whole encoder counts.
     """
 
     name: str
@@ -143,7 +143,7 @@ class Candidate:
     BATCH: ClassVar[int] = 1000
 
     def begin(self, motion: Motion) -> None:
-        """Reset, and prepare for the ticks of a motion with velocities."""
+        """Reset the state and prepare for a motion with known velocities."""
         rows = slice(None, None, self.every)
         places_m = motion.position_m[rows]
         velocity_mps = np.zeros_like(places_m) if motion.velocity_mps is None else motion.velocity_mps[rows]
@@ -173,7 +173,7 @@ class Candidate:
         return sum(rows.nbytes for rows in _packed(self._run_scene).arrays)
 
     def take(self, start: int, stop: int) -> None:
-        """Run these ticks and set their rows of ``force_n``."""
+        """Run the ticks from ``start`` to ``stop`` and write their rows of ``force_n``."""
         _by_the_tick(self._model, self._safety[0], self._sample[0], self._motion, self.force_n, start, stop)
 
     def forces(self, motion: Motion) -> Floats:
@@ -188,10 +188,9 @@ class Candidate:
 
 
 class _UnsteadyDrag(Candidate):
-    """Unsteady drag; against a solved motion of the fit, with constants that are fitted without that motion."""
+    """Unsteady drag; a solved motion is compared using constants that were fitted without that motion."""
 
     def forces_against(self, truth: Truth) -> list[Floats]:
-        """Return the forces; by the equations where a motion is left out of the fit."""
         if truth.left_out is None:
             return super().forces_against(truth)
         forces = []
@@ -204,9 +203,9 @@ class _UnsteadyDrag(Candidate):
 
 
 class _LinearViscosity(Candidate):
-    """Linear viscosity, F = −6πµR v: all that general libraries ship.
+    """Linear viscosity, F = −6πµR v, the only law in general-purpose haptics libraries.
 
-    HAPI's and H3D's ``HapticViscosity`` is this; CHAI3D's ``cEffectViscosity`` leaves the factor to the user.
+    This is ``HapticViscosity`` of HAPI and H3D; CHAI3D's ``cEffectViscosity`` leaves the factor to the user.
     """
 
     @property
@@ -222,7 +221,7 @@ class _LinearViscosity(Candidate):
 
 @dataclass(eq=False)
 class _WakeList(Candidate):
-    """The wake as a list, float64 or float32."""
+    """The wake stored as a list of elements in float64 or float32."""
 
     precision: type[np.floating[Any]] = np.float64
 
@@ -253,13 +252,12 @@ def _packed(scene: Scene) -> Model:
 
 
 def given(scene: Scene) -> Scene:
-    """Return the scene with the velocity given with the motion."""
+    """Return the scene with the velocity taken from the motion instead of an estimator."""
     return scene.model_copy(update={"velocity": Given()})
 
 
 @kernel
 def _tick(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> None:
-    """Run one tick of a motion."""
     t_ns, hand_m, velocity_mps = motion
     state = model.state[0]
     sample.time_ns = t_ns[k]
@@ -320,28 +318,26 @@ _LAWS: dict[Law, tuple[str, str]] = {
 
 
 def _with_wake(scene: Scene, **changes: Any) -> Scene:
-    """Return the scene with other parameters of its wake."""
     wake = scene.liquids[0].wake.model_copy(update=changes)
     return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
 
 
 def _only(scene: Scene, liquid: Any) -> Scene:
-    """Return the scene with one liquid, that is everywhere and does not flow by itself."""
     alone = liquid.model_copy(update={"region": Everywhere(), "current": None})
     return scene.model_copy(update={"liquids": (alone,)})
 
 
 def drag_and_wake(scene: Scene) -> Scene:
-    """Return the scene's first liquid everywhere, with only its law of drag and its wake, if selected."""
+    """Return the scene with its first liquid everywhere, and only its drag law and, if selected, its wake."""
     liquid = resolve(scene).liquids[0]
     effects = ("drag", "wake") if "wake" in liquid.effects else ("drag",)
     return _only(scene, liquid.model_copy(update={"effects": effects}))
 
 
 def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
-    """Return implementations of one definition, or of parts of it; and the one used in the program.
+    """Return implementations of the same definition, or of parts of it, and the one that the program uses.
 
-    ``scene`` is of one liquid, by `drag_and_wake`. What is about the wake is left out where there is none.
+    ``scene`` has one liquid, as returned by `drag_and_wake`. Without a wake, the candidates for the wake are omitted.
     """
     exact = given(scene)
     name = "O(1) wake" if _has_wake(scene) else "drag"
@@ -364,7 +360,6 @@ def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
 
 
 def _lists(exact: Scene) -> list[Candidate]:
-    """Return alternatives to the wake: lists, shorter or coarser ones, none."""
     length = exact.liquids[0].wake.length
     half, quarter = max(1, length // 2), max(1, length // 4)
     candidates: list[Candidate] = [
@@ -383,7 +378,7 @@ def _lists(exact: Scene) -> list[Candidate]:
 
 
 def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
-    """Return models of a liquid with a viscosity, in order of accuracy; and the one that the gate would choose."""
+    """Return models of a viscous liquid in order of accuracy, and the one that the program would select."""
     exact = given(_only(scene, scene.liquids[0]))
     candidates: list[Candidate] = [_LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]
     candidates += [
@@ -411,7 +406,6 @@ def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
 
 
 def _carrying(exact: Scene, law: Law, carried: tuple[Effect, ...]) -> Candidate:
-    """Return drag with added mass and history as applicable."""
     words, (name, short) = [_WORDS[it] for it in carried], _LAWS[law]
     of = with_effects(exact, "drag", *carried, law=law)
     return Candidate(" + ".join([name, *words]), " + ".join([short, *words]), "effects", of)

@@ -35,7 +35,7 @@ _ALLOWANCE_S: Final = 0.8
 
 
 def _clock() -> Callable[[], int]:
-    """Return a clock [ns] that stops while other programs run, or if that is too coarse, one that does not."""
+    """Return a clock [ns] of CPU time or, if that is too coarse, of elapsed time."""
     fine = time.get_clock_info("thread_time").resolution <= _FINE_S
     return time.thread_time_ns if fine else time.perf_counter_ns
 
@@ -50,7 +50,7 @@ class Time(NamedTuple):
 
 @dataclass(frozen=True)
 class Row:
-    """One candidate against one reference."""
+    """The result of one candidate against one reference."""
 
     kind: Kind
     liquid: str
@@ -64,13 +64,13 @@ class Row:
 
     @property
     def ns_per_ms(self) -> float:
-        """Computation time per millisecond of motion [ns]: at 1 kHz, that of a tick."""
+        """Computation time per millisecond of motion [ns]; at 1 kHz this is the time per tick."""
         return self.time.median_ns * self.candidate.rate_hz / 1000
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """All results: rows, sources of the references, omissions with reasons, the machine and the motion."""
+    """All results: rows, sources of the references, omitted candidates with reasons, machine and motion."""
 
     rows: tuple[Row, ...]
     truths: tuple[Truth, ...]
@@ -94,9 +94,9 @@ def accuracy(
     allowance_s: float = _ALLOWANCE_S,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Accuracy:
-    """Measure the candidates of one scene against its definition, and those of another against physics.
+    """Compare the candidates of one scene with its definition, and those of another with physical references.
 
-    ``motion`` is at the scenes' rate: the definition is followed along it, and all candidates are timed along it.
+    ``motion`` has the scenes' rate. The definition is evaluated along it, and all candidates are timed along it.
 
     Raises
     ------
@@ -169,7 +169,7 @@ def _rows(
 
 
 class _Bench:
-    """One candidate along the motion, repeatedly, with its memory filled before the timing."""
+    """One candidate that is run along the motion repeatedly, with its memory filled before it is timed."""
 
     def __init__(self, candidate: Candidate, motion: Motion) -> None:
         self._candidate, self._motion, self._clock_ns = candidate, motion, _clock()
@@ -177,7 +177,7 @@ class _Bench:
         self.forget()
 
     def forget(self) -> None:
-        """Begin a new repeat: times per tick [ns] of its batches, and the elapsed time [s]."""
+        """Discard the batch times per tick [ns] and the elapsed time [s] before a new repeat."""
         self.costs_ns: list[float] = []
         self.passed_s = 0.0
 
@@ -206,9 +206,9 @@ class _Bench:
 def _race(
     candidates: Sequence[Candidate], motion: Motion, repeats: int, batches: int, allowance_s: float
 ) -> dict[Candidate, Time]:
-    """Return the times of all candidates, in alternating batches, so that slow phases of the machine affect all alike.
+    """Return the times of all candidates in alternating batches, so that slow phases of the machine affect all alike.
 
-    What other programs take is not counted: it would strike a batch of 10 ms each time, and one of 100 µs hardly ever.
+    Time used by other programs is excluded: it would affect every batch of 10 ms, but few of 100 µs.
     """
     benches = {candidate: _Bench(candidate, motion) for candidate in candidates}
     costs: dict[Candidate, list[list[float]]] = {candidate: [] for candidate in candidates}
@@ -232,7 +232,7 @@ def _race(
 
 
 def worst(rows: Sequence[Row]) -> dict[Candidate, Row]:
-    """Return each candidate's row against the reference with its greatest error."""
+    """Return, for each candidate, the row of the reference with the greatest error."""
     largest: dict[Candidate, Row] = {}
     for row in rows:
         if row.candidate not in largest or row.error.rms > largest[row.candidate].error.rms:
@@ -241,9 +241,9 @@ def worst(rows: Sequence[Row]) -> dict[Candidate, Row]:
 
 
 def front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
-    """Return the Pareto-optimal candidates in time and error, cheapest first.
+    """Return the candidates that are Pareto-optimal in time and error, cheapest first.
 
-    Rounding errors count as equal, and so do times that differ by less than clocks and neighbours can tell.
+    Differences within rounding error, or within the resolution of the timing, count as equal.
     """
 
     def error(row: Row) -> float:

@@ -51,11 +51,11 @@ PUBLISHED: Final[Mapping[str, Callable[[float], float]]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Surveyed:
-    """One liquid: its Reynolds number at the scene's greatest speed, its model, and the errors of that.
+    """One liquid: its Reynolds number at the scene's greatest speed, its model, and the model's errors.
 
-    Errors are RMS shares with velocities known, against creeping flow, experiments and the fluid solver; None where
-    there is no such truth, or the ball is too fast for creeping flow to matter. ``solver_reynolds`` are the least and
-    the greatest of the solved motions.
+    Errors are relative RMS errors with known velocities, against creeping flow, experiments and the fluid solver. They
+    are None without such a reference, or if the ball is too fast for creeping flow. ``solver_reynolds`` is the range of
+    the solved motions.
     """
 
     liquid: str
@@ -70,12 +70,12 @@ class Surveyed:
 
     @property
     def reynolds(self) -> float:
-        """Re at the scene's greatest speed."""
+        """Reynolds number at the scene's greatest speed."""
         return self.speed_mps / self.mps_per_reynolds
 
 
 def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
-    """Measure every liquid with a viscosity of a file, by name; thicker ones first."""
+    """Measure every liquid of a file that has a viscosity, most viscous first."""
     surveyed = []
     for name, scene in scenes.items():
         liquid = scene.liquids[0]
@@ -115,13 +115,13 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
 
 
 def spread(reynolds: float) -> float:
-    """Return the greatest difference of the published laws of steady drag, relative to their mean."""
+    """Return the greatest difference between published laws of steady drag, relative to their mean."""
     ratios = [law(reynolds) for law in PUBLISHED.values()]
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
 
 
 def evidence(found: tuple[Surveyed, ...]) -> Evidence:
-    """Return liquids, and drag laws over the Reynolds number, as Markdown."""
+    """Return tables of the liquids and of drag laws as a function of the Reynolds number, as Markdown."""
     highest = max(it.case.reynolds for it in (*stored(), *training(), *held_out()))
     liquids = []
     for it in found:
@@ -170,7 +170,7 @@ _WHAT: Final = (
 
 
 def _measured(reynolds: float) -> float:
-    """Return C_d Re/24 by experiment."""
+    """Return C_d Re/24 as measured in experiments."""
     liquid = Liquid(id="any", density_kg_m3=1.0, viscosity_pa_s=1.0)
     return float(measured_drag_n(liquid, 1.0, np.array([reynolds]))[0]) / (3 * math.pi * reynolds)
 

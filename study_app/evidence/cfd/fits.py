@@ -39,7 +39,7 @@ _LAW: Final = "brown-lawler"
 
 @dataclass(frozen=True, slots=True)
 class Model:
-    """Effects with a law of drag, and which of their parameters are fitted."""
+    """A drag law with other effects, and the names of the parameters that are fitted."""
 
     name: str
     effects: tuple[Effect, ...]
@@ -68,12 +68,13 @@ _START: Final = {"length": 300, "scaling": 1000.0}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Fitted:
-    """One model on one motion, at the scene's rate: its parameters, and its error against the solver.
+    """One model fitted to one motion at the scene's rate: its parameters, and its error against the solver.
 
-    ``force_n`` (n,) along the motion; ``rms_n`` and ``worst_n`` the error, ``share`` the first of the RMS force,
-    ``within`` the share of time in which it meets the accuracy target. ``push`` is the momentum that the liquid gives
-    the ball after the stop, as a share of the solver's: 0 for none, below 0 against the former motion. ``carried`` is
-    ``share`` at the liquid's other speed with the same parameters. ``warnings`` are those of the fit.
+    ``force_n`` (n,) is the force along the motion, ``rms_n`` and ``worst_n`` the RMS and the greatest error, ``share``
+    the RMS error relative to the RMS force, and ``within`` the fraction of time in which the accuracy target is met.
+    ``push`` is the momentum that the liquid gives the ball after the stop, relative to the solver's: 0 for none,
+    negative against the previous motion. ``carried`` is ``share`` at the liquid's other speed with the same parameters.
+    ``warnings`` are those of the fit.
     """
 
     model: Model
@@ -90,7 +91,7 @@ class Fitted:
 
 
 def fit_all(tables: Sequence[SolvedTable], progress: Callable[[str], None] = lambda _: None) -> tuple[Fitted, ...]:
-    """Return every model fitted to every table, each tried on the others of the same liquid."""
+    """Return every model fitted to every table, and tested on the other tables of the same liquid."""
     fits = []
     for table in tables:
         progress(f"fitting {len(MODELS)} models to {table.case.liquid_id}, {table.notes['title']} ...")
@@ -102,7 +103,7 @@ def fit_all(tables: Sequence[SolvedTable], progress: Callable[[str], None] = lam
 
 
 def fit_one(model: Model, table: SolvedTable) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the parameters of the best fit of the model to the table, and the warnings of the fit."""
+    """Return the best-fitting parameters of the model for the table, and the warnings of the fit."""
     if not model.free:
         return {}, ()
     motion, force_n = even(table)
@@ -117,7 +118,7 @@ def judge(
     others: Sequence[SolvedTable] = (),
     warnings: tuple[str, ...] = (),
 ) -> Fitted:
-    """Return the errors of a model with these parameters against the table, and against others of the liquid."""
+    """Return the errors of a model with these parameters for the table and for others of the same liquid."""
     motion, solved_n = even(table)
     force_n = _force_along(model, table.case, values, motion)
     error_n = np.abs(force_n - solved_n)
@@ -143,7 +144,7 @@ def judge(
 
 
 def _scene_of(model: Model, case: Case, values: Mapping[str, float] | None = None) -> Scene:
-    """Return a scene with the model's effects in the liquid of the case, at 1 kHz with given velocities."""
+    """Return a scene with the model's effects in the liquid of the case, at 1 kHz with known velocities."""
     tables: dict[str, Any] = {}
     if "wake" in model.effects:
         tables["wake"] = Wake(**_START)
@@ -164,13 +165,13 @@ def _scene_of(model: Model, case: Case, values: Mapping[str, float] | None = Non
 
 
 def _force_along(model: Model, case: Case, values: Mapping[str, float], motion: Motion) -> Floats:
-    """Return the model's force (n,) [N] along a motion along x."""
+    """Return the model's force (n,) [N] for a motion along x."""
     force_n: Floats = np.array(simulate(_scene_of(model, case, values), motion).fx_n)
     return force_n
 
 
 def even(table: SolvedTable) -> tuple[Motion, Floats]:
-    """Return a table's motion and force (n,) with a row for every tick, so that all times weigh alike."""
+    """Return a table's motion and force (n,), resampled to one row per tick so that all times have equal weight."""
     t_s, velocity_mps, force_n = table.columns.values()
     even_s = np.arange(math.floor(t_s[-1] * _RATE_HZ) + 1) / _RATE_HZ
     even_n = np.interp(even_s, t_s, force_n)
@@ -178,7 +179,6 @@ def even(table: SolvedTable) -> tuple[Motion, Floats]:
 
 
 def _share_of(error_n: Floats, force_n: Floats) -> float:
-    """Return the RMS error as a share of the RMS force."""
     return _rms(error_n) / _rms(force_n)
 
 
@@ -197,9 +197,9 @@ _ROUNDS: Final = 10
 
 
 class Tick:
-    """A model tick by tick along x, or `along` a known motion.
+    """A model computed tick by tick along x, or with `along` for a known motion.
 
-    The law alone has the velocities given; what is ``sent`` has passed the estimator and the safety layer.
+    The law alone receives the exact velocities; a force that is ``sent`` has passed the estimator and the safety layer.
     """
 
     def __init__(self, name: str, setup: Mapping[str, float], *, sent: bool) -> None:
@@ -221,11 +221,10 @@ class Tick:
         self._model = ModelAlong(scene, dynamics, given=not sent)
 
     def __call__(self, t_s: float, x_m: float, v_mps: float) -> float:
-        """Return the force along x [N] at a time, place and velocity."""
         return float(self.along(np.array([t_s]), np.array([x_m]), np.array([v_mps]))[0])
 
     def along(self, t_s: Floats, x_m: Floats, v_mps: Floats) -> Floats:
-        """Return the forces along x (n,) [N] of a motion: times [s], places [m] and velocities [m/s], each (n,)."""
+        """Return the forces along x (n,) [N] at times [s], positions [m] and velocities [m/s], each (n,)."""
         position_m, velocity_mps = np.zeros((2, len(t_s), 3))
         position_m[:, 0], velocity_mps[:, 0] = x_m, v_mps
         samples = self._model.follow(t_s, position_m, None if self._sent else velocity_mps)
@@ -234,7 +233,10 @@ class Tick:
 
 
 def score_all(progress: Callable[[str], object] = lambda _line: None) -> Evidence:
-    """Score every model of `_ENGINES`, the law alone and as sent; they follow each motion in turn, for their times."""
+    """Score every model of `_ENGINES`, the law alone and as sent.
+
+    All models follow each motion in turn, so that their times are comparable.
+    """
     over = score.motions()
     engines = {
         f"{name}, as sent" if sent else name: partial(Tick, name, sent=sent)
@@ -269,7 +271,7 @@ _AFTER: Final = 8.0
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(tables: Sequence[SolvedTable], fits: Sequence[Fitted]) -> Figure:
-    """Draw, for the fastest motion through each liquid, the force from its start to 8 D/U after its stop."""
+    """Draw the force for the fastest motion through each liquid, from its start to 8 D/U after its stop."""
     shown = {table.case.liquid_id: table for table in sorted(tables, key=lambda it: it.case.speed_mps)}
     height_pt = _PANEL_PT * len(shown) + 30
     figure = Figure(figsize=(_WIDTH_PT / 72, height_pt / 72), facecolor="white")
@@ -326,7 +328,7 @@ def clift(reynolds: float) -> float:
 
 
 def _steady_markdown(table: SolvedTable) -> str:
-    """Return steady drag as a Markdown table: the solver's C_d, and by how much others differ from it."""
+    """Return a Markdown table of steady drag: the solver's C_d and the deviations of the others from it."""
     names = ["coarser grid", "half the box", "Clift et al. 1978", "Mittal 1999", "experiments", *LAWS, "C_d 0.47"]
     rows = []
     for reynolds, solved, coarse, narrow in zip(*(it.tolist() for it in table.columns.values()), strict=True):
@@ -338,7 +340,7 @@ def _steady_markdown(table: SolvedTable) -> str:
 
 
 def _fits_markdown(fits: Sequence[Fitted]) -> str:
-    """Return the fits as Markdown, a table for every motion."""
+    """Return the fits as Markdown, one table per motion."""
     parts = []
     for case in dict.fromkeys(it.case for it in fits):
         parts.append(f"{case.liquid_id}, {case.speed_mps:g} m/s (Re {case.reynolds:.3g})")
@@ -347,7 +349,7 @@ def _fits_markdown(fits: Sequence[Fitted]) -> str:
 
 
 def fits_csv(fits: Sequence[Fitted]) -> str:
-    """Return the fits as CSV, named `COLUMNS`; parameters as ``name=value`` apart by blanks."""
+    """Return the fits as CSV with the columns `COLUMNS`; parameters are ``name=value`` pairs separated by blanks."""
     rows = []
     for it in fits:
         numbers = (it.rms_n, it.worst_n, it.share, it.within, it.push, it.carried)
@@ -383,7 +385,7 @@ def _row(it: Fitted) -> tuple[str, ...]:
 
 
 def _measured(reynolds: float) -> float:
-    """Return C_d by the experiments that `truths` interpolates, as of a sphere and liquid of size and density 1."""
+    """Return the measured C_d that `truths` interpolates, for a sphere and a liquid of unit size and density."""
     speed_mps = np.array([1.0])
     liquid = Liquid(id="any", density_kg_m3=1.0, viscosity_pa_s=1 / reynolds)
     return float(measured_drag_n(liquid, 1.0, speed_mps)[0]) / (math.pi / 8)

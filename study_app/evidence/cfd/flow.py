@@ -31,11 +31,11 @@ _EDGE: Final = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """Extent of the mesh ahead of, behind and beside the ball, and lengths of its edges, in diameters.
+    """Extent of the mesh ahead of, behind and beside the ball, and its edge lengths, in diameters.
 
-    ``ball`` is the longest edge on the ball, ``near`` within two diameters of it and five behind; there the wake has
-    four times that, the rest of the liquid ``far``. For a ball that goes back and forth, ``symmetric``, it is ahead as
-    it is behind.
+    ``ball`` is the longest edge on the ball, ``near`` the longest within two diameters of it and five behind it. Edges
+    are four times as long in the wake and ``far`` in the rest of the liquid. A ``symmetric`` grid, for a ball that
+    moves back and forth, extends as far ahead of the ball as behind it.
     """
 
     ahead: float
@@ -48,9 +48,9 @@ class Grid:
 
 
 def library() -> Any:
-    """Import NGSolve.
+    """Import NGSolve, with linear algebra limited to one thread.
 
-    Its algebra is kept to one thread: on matrices as small as these more make it ten times slower on busy cores.
+    With matrices this small, more threads make it ten times slower on busy cores.
     """
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -63,7 +63,7 @@ def library() -> Any:
 
 
 class Flow:
-    """The liquid around the ball on one grid; ``unknowns`` is how many numbers describe it."""
+    """The liquid around the ball on one grid; ``unknowns`` is the number of degrees of freedom."""
 
     def __init__(self, grid: Grid) -> None:
         self._ng = ng = library()
@@ -79,7 +79,7 @@ class Flow:
         self._stream = self._one_on("ahead|aside")
 
     def steady(self, reynolds: Sequence[float]) -> list[float]:
-        """Return C_d at rising Reynolds numbers, each found by Newton's method from the one before."""
+        """Return C_d at increasing Reynolds numbers, each by Newton's method starting from the previous solution."""
         ng = self._ng
         flow, residual, step = ng.GridFunction(self._space), self._zeros(), self._zeros()
         flow.vec.data = self._stream
@@ -103,9 +103,9 @@ class Flow:
     def unsteady(
         self, reynolds: float, times: Floats, speed: Callable[[float], float], *, convection: bool = True
     ) -> Floats:
-        """Return the force along the stream at ``times`` (n,) [ρU²D²], for a stream at rest until the first of them.
+        """Return the force along the stream at ``times`` (n,) [ρU²D²], for a stream at rest until the first time.
 
-        Without ``convection`` the flow creeps.
+        Without ``convection`` the flow is creeping.
         """
         ng = self._ng
         stokes, mass = (ng.BilinearForm(self._space) for _ in range(2))
@@ -158,7 +158,7 @@ class Flow:
         return made
 
     def _one_on(self, border: str) -> Any:
-        """Return the vector of a flow of speed 1 along the stream at a border, and 0 at all other nodes."""
+        """Return the velocity vector that is 1 along the stream on one boundary and 0 at all other nodes."""
         flow, made = self._ng.GridFunction(self._space), self._zeros()
         flow.components[0].Set(1, definedon=self._mesh.Boundaries(border))
         made.data = flow.vec
@@ -185,7 +185,7 @@ class Flow:
 
 
 def _mesh(grid: Grid) -> Any:
-    """Return curved triangles of the half plane above the axis, its edges named."""
+    """Return a mesh of curved triangles for the half plane above the axis, with named edges."""
     from netgen.occ import Glue, OCCGeometry, WorkPlane  # noqa: PLC0415 - comes with NGSolve
 
     def box(ahead: float, long: float, high: float) -> Any:

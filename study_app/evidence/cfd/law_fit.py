@@ -28,10 +28,10 @@ _BEGIN: Final = Constants(c_m=0.5, c_y=1.0, c_z=2.0, c_s=1.0, beta=1.0, r_0=5.0)
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _MotionError:
-    """RMS error as a share of the RMS force, and greatest error as a share of the greatest force, of one motion.
+    """Relative RMS error and relative greatest error of one motion.
 
-    ``fitted`` with the constants fitted to all motions, None of a motion that is held out of the fit; ``left_out`` with
-    those fitted to all other motions, ``others``; ``program`` with the program's own constants in its tick at 1 kHz.
+    ``fitted`` is with the constants fitted to all motions (None for a motion that is held out), ``left_out`` with those
+    fitted to all motions except the ``others``, and ``program`` with the program's own constants in its tick at 1 kHz.
     Each is (RMS, greatest).
     """
 
@@ -44,14 +44,14 @@ class _MotionError:
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The constants by all motions, and the errors of each motion."""
+    """The constants fitted to all motions, and the errors of each motion."""
 
     constants: Constants
     errors: tuple[_MotionError, ...]
 
 
 class _Solved:
-    """One solved motion on even times, in the units of its liquid."""
+    """One solved motion at even times, in the units of its liquid."""
 
     def __init__(self, table: SolvedTable) -> None:
         case = table.case
@@ -68,12 +68,12 @@ class _Solved:
         self._prompt_n = -stokes_nspm * self._w_mps[:, 0] - added_kg * self._dw_mps2[:, 0]
 
     def residuals(self, constants: Constants) -> Floats:
-        """Return the errors (n,), whose sum of squares is the square of the RMS share."""
+        """Return the errors (n,), whose sum of squares is the square of the relative RMS error."""
         residuals: Floats = self._error_n(constants) / np.linalg.norm(self._force_n)
         return residuals
 
     def errors(self, constants: Constants) -> tuple[float, float]:
-        """Return the RMS and the greatest error as shares of the RMS and the greatest force."""
+        """Return the RMS and the greatest error, relative to the RMS and the greatest force."""
         error_n = self._error_n(constants)
         share = float(np.linalg.norm(error_n) / np.linalg.norm(self._force_n))
         return share, float(np.abs(error_n).max() / np.abs(self._force_n).max())
@@ -91,7 +91,7 @@ def refit(
     held_out: Sequence[SolvedTable] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Refit:
-    """Return the constants by all tables, each of equal weight, and each table's errors when it is left out.
+    """Return the constants fitted to all tables with equal weight, and the error of each table when it is left out.
 
     The errors of the tables that are ``held_out`` come last.
 
@@ -135,12 +135,12 @@ def _as_run(table: SolvedTable) -> tuple[float, float]:
 
 
 def fit_constants(tables: Sequence[SolvedTable]) -> Constants:
-    """Return the constants by all tables, each of equal weight."""
+    """Return the constants fitted to all tables with equal weight."""
     return _fit([_Solved(it) for it in tables], _BEGIN)
 
 
 def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
-    """Search in the logarithms, so that constants stay positive."""
+    """Search in logarithms, so that the constants stay positive."""
 
     def residuals(logs: Floats) -> Floats:
         constants = Constants._make(np.exp(logs).tolist())
@@ -153,7 +153,7 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
 
 
 def evidence(found: Refit) -> Evidence:
-    """Return constants and errors as Markdown, and the constants without each motion as CSV."""
+    """Return constants and errors as Markdown, and the constants fitted without each motion as CSV."""
     values = zip(Constants._fields, found.constants, CONSTANTS, strict=True)
     constants = [(name, f"{fitted:.3g}", f"{own:g}") for name, fitted, own in values]
     motions = []

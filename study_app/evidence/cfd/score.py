@@ -64,14 +64,14 @@ SUMS: Final = "SHA256SUMS"
 
 
 class _EngineError(Exception):
-    """The engine did not answer as it must."""
+    """The engine's answer is missing or invalid."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Motion:
-    """One solved motion at `_RATE_HZ`: place, velocity and the solver's force, each (n,).
+    """One solved motion at `_RATE_HZ`: position, velocity and the solver's force, each (n,).
 
-    ``fitted`` says whether this project's law of unsteady drag was fitted to it.
+    ``fitted`` tells whether this project's law of unsteady drag was fitted to it.
     """
 
     name: str
@@ -84,13 +84,13 @@ class Motion:
 
     @property
     def setup(self) -> dict[str, float]:
-        """What an engine receives about the liquid and the ball."""
+        """The properties of the liquid and the ball that an engine receives."""
         return {name: float(self.notes[name]) for name in ("density_kg_m3", "viscosity_pa_s", "diameter_m")}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Score:
-    """The error along one motion, RMS and greatest as shares of the force's, and the time of a tick [ns]."""
+    """The RMS and the greatest error along one motion, relative to the force, and the time per tick [ns]."""
 
     motion: Motion
     rms: float
@@ -100,9 +100,9 @@ class Score:
 
 @dataclass(frozen=True)
 class Releases:
-    """Handles let go in one liquid: the most energy given with a delay of one tick [J], and the delay borne [ticks].
+    """The energy gained and the delay tolerated by a handle that is released in one liquid.
 
-    The delay is -1 if none is borne, not even 0.
+    The energy is the greatest at a delay of one tick [J]; the delay [ticks] is -1 if not even 0 is tolerated.
     """
 
     liquid: str
@@ -111,7 +111,7 @@ class Releases:
 
 
 def motions(folder: Path | None = None, only: str = "") -> tuple[Motion, ...]:
-    """Return the motions with ``only`` in their names, after comparing each file with its checksum."""
+    """Return the motions whose names contain ``only``, after verifying the checksum of each file."""
     folder = folder or Path(__file__).resolve().parent
     lines = (folder / SUMS).read_text("utf-8").splitlines()
     sums = {line[66:]: line[:64] for line in lines if not line.startswith("#")}
@@ -147,7 +147,7 @@ def _motion(name: str, text: str, *, fitted: bool) -> Motion:
 
 
 def score(engine: _Engine, motion: Motion) -> Score:
-    """Let an engine follow a motion, and compare its forces with the solver's."""
+    """Run an engine along a motion and compare its forces with the solver's."""
     step = engine({**motion.setup, "handle_kg": math.inf, "delay_ticks": 0})
     ticks = (motion.t_s, motion.position_m, motion.velocity_mps)
     if (along := getattr(step, "along", None)) is not None:
@@ -173,7 +173,7 @@ def score(engine: _Engine, motion: Motion) -> Score:
 def release(
     engine: _Engine, setup: Mapping[str, float], handle_kg: float, phase: float, delay: int
 ) -> tuple[float, bool]:
-    """Move a handle through a liquid, let it go, and follow it.
+    """Move a handle through a liquid, release it, and follow its motion.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ def release(
 
 
 def releases(engine: _Engine, motion: Motion, delays: Sequence[int] = DELAYS) -> Releases:
-    """Let handles go in the liquid of a motion, with more and more delay until one fails."""
+    """Release handles in the liquid of a motion with increasing delay until one is unstable."""
     given_j, borne = 0.0, -1
     for delay in delays:
         cases = itertools.product(HANDLES_KG, _PHASES)
@@ -253,7 +253,7 @@ def all_releases(
     delays: Sequence[int] = DELAYS,
     progress: Callable[[str], object] = lambda _line: None,
 ) -> list[Releases]:
-    """Return an engine's releases in each liquid of some motions."""
+    """Return an engine's releases in each liquid of the motions."""
     first = {it.notes["liquid"]: it for it in reversed(over)}
     let = []
     for name in LIQUIDS:
@@ -270,9 +270,9 @@ HEADINGS: Final = (
 
 
 def row(name: str, scores: Sequence[Score], let: Sequence[Releases], against: Sequence[Score] = ()) -> list[str]:
-    """Return the cells of an engine below `HEADINGS`: medians over motions of errors and time, the worst release.
+    """Return an engine's cells for `HEADINGS`: medians of errors and time over motions, and the worst release.
 
-    The time is a multiple of ``against``, another engine's scores along the same motions in turn, if they are given.
+    With ``against``, another engine's scores along the same motions in turn, the time is given relative to it.
     """
     fitted = [it.rms for it in scores if it.motion.fitted]
     others = [it for it in scores if not it.motion.fitted]
@@ -291,13 +291,13 @@ def row(name: str, scores: Sequence[Score], let: Sequence[Releases], against: Se
 
 
 def table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return rows as Markdown."""
+    """Return the rows as a Markdown table."""
     marks = ["---", *["--:"] * (len(headings) - 1)]
     return "".join(f"| {' | '.join(line)} |\n" for line in (headings, marks, *rows))
 
 
 class _Program:
-    """A program as an engine, one line to it and one from it at a time."""
+    """An external program as an engine; it answers each line with one line."""
 
     def __init__(self, words: Sequence[str]) -> None:
         self._name = words[0]
@@ -339,7 +339,7 @@ class _Program:
         return said.strip()
 
     def _watch(self) -> None:
-        """End a program that does not answer."""
+        """Terminate a program that does not answer."""
         while self._process.poll() is None:
             time.sleep(0.2)
             if time.perf_counter() - self._asked_s > ANSWER_S:
@@ -347,7 +347,7 @@ class _Program:
                 self._process.kill()
 
     def close(self) -> None:
-        """End its input, and the program if it does not end then."""
+        """Close the program's input, and terminate it if it does not exit."""
         assert self._process.stdin is not None  # noqa: S101
         assert self._process.stdout is not None  # noqa: S101
         try:

@@ -26,14 +26,14 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
 class Step(NamedTuple):
-    """A change of the speed ``by`` so much within `RAMP`, from ``at`` on, with least jerk (Flash & Hogan 1985)."""
+    """A minimum-jerk change of speed by ``by`` within `RAMP`, starting at ``at`` (Flash & Hogan 1985)."""
 
     at: float
     by: float
 
 
 class _Sine(NamedTuple):
-    """A part ``amplitude`` · sin(2πt/period + phase) of the speed."""
+    """A component ``amplitude`` · sin(2πt/period + phase) of the speed."""
 
     amplitude: float
     period: float
@@ -42,7 +42,7 @@ class _Sine(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class VelocityProfile:
-    """Speed along one axis over time, from rest: the sum of the steps, times that of the sines if there are any."""
+    """Speed along one axis over time, from rest: the sum of the steps, multiplied by the sum of the sines if any."""
 
     name: str
     words: str
@@ -68,9 +68,9 @@ class VelocityProfile:
         return found
 
     def moments(self, step: float) -> Floats:
-        """Return the times (n,) at which the flow is solved: ``step`` apart for half a D/U after each step.
+        """Return the times (n,) at which the flow is solved: ``step`` apart for half a D/U after each change of speed.
 
-        Twice as far apart in the D/U after that, four times in the rest.
+        They are twice as far apart in the following D/U, and four times in the rest.
         """
         parts = []
         ends = [*(it.at for it in self.steps[1:]), self.end]
@@ -82,15 +82,15 @@ class VelocityProfile:
         return np.concatenate([*parts, [self.end]])
 
     def near_steps(self, t: Floats) -> NDArray[np.bool_]:
-        """Return which of the times (n,) are within two ramps after the begin of a step."""
+        """Return which of the times (n,) lie within two ramps after the start of a step."""
         found: NDArray[np.bool_] = np.any([(t >= at) & (t <= at + 2 * RAMP) for at, _ in self.steps], axis=0)
         return found
 
     def linear_drags(self, t: Floats, reynolds: float) -> Floats:
-        """Return the force (n,) against the motion in creeping flow, exact for an unbounded liquid, at times (n,).
+        """Return the force (n,) against the motion in creeping flow at times (n,), exact for an unbounded liquid.
 
-        Stokes drag, the inertia of half the displaced liquid, and the Basset integral (Landau & Lifshitz, Fluid
-        Mechanics, §24), here by Gauss' rule in √(t − τ), in which it has no singularity.
+        It is the sum of Stokes drag, added mass, and the Basset integral (Landau & Lifshitz, Fluid Mechanics, §24),
+        computed by Gaussian quadrature in √(t − τ), which removes the singularity.
         """
         viscosity = 1 / reynolds
         memory = np.zeros_like(t)
@@ -103,7 +103,7 @@ class VelocityProfile:
         return found
 
     def _panels(self) -> list[tuple[float, float]]:
-        """Return the intervals in which the ball accelerates, smooth and short enough for Gauss' rule."""
+        """Return the intervals of acceleration, split so that each is smooth and short enough for the quadrature."""
         ramps = [(at, at + RAMP) for at, _ in self.steps]
         if not self.sines:
             return ramps
@@ -134,7 +134,7 @@ def _slope(x: Floats) -> Floats:
 
 
 def _oscillation(keulegan_carpenter: float) -> VelocityProfile:
-    """Return four periods of an oscillation by the Keulegan–Carpenter number U T/D."""
+    """Return four periods of an oscillation with the Keulegan–Carpenter number U T/D."""
     sine = _Sine(amplitude=1.0, period=keulegan_carpenter, phase=0.0)
     words = f"oscillation, KC {keulegan_carpenter:g}"
     return VelocityProfile(
@@ -205,7 +205,7 @@ The reversal at Re 60 and the return also served to choose the form of the law.
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """A ball in one liquid that moves along a profile with the speed ``speed_mps`` as U."""
+    """A ball in one liquid that follows a velocity profile; ``speed_mps`` is its U."""
 
     liquid_id: str
     density_kg_m3: float
@@ -223,7 +223,7 @@ class Case:
 
     @property
     def name(self) -> str:
-        """Name of the file without its ending."""
+        """The file name without its suffix."""
         motion = "" if self.profile is STOPPING else f"{self.profile.name}-"
         return f"{motion}{self.liquid_id}-{round(self.speed_mps * 1000)}mmps"
 
@@ -248,7 +248,7 @@ class Case:
 
 
 def cases() -> tuple[Case, ...]:
-    """Return each liquid at the greatest speed of its protocol, in the scene and, as at scale 1, of the hand."""
+    """Return each liquid at the greatest speed of its protocol, at the scene's scale and at scale 1."""
     all_cases = []
     for liquid_id in LIQUIDS:
         scene = load_scene(shipped_file(_PROTOCOL), liquid_id)

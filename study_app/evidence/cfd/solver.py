@@ -47,9 +47,7 @@ PERMITTED: Final = 0.02
 
 
 def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tuple[Path, ...]:
-    """Write the tables of all cases and of steady drag, solved by an executor, into the folder ``to``.
-
-    Return the files.
+    """Solve all cases and steady drag with an executor, write the tables into the folder ``to``, and return the files.
 
     Raises
     ------
@@ -81,12 +79,12 @@ def _solved(case: Case, grid: Grid, coarse: Grid) -> bytes:
 
 @cache
 def flow_of(grid: Grid) -> Flow:
-    """Return the flow on a grid; a worker makes its mesh once."""
+    """Return the flow on a grid; each worker builds the mesh once."""
     return Flow(grid)
 
 
 def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> bytes:
-    """Return the file of one case, with a row for every `_STEP` or ``step``, whichever is longer."""
+    """Return the file content of one case, with a row every `_STEP` or ``step``, whichever is longer."""
     profile = case.profile
     times, rough = profile.moments(step), profile.moments(2 * step)
 
@@ -122,7 +120,7 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> b
 
 
 def steady_table() -> bytes:
-    """Return the file of steady drag."""
+    """Return the file content of steady drag."""
     solved = [Flow(it) for it in (_WIDE, _WIDE_COARSE, GRID)]
     columns = [flow.steady(_REYNOLDS) for flow in solved]
     method = "; ".join(
@@ -133,7 +131,7 @@ def steady_table() -> bytes:
 
 
 def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floats) -> str:
-    """Return the greatest differences, while the ball accelerates and otherwise, as shares of the greatest force."""
+    """Return the greatest differences relative to the greatest force, during acceleration and otherwise."""
     size = np.abs(difference) / np.abs(force).max()
     ramps = case.profile.near_steps(times)
     worst = float(size.max())
@@ -148,7 +146,7 @@ def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floa
 
 
 def made(command: str = COMMAND) -> dict[str, str]:
-    """Return the notes that say by what a table was made."""
+    """Return the notes that say which command and versions produced a table."""
     return {
         "command": command,
         "machine": machine(),

@@ -45,7 +45,7 @@ class Table:
 
     @property
     def case(self) -> SolvedCase:
-        """What was solved, by the notes of a table of `MOTION`."""
+        """The solved case that the notes of a `MOTION` table describe."""
         profile = PROFILES[self.notes.get("profile", STOPPING.name)]
         density_kg_m3, viscosity_pa_s, diameter_m, speed_mps = (float(self.notes[name]) for name in _OF_THE_CASE)
         return SolvedCase(
@@ -59,14 +59,14 @@ class Table:
 
 
 def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats]) -> bytes:
-    """Return a table as the bytes of its file."""
+    """Return a table as file content."""
     head = "".join(f"# {name}: {value}\n" for name, value in notes.items())
     rows = ([f"{value:.7g}" for value in row] for row in zip(*columns.values(), strict=True))
     return (head + csv_text_of([columns, *rows])).encode()
 
 
 def notes_of(case: SolvedCase) -> dict[str, str]:
-    """Return the notes that say what was solved."""
+    """Return the notes that describe a solved case."""
     values = (case.density_kg_m3, case.viscosity_pa_s, case.diameter_m, case.speed_mps)
     return {
         "liquid": case.liquid_id,
@@ -76,7 +76,7 @@ def notes_of(case: SolvedCase) -> dict[str, str]:
 
 
 def stored(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]:
-    """Return the tables of `MOTION`, of the package or of a folder or of one in it (``of``), by liquid and speed.
+    """Return the `MOTION` tables of the package or of a folder, or those in its subfolder ``of``, by liquid and speed.
 
     Raises
     ------
@@ -99,7 +99,7 @@ held_out: Final = partial(stored, of=HELD_OUT_FOLDER)
 
 
 def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
-    """Return the constants of unsteady drag fitted without a motion, by the name of its case; often none."""
+    """Return the constants of unsteady drag that were fitted without one motion, by case name; may be empty."""
     file = (folder or package()) / LEFT_OUT_FILE
     if not file.is_file():
         return {}
@@ -115,7 +115,7 @@ def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
 
 
 def steady(folder: Traversable | None = None) -> Table:
-    """Return the table of `STEADY`; errors are those of `read`."""
+    """Return the table of `STEADY`; it raises the errors of `read`."""
     return read((folder or package()) / STEADY_FILE, STEADY)
 
 
@@ -125,7 +125,7 @@ def package() -> Traversable:
 
 
 def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
-    """Return a table with these columns, and numbers in the notes ``noted``.
+    """Return a table with these columns, whose notes ``noted`` are numbers.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> 
 
 
 def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Truth, ...]:
-    """Return the fluid solver's results for the scene's liquid and body, at the scene's rate; often none."""
+    """Return the fluid solver's results for the scene's liquid and body at the scene's rate, if any."""
     liquid = scene.liquids[0]
     ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
     more = (*training(), *held_out()) if folder is None else ()

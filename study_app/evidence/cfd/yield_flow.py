@@ -49,7 +49,7 @@ class YieldFlow(Flow):
     """Creeping flow of a Herschel–Bulkley liquid around the ball."""
 
     def drags(self, flow_index: float, bingham: Sequence[float]) -> Iterator[tuple[float, float]]:
-        """Yield the drag at rising Bingham numbers, with the least ε and with the one before."""
+        """Yield the drag at increasing Bingham numbers, with the smallest and the second smallest ε."""
         ng = self._ng
         flow, residual = ng.GridFunction(self._space), self._zeros()
         flow.vec.data = self._stream
@@ -72,7 +72,7 @@ class YieldFlow(Flow):
             yield forces[-1], forces[-2]
 
     def _settles(self, form: Any, flow: Any) -> bool:
-        """Solve by Newton's method, with steps shortened until the residual falls; return whether it converged."""
+        """Solve by a damped Newton method; return whether it converged."""
         ng = self._ng
         free, residual, step, before, left = ng.Projector(self._free, True), *(self._zeros() for _ in range(4))
 
@@ -100,7 +100,7 @@ class YieldFlow(Flow):
 
 
 def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None]) -> Path:
-    """Write the table of Herschel–Bulkley liquids, solved by an executor, into the folder ``to``; return the file.
+    """Solve the Herschel–Bulkley liquids with an executor; return the table written into the folder ``to``.
 
     Raises
     ------
@@ -131,12 +131,12 @@ def _solved(flow_index: float) -> list[tuple[float, ...]]:
 
 
 def stored_materials(folder: Traversable | None = None) -> dict[str, Floats]:
-    """Return the columns of the stored table; errors are those of `stored_flows.read`."""
+    """Return the columns of the stored table; it raises the errors of `stored_flows.read`."""
     return read((folder or package()) / FILE, COLUMNS).columns
 
 
 def errors(columns: dict[str, Floats]) -> Floats:
-    """Return the law's error (n,) as a share of the solver's drag."""
+    """Return the law's error (n,) relative to the solver's drag."""
     liquids = [
         HerschelBulkley(yield_stress_pa=bingham, consistency_pa_sn=1.0, flow_index=index)
         for index, bingham in zip(columns["flow_index"].tolist(), columns["bingham"].tolist(), strict=True)

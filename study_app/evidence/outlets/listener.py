@@ -27,7 +27,7 @@ _QUIET_S: Final = 1.0
 
 
 def opened(lsl: Any, name: str) -> Any:
-    """Return an open inlet of a stream."""
+    """Open an inlet for a stream and return it."""
     streams = lsl.resolve_byprop("name", name, 1, _FOUND_WITHIN_S)
     if not streams:
         sys.exit(f"no stream is called {name!r}")
@@ -43,7 +43,7 @@ def _await_end(ending: threading.Event) -> None:
 
 
 def _listen() -> dict[str, Any]:
-    """Receive both streams until the input ends; return the received data."""
+    """Receive both streams until the input closes; return the received data."""
     lsl, clock = library(), SystemClock()
     markers, samples = opened(lsl, MARKERS), opened(lsl, SAMPLES)
     correction_s = markers.time_correction(_FOUND_WITHIN_S)
@@ -81,7 +81,7 @@ def _listen() -> dict[str, Any]:
 
 
 def read(file: int) -> list[tuple[int, int]]:
-    """Return the bytes that come, each with the time at which it was read [ns]."""
+    """Return the received bytes, each with the time at which it was read [ns]."""
     clock = SystemClock()
     clock.now_ns()
     sys.stdout.write("ready\n")

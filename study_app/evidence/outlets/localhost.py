@@ -20,9 +20,9 @@ level = -2
 
 @cache
 def localhost_only() -> Path:
-    """Let this process and those it starts use a configuration of their own, once; return its file.
+    """Restrict LSL to this computer for this process and its children; return the configuration file.
 
-    It must be called before the library is loaded.
+    Call it before the library is loaded.
     """
     descriptor, name = tempfile.mkstemp(prefix="liquid-study-lsl-", suffix=".cfg")
     path = Path(name)

@@ -28,7 +28,7 @@ PATIENCE_S: Final = 60.0
 
 
 class Listener:
-    """The process of ``outlets.listener``; as a context it ends at the latest at the end."""
+    """The process that runs ``outlets.listener``; used as a context manager, it is ended on exit."""
 
     def __init__(self, *arguments: str, pass_fds: Sequence[int] = ()) -> None:
         self._process = subprocess.Popen(  # noqa: S603 - our own words
@@ -60,7 +60,7 @@ class Listener:
 
 
 class _MeasuredStream(SampleStream):
-    """A stream of samples that keeps the SHA-256 of what it sent, and sends nothing while it is held."""
+    """A sample stream that hashes what it sends (SHA-256), and sends nothing while it is held."""
 
     def __init__(self, telemetry: Any, rate_hz: float, now_ns: Callable[[], int]) -> None:
         self.hashed = hashlib.sha256()
@@ -69,7 +69,7 @@ class _MeasuredStream(SampleStream):
         super().__init__(telemetry, rate_hz, now_ns)
 
     def send_new(self) -> None:
-        """Send the samples since the last time, once it is not held."""
+        """Send the samples since the previous call, unless the stream is held."""
         self.running.wait()
         super().send_new()
 
@@ -78,7 +78,7 @@ class _MeasuredStream(SampleStream):
         super().push(channels, times_s)
 
     def close(self) -> None:
-        """Send the remaining samples, and end the stream."""
+        """Send the remaining samples and end the stream."""
         self.running.set()
         super().close()
 
@@ -89,10 +89,10 @@ _MARKER_EVERY_S: Final = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Streamed:
-    """What arrived of so many ``seconds``.
+    """The data received in ``seconds``.
 
-    ``errors_us`` are the distances of the markers' times from the servo's clock [µs], ``arrivals_ms`` how long markers
-    took to arrive [ms]; both (n,). ``intact`` says whether every sample arrived with the numbers that were sent.
+    ``errors_us`` are the differences between marker times and the servo clock [µs], ``arrivals_ms`` the transmission
+    times of the markers [ms]; both (n,). ``intact`` tells whether every sample arrived unchanged.
     """
 
     seconds: float
@@ -107,19 +107,19 @@ class Streamed:
 
     @property
     def error_p99_ms(self) -> float:
-        """The 99th percentile of the markers' distance from the servo's clock [ms]."""
+        """The 99th percentile of the marker time errors [ms]."""
         return float(np.percentile(self.errors_us, 99)) * 1e-3 if len(self.errors_us) else float("inf")
 
     @property
     def met(self) -> bool:
-        """Whether nothing was lost and the markers' times are accurate."""
+        """Whether no data were lost and the marker times are accurate."""
         return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= _MOST_ERROR_MS
 
 
 def stream(
     seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> Streamed:
-    """Stream a servo at 1 kHz, and twenty markers a second, to a listener in another process."""
+    """Stream a servo at 1 kHz and twenty markers per second to a listener in another process."""
     servo = Servo(PlayedHand())
     servo.prepare()
     sink = SinkThread(open_sink("lsl", servo.now_ns))
@@ -148,7 +148,7 @@ def stream(
 
 
 def _numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
-    """Return the marker of an event that happens now, of a trial with this number."""
+    """Return a marker for an event at this moment in a trial with this number."""
     marker = marker_of("trial_started", 1e-9 * (now_ns - origin_ns), origin_ns, {"trial": number, "code": "L1"})
     assert marker is not None  # noqa: S101 - such events are markers
     return marker
@@ -178,7 +178,7 @@ _DRAWS: Final = 2000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ratio:
-    """A percentile of the lateness with outlets, by that without them, and its 95 % interval.
+    """The ratio of a lateness percentile with outlets to that without, with its 95 % interval.
 
     Segments of 0.25 s are resampled in pairs, with and without.
     """
@@ -200,10 +200,10 @@ class Ratio:
 def compare(
     seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> tuple[Ratio, ...]:
-    """Return the median lateness with and without outlets, and the 99th percentile.
+    """Return the ratios of the median and the 99th percentile of the lateness, with and without outlets.
 
-    With outlets, a stream of samples and twenty markers a second go to a listener in another process. Without them its
-    thread rests. Each pair of segments begins with the other.
+    With outlets, a stream of samples and twenty markers per second go to a listener in another process; without them,
+    its thread is idle. Pairs of segments alternate which condition comes first.
     """
     grants = granted()
     loop = ServoLoop(grants.best or grants.normal, real_time=True, spin_us=None)
@@ -241,7 +241,7 @@ def compare(
 
 
 def _ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int64]], percentile: int) -> Ratio:
-    """Return the ratio of a percentile of latenesses [ns] by segments (each (n,)), with and without outlets."""
+    """Return the ratio of a percentile of the lateness [ns] over segments (n,), with to without outlets."""
     rng = np.random.default_rng(1)
     own = np.array([np.percentile(segment, percentile) for segment in active])
     other = np.array([np.percentile(segment, percentile) for segment in rest])

@@ -25,11 +25,11 @@ _EVERY_S: Final = 0.05
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TriggerDelays:
-    """How long events took to a byte.
+    """The delays from events to their trigger bytes.
 
-    ``written_us`` is from each event to its byte being handed to the port [µs], ``read_us`` to its being read by
-    another process [µs], ``high_ms`` how long each code stayed before 0 came [ms]; all (n,), the last two None where
-    nothing reads the port. ``wrong`` counts bytes that differ from what was sent.
+    ``written_us`` is from each event until its byte is handed to the port [µs], ``read_us`` until another process reads
+    it [µs], ``high_ms`` how long each code stayed before the reset to 0 [ms]; all (n,), the last two None if no process
+    reads the port. ``wrong`` counts bytes that differ from those sent.
     """
 
     port: str
@@ -40,7 +40,7 @@ class TriggerDelays:
 
 
 class _VirtualPort:
-    """A pair of virtual ports: one with an ``address`` to send to, and another whose bytes another process reads."""
+    """A pair of virtual ports: one has an ``address`` to send to, another process reads the other."""
 
     def __init__(self) -> None:
         if not hasattr(os, "openpty"):
@@ -57,12 +57,12 @@ class _VirtualPort:
         self._listener.ready()
 
     def unplug(self) -> list[tuple[int, int]]:
-        """End the reader, as if an adapter were unplugged; return the bytes, each with when it was read [ns]."""
+        """End the reader as if an adapter were unplugged; return the bytes, each with its reading time [ns]."""
         self.close()
         return [(byte, at_ns) for byte, at_ns in self._listener.end()]
 
     def close(self) -> None:
-        """Close this end; the reader ends once the port is closed, too."""
+        """Close this end of the port, which also ends the reader."""
         with suppress(OSError):
             os.close(self._theirs)
 
@@ -79,7 +79,7 @@ def measure(
 ) -> TriggerDelays:
     """Send twenty events per second to the address of a port, or to a virtual one, and return their delays.
 
-    ``port`` "virtual" is a pair of virtual ports, whose other end another process reads.
+    The ``port`` "virtual" is a pair of virtual ports whose other end is read by another process.
 
     Raises
     ------

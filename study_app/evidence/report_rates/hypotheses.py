@@ -38,7 +38,7 @@ Drawn: TypeAlias = Callable[[np.random.Generator, int], Array]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DrawnStudies:
-    """Studies of so many ``participants``, of which ``trial`` draws one and says whether it makes the ``claim``."""
+    """Simulated studies with ``participants``; ``trial`` simulates one and tells whether it makes the ``claim``."""
 
     name: str
     participants: int
@@ -51,7 +51,7 @@ _EQUIVALENT: Final = "called equivalent"
 
 
 def false_claims() -> Iterator[DrawnStudies]:
-    """Yield studies whose claims are false."""
+    """Yield studies in which the claim is false."""
     yield from _thresholds()
     yield from _recognition()
     yield from _equivalence()
@@ -60,7 +60,7 @@ def false_claims() -> Iterator[DrawnStudies]:
 
 
 def powers() -> Iterator[DrawnStudies]:
-    """Yield studies whose claims are true."""
+    """Yield studies in which the claim is true."""
     yield DrawnStudies(
         name="thresholds of two blocks, 1.5 : 1, 3-down-1-up, 60 trials",
         participants=12,
@@ -92,7 +92,7 @@ def _thresholds() -> Iterator[DrawnStudies]:
 
 
 def _compares_thresholds(n: int, ratio: float) -> Trial:
-    """Return a trial that compares thresholds of the same people in two blocks, the first ``ratio`` times higher."""
+    """Return a trial that compares thresholds in two blocks; the first block's are ``ratio`` times higher."""
     plan = ThresholdPlan(Stimulus(vary="damping_nspm", levels=_LEVELS), DESIGN, METHOD, catch=0, standards=1)
 
     def trial(rng: np.random.Generator) -> bool:
@@ -135,7 +135,7 @@ def _recognition() -> Iterator[DrawnStudies]:
 
 
 def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
-    """Return a trial of liquids that are called the first or the last at random, but for those ``known``."""
+    """Return a trial in which liquids are named at random, except those that are ``known``."""
 
     def trial(rng: np.random.Generator) -> bool:
         names = np.where(rng.random((n, 3)) < share, 0, 2) if known else rng.integers(0, 3, (n, 3))
@@ -223,7 +223,7 @@ _MANY: Final = 20_000
 
 
 def _trends() -> Iterator[DrawnStudies]:
-    """Yield trends of people's own that are skewed: of mean 0, so that ranks fall, and of rank correlation 0."""
+    """Yield skewed individual trends with mean 0, so that ranks fall, and with rank correlation 0."""
     for n in (12, 30):
         yield DrawnStudies(
             name="own trends, skewed, mean 0: ranks fall",
@@ -247,14 +247,14 @@ def _follows(n: int, shift: float, claim: str) -> Trial:
 
 
 def _answers(rng: np.random.Generator, n: int, shift: float) -> Array:
-    """Return answers (participants, delays) of people whose slopes are exponential with mean ``shift``."""
+    """Return answers (participants, delays) of participants with exponentially distributed slopes of mean ``shift``."""
     slopes = _SLOPE * (rng.exponential(size=(n, 1)) - 1 + shift)
     return np.clip(np.round(4 + slopes * DELAYS + _NOISE * rng.normal(size=(n, len(DELAYS)))), 1, 7)
 
 
 @cache
 def _shift_without_trend() -> float:
-    """Return the mean of skewed slopes at which the mean rank correlation is 0, found from many people."""
+    """Return the mean of skewed slopes at which the mean rank correlation is 0, from a large sample."""
 
     def correlation(shift: float) -> float:
         return trend(_answers(np.random.default_rng(0), _MANY, shift), None, seed=None).effect or 0.0

@@ -57,7 +57,7 @@ TRUTH: Final = 4000
 
 
 def alike(block: Block, extent: _Extent) -> Mapping[int, int]:
-    """Return which settings (places) are equal in truth to which earlier one."""
+    """Return, for each condition that is truly equal to an earlier one, the index of that one."""
     k = len(block.settings)
     if extent in _NO_EFFECT:
         return dict.fromkeys(range(1, k), 0)
@@ -82,7 +82,7 @@ def answers(
 
 
 def _opined(block: Block, opinions: Opinions, extent: _Extent, rng: np.random.Generator) -> Array:
-    """Return the answer model's answers; equal settings have equal effects."""
+    """Return the answers of the answer model; equal conditions have equal effects."""
     if extent == "empty":
         return opinions.answers(0.0, PEOPLE)
     thought = opinions.thought.copy()
@@ -109,7 +109,7 @@ def _probit(
 
 
 def _own(block: Block, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Return effects of people of their own, zero in the mean (people, settings, items): trends, or opinions."""
+    """Return individual effects (participants, settings, items) with mean zero: trends or opinions."""
     n, k, items = shape
     if block.kind == "delays":
         return np.linspace(-1.0, 1.0, k)[:, None] * rng.normal(size=(n, 1, items))
@@ -117,7 +117,7 @@ def _own(block: Block, shape: tuple[int, ...], rng: np.random.Generator) -> Arra
 
 
 def _effects(simulation: Plan, block: Block) -> Array:
-    """Return the latent effect of each setting on each item (settings, items)."""
+    """Return the latent effect of each condition on each item (settings, items)."""
     k, items = len(block.settings), len(block.items)
     if block.kind == "delays":
         signs = [
@@ -134,7 +134,7 @@ def _effects(simulation: Plan, block: Block) -> Array:
 
 
 def _true_differences(simulation: Plan, generator: Generator, extent: _Extent) -> tuple[Array, ...]:
-    """Return the true differences of mean answers to the first setting (settings, items), block by block."""
+    """Return the true mean differences from the first condition (settings, items), block by block."""
     differences = []
     for block, given in zip(simulation.blocks, answers(simulation, generator, extent, TRUTH, 0, 0), strict=True):
         means = given.mean(axis=0)
@@ -167,7 +167,7 @@ _ALLOWED: Final[dict[_Limit, tuple[float, float, float, float]]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rate:
-    """Number of ``hits`` among the simulated studies ``of`` one cell."""
+    """Number of ``hits`` among ``of`` simulated studies in one cell."""
 
     cell: str
     participants: int
@@ -177,7 +177,7 @@ class Rate:
     studies: int
 
     def __add__(self, other: Rate) -> Rate:
-        """Return the rate of both counts together, of the same thing in the same cell."""
+        """Return the pooled rate of two counts of the same event in the same cell."""
         return replace(self, hits=self.hits + other.hits, studies=self.studies + other.studies)
 
     def __str__(self) -> str:
@@ -193,16 +193,16 @@ class Rate:
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval of the share."""
+        """Wilson's 95 % interval of the proportion."""
         return interval(self.share, self.studies) if self.studies else (0.0, 1.0)
 
     @property
     def holds(self) -> _Verdict:
-        """Whether the rate keeps to its limit.
+        """Whether the rate meets its limit.
 
-        "no" where the interval of confidence `SURE` lies beyond the limit: of a hundred rates that are exactly at their
-        limit some 95 % intervals miss it by chance. "yes" where the 95 % interval is within what the limit allows;
-        otherwise there are too few studies.
+        "no" if the interval with confidence `SURE` lies beyond the limit: of a hundred rates exactly at their limit,
+        some 95 % intervals miss it by chance. "yes" if the 95 % interval lies within the limit; otherwise there are too
+        few studies.
         """
         if self.limit == "counted":
             return "counted"
@@ -219,7 +219,7 @@ class Rate:
 
 
 def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
-    """Return the rates, each with its Wilson interval and whether its limit holds, as Markdown and as CSV."""
+    """Return the rates with their Wilson intervals and whether their limits are met, as Markdown and as CSV."""
     rows = []
     for rate in sorted(rates, key=lambda rate: (rate.cell, rate.what, rate.participants)):
         low, high = (f"{100 * end:.1f}" for end in rate.interval)
@@ -266,7 +266,7 @@ _ANYWHERE: Final = "anything in the report claims something"
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """Studies of one kind: model of the answers, true effects, number of participants, and planned looks if any."""
+    """Studies of one kind: the answer model, true effects, number of participants and planned looks, if any."""
 
     generator: Generator
     extent: _Extent
@@ -286,7 +286,7 @@ def truth(simulation: Plan, cell: Cell) -> _Truth:
 
 
 def count_studies(simulation: Plan, cell: Cell, truth: _Truth, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
-    """Return the rates of so many studies of a cell, those of batch number ``batch``."""
+    """Return the rates in the studies of one batch of a cell."""
     events: dict[Event, int] = {}
     for study in range(batch * _BATCH, batch * _BATCH + studies):
         for event, happened in _study(simulation, cell, truth, seed, study).items():
@@ -331,7 +331,7 @@ def _study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, study: int) -
 def report(
     simulation: Plan, decided: Decided, given: Sequence[Array], study: int, failures: Failures
 ) -> tuple[list[BlockAnswers], tuple[BlockResult, ...]]:
-    """Return the answers of each block, and what the report finds in them."""
+    """Return the answers of each block, and the findings that the report derives from them."""
     people = tuple(f"P{number:03d}" for number in range(len(given[0])))
     tables = [
         of_tables(
@@ -350,7 +350,7 @@ def report(
 
 
 def _claims(result: BlockResult) -> bool:
-    """Return whether anything in the section of a block says that settings differ or that a delay is noticed."""
+    """Return whether a block's section claims that conditions differ or that a delay is noticed."""
     pairs = [pair.tested for pair in Pairs.of(result)]
     tests = [*SettingsDiffer.of(result), *DelayTrend.of(result), *MeanTests.of(result), *pairs]
     low = any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result))
@@ -358,7 +358,7 @@ def _claims(result: BlockResult) -> bool:
 
 
 def _modelled(result: BlockResult) -> Iterator[tuple[Event, bool]]:
-    """Yield whether the test of means finds anything in a statement."""
+    """Yield, for each statement, whether the test of means finds a difference."""
     yield ("found by the test of means", "at most 5 %"), any(test.verdict in FOUND for test in MeanTests.of(result))
 
 
@@ -387,7 +387,7 @@ def _recognised(result: BlockResult) -> bool:
 
 
 def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
-    """Return the pairs of codes whose settings are equal in truth."""
+    """Return the pairs of codes whose conditions are truly equal."""
     like = alike(block, extent)
     codes = block.codes
     return {
@@ -426,7 +426,7 @@ def _printed(result: BlockResult) -> bool:
 
 
 def _equivalence(asked: BlockAnswers, result: BlockResult, truth: Array) -> Iterator[tuple[Event, bool]]:
-    """Yield whether a delay is called equivalent that is not: the one nearest to the bound, and on the first page."""
+    """Yield whether a delay is wrongly called equivalent: the delay nearest to the bound, and on the first page."""
     bound = asked.decided.equivalence_bound
     if bound is None or not ContrastsWithControl.of(result):
         return
@@ -468,7 +468,7 @@ _LAPSE: Final = 0.02
 
 @cache
 def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
-    """Return all cases: the limit of their rate, what is counted, and how one study is simulated."""
+    """Return all cases with the limit of their rate, the counted event, and the simulation of one study."""
     tests: dict[_Case, tuple[_Limit, str, Trial]] = {}
     for n in (5, 12, 24):
         for words, most in (("-1, 0, 1", (-1.0, 0.0, 1.0)), ("0", (0.0,))):
@@ -493,7 +493,7 @@ def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
 
 
 def count_single(case: _Case, seed: int, batch: int, studies: int) -> tuple[Rate, ...]:
-    """Return the rates of so many studies of a case, those of batch number ``batch``."""
+    """Return the rates in the studies of one batch of a case."""
     limit, what, trial = _single_tests()[case]
     number = list(_single_tests()).index(case)
     rng = np.random.default_rng([seed, number, batch])
@@ -529,7 +529,7 @@ def _covered(n: int, spread_ms: float, never: float) -> Trial:
 
 
 def _people(rng: np.random.Generator, n: int, spread_ms: float, never: float) -> Array:
-    """Return answers (n, levels), 6 for noticed and 2 for not, of people whose thresholds lie about the true one."""
+    """Return answers (n, levels), 6 for noticed and 2 otherwise, of participants with varying thresholds."""
     at = _TRUE_MS + spread_ms * rng.normal(size=(n, 1))
     chance = _LAPSE + (1 - 2 * _LAPSE) * expit(2 * np.log(19) * (_LEVELS_MS - at) / _WIDTH_MS)
     chance[rng.random(n) < never] = _LAPSE
@@ -550,7 +550,7 @@ _Count: TypeAlias = Callable[[int, int, int], tuple[Rate, ...]]
 
 
 def cells(sizes: Sequence[int] = _SIZES) -> tuple[Cell, ...]:
-    """Return every kind of study by every generator at every size, and empty studies with planned looks."""
+    """Return every kind of study with every generator and size, and null studies with planned looks."""
     every = [Cell(generator, extent, n) for generator in GENERATORS for extent in EXTENTS for n in sizes]
     looked = [Cell("ordinal probit", "empty", _LOOKS[-1], _LOOKS, spending) for spending in get_args(Spending)]
     return (*every, *looked)
@@ -565,11 +565,11 @@ def validate(
     sizes: Sequence[int] = _SIZES,
     progress: Callable[[str], object] = str,
 ) -> Iterator[tuple[int, tuple[Rate, ...]]]:
-    """Yield after every batch how many studies were simulated so far in all, and the rates of them.
+    """After every batch, yield the number of simulated studies so far and their rates.
 
-    Cells with an undecided rate are continued with as many further studies, up to ``_ROUNDS`` times as many in all. A
-    continued cell counts all of its rates on, those that hold included; ``progress`` is called with a line for it.
-    Every batch draws from a stream of its own, so what is counted does not depend on the executor.
+    Cells with an undecided rate are extended by the same number of studies, up to ``_ROUNDS`` times as many in total.
+    All rates of an extended cell are counted further, including decided ones; ``progress`` is called with one line per
+    extended cell. Every batch has its own random stream, so the counts do not depend on the executor.
     """
     counts = _cell_counts(simulation, sizes)
     done, total = 0, dict[tuple[str, int, str], Rate]()
@@ -596,7 +596,7 @@ def validate(
 
 
 def _cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[_Key, _Count]:
-    """Return how the rates of every cell are counted."""
+    """Return the function that counts the rates of each cell."""
     every = cells(sizes)
     kinds = {(cell.generator, cell.extent): cell for cell in every}
     truths = {kind: truth(simulation, cell) for kind, cell in kinds.items()}
@@ -612,6 +612,6 @@ def _cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[_Key, _Count
 
 
 def _batches(studies: int, finished: int) -> list[tuple[int, int]]:
-    """Return the numbers and sizes of the batches of so many studies, after so many finished rounds of them."""
+    """Return numbers and sizes of the batches of a round, after ``finished`` rounds."""
     starts = range(0, studies, _BATCH)
     return [(number, min(_BATCH, studies - start)) for number, start in enumerate(starts, start=finished * len(starts))]

@@ -75,9 +75,10 @@ _inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
 
 class FaultyDevice:
-    """A device between the servo and an opened one, ``inner``; both must live as long as the servo ticks.
+    """A device that injects faults between the servo and ``inner``, an opened device that must outlive the servo.
 
-    ``clock`` is the servo's; one that runs by itself never jumps. Kinds and times of faults follow from ``seed``.
+    ``clock`` is the servo's; a clock that advances by itself never jumps. The kinds and times of the faults follow from
+    ``seed``.
     """
 
     def __init__(self, inner: Driver, clock: Clock, seed: int) -> None:
@@ -97,13 +98,14 @@ class FaultyDevice:
 
     @property
     def failure(self) -> str | None:
-        """Why the device behind it ended, if it says so."""
+        """The reason why the inner device failed, if it reports one."""
         return self._kept[0].failure
 
     def allow(self, faults: dict[int, tuple[float, int, int]], gap: tuple[int, int]) -> None:
-        """Let these kinds of faults happen from the next one on: share of all, fewest and most readings of each.
+        """Inject these kinds of faults from the next one onwards.
 
-        ``gap`` are the fewest and the most sound readings between two. A clock that runs by itself does not jump.
+        Each kind has its share of all faults, and its least and greatest number of readings; ``gap`` is the least and
+        greatest number of sound readings between two faults. A clock that advances by itself does not jump.
         """
         state = self.state
         state.share = 0.0
@@ -122,7 +124,7 @@ def _functions() -> tuple[Any, Any]:
 
 @kernel
 def _due(faults: Any) -> int:
-    """Return the kind of fault this reading has, or NONE."""
+    """Return the fault of this reading, or NONE."""
     kind: int = faults.kind  # read once: the host may allow other faults meanwhile
     if kind == _NONE:
         kind = _draw(faults)
@@ -141,7 +143,7 @@ def _due(faults: Any) -> int:
 
 @kernel
 def _draw(faults: Any) -> int:
-    """Draw the next fault and when it begins; return its kind, or NONE."""
+    """Draw the kind and the start of the next fault; return its kind, or NONE."""
     total = 0.0
     for share in faults.share:
         total += share
@@ -166,7 +168,7 @@ def _between(faults: Any, least: int, most: int) -> int:
 
 @kernel
 def _no_number(choice: int) -> float:
-    """Return something that is no place a hand can be at."""
+    """Return a value that is no possible hand position, such as NaN or infinity."""
     if choice < 3:
         return math.nan
     return math.inf if choice < 6 else -math.inf

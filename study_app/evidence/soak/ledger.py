@@ -40,7 +40,7 @@ _LEDGER = np.dtype(
 
 
 def wake_of(scene: Scene) -> Wake | None:
-    """Return the wake that can be stored: that of a single liquid, everywhere, without a current; else None."""
+    """Return the wake of a single liquid that fills the scene without a current; None for other scenes."""
     if len(scene.liquids) != 1:
         return None
     liquid: Liquid = scene.liquids[0]
@@ -51,7 +51,7 @@ def wake_of(scene: Scene) -> Wake | None:
 
 
 class Ledger:
-    """The wake of one scene, whose `wake_of` is one, from its first sample on."""
+    """An independent record of the wake of a scene, from its first sample onwards."""
 
     def __init__(self, scene: Scene) -> None:
         wake = wake_of(scene)
@@ -66,7 +66,7 @@ class Ledger:
         ledger.gap_ns = CURRENT.gap_ticks * ledger.period_ns
 
     def take(self, samples: Any) -> float | None:
-        """Write down ``samples`` (recarray of ``SAMPLE``, all of this scene, none missing); compare at the last one.
+        """Record ``samples`` (recarray of ``SAMPLE``, all of this scene, none missing), and compare at the last one.
 
         Returns
         -------
@@ -90,7 +90,7 @@ class Ledger:
 
     @property
     def age_s(self) -> float:
-        """How long the wake has run on without being emptied [s]."""
+        """The time since the wake was last empty [s]."""
         return float(self._wake[0].age_ns) * 1e-9
 
 
@@ -104,14 +104,14 @@ def _last_accepted(samples: Any) -> int:
 
 @kernel
 def _begins_anew(ledger: Any, sample: Any) -> bool:
-    """Return whether the body was lost in a gap: it has moved, and yet its velocity is exactly 0."""
+    """Return whether the body was reset in a gap: it has moved, and yet its velocity is exactly 0."""
     moved = square_distance(sample.position_m, ledger.accepted_m) > 0.0
     return bool(sample.time_ns - ledger.accepted_ns > ledger.gap_ns and moved and square(sample.velocity_mps) == 0.0)
 
 
 @kernel
 def write_down(ledger: Any, wake: Any, elements: Any, samples: Any, first: int, end: int) -> None:
-    """Take samples ``first`` to ``end`` into the list, as the definition says."""
+    """Record samples ``first`` to ``end`` in the list according to the definition."""
     for i in range(first, end):
         sample = samples[i]
         if sample.fresh == 0:
@@ -139,7 +139,7 @@ def write_down(ledger: Any, wake: Any, elements: Any, samples: Any, first: int, 
 
 
 def prepare() -> None:
-    """Compile what writes down, or load it from the cache."""
+    """Compile the recording functions, or load them from the cache."""
     wake, elements = new_wake_list(Wake(length=1, scaling=1), 1000.0)
     _last_accepted(records(SAMPLE, 0))
     sum_elements(wake[0], elements, np.zeros(3))
@@ -148,9 +148,9 @@ def prepare() -> None:
 
 @dataclass(slots=True, kw_only=True)
 class Drift:
-    """How far the wakes of a servo were from their definition at most, in units of Σ|e|/S, looked at now and then.
+    """The greatest difference between the servo's wakes and their definition, in units of Σ|e|/S.
 
-    ``longest_s`` is the longest time that one of them ran on without being emptied.
+    ``longest_s`` is the longest time for which a wake was never empty.
     """
 
     comparisons: int = 0
@@ -167,9 +167,9 @@ class Drift:
             self._scenes[serial] = scene
 
     def take(self, samples: Any) -> None:
-        """Follow ``samples`` (recarray of ``SAMPLE``), those after the last ones.
+        """Follow the next ``samples`` (recarray of ``SAMPLE``).
 
-        A scene of which some are missing is followed no further.
+        A scene with missing samples is not followed further.
         """
         for part in np.split(samples, np.flatnonzero(np.diff(samples.scene)) + 1):
             if len(part) > 0:

@@ -29,9 +29,9 @@ _SEEN: Final = {
 
 @dataclass(slots=True, kw_only=True)
 class Rests:
-    """What was left of wake [m/s] and force [N] after the hand had kept still, at most.
+    """The greatest wake [m/s] and force [N] that remained after the hand had been at rest.
 
-    ``pushed_s`` is how long a force above ``PERCEPTIBLE_N`` was sent to a hand that kept still.
+    ``pushed_s`` is how long a force above ``PERCEPTIBLE_N`` was sent to a resting hand.
     """
 
     count: int = 0
@@ -41,7 +41,7 @@ class Rests:
 
 
 class InjectedFault(NamedTuple):
-    """How many times a fault was injected, in how many readings, and how many of these telemetry has."""
+    """The number of times a fault was injected, of affected readings, and of those that telemetry reports."""
 
     name: str
     times: int
@@ -51,7 +51,7 @@ class InjectedFault(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class SoakResult:
-    """The numbers of a soak.
+    """The numbers of a soak test.
 
     ``memory`` [bytes] is read soon after the start, at every tenth and at the end; ``counts`` is a record of
     ``audit.COUNTS``, ``device`` one of ``faults.FAULTS``.
@@ -78,12 +78,12 @@ class SoakResult:
 
     @property
     def growth_bytes(self) -> int:
-        """How much more memory is held at the end than soon after the start."""
+        """The increase in memory from soon after the start to the end."""
         return self.memory[-1] - self.memory[0]
 
     @property
     def faults(self) -> tuple[InjectedFault, ...]:
-        """The faults of each kind."""
+        """The injected faults of each kind."""
         rows = []
         for kind, name in enumerate(KINDS):
             shown = kind != JUMP or self.virtual  # a tick may take long for other reasons too
@@ -94,12 +94,12 @@ class SoakResult:
 
     @property
     def findings(self) -> tuple[str, ...]:
-        """What is wrong, a sentence each; empty where nothing is."""
+        """One sentence per problem; empty if there is none."""
         checks = (*self._limits(), *self._sums())
         return tuple(sentence for sentence, wrong in checks if wrong)
 
     def _limits(self) -> Iterator[tuple[str, bool]]:
-        """Yield the limits of samples, written forces and drift, each with whether it is broken."""
+        """Yield the limits of samples, written forces and drift, and whether each is violated."""
         counts, device = self.counts, self.device
         first = f", first at tick {counts.first_tick}"
         yield f"{counts.excess} forces above the limit of {counts.limit_n:g} N{first}", counts.excess > 0
@@ -123,7 +123,7 @@ class SoakResult:
         yield f"memory grew by {_mib(self.growth_bytes):.1f} MiB", self.growth_bytes > _MOST_GROWTH_BYTES
 
     def _sums(self) -> Iterator[tuple[str, bool]]:
-        """Yield what must be the same counted in two places; some of it only where no sample is missing."""
+        """Yield consistency checks between two independent counts; some require that no sample is missing."""
         counts = self.counts
         lost = counts.samples + self.dropped != self.ticks or counts.missing > self.dropped
         yield f"{self.ticks} ticks are not {counts.samples} samples and {self.dropped} dropped", lost

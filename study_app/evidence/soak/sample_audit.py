@@ -74,8 +74,8 @@ _COUNTS = np.dtype(
 class Audit:
     """The counts over all samples so far.
 
-    ``limit_n`` is the greatest force that may be sent [N], ``slew_n`` its greatest change from tick to tick [N], and
-    ``reach_m`` how far the device's handle gets from the middle at most [m].
+    ``limit_n`` is the greatest permitted force [N], ``slew_n`` its greatest permitted change per tick [N], and
+    ``reach_m`` the greatest distance of the device's handle from the centre [m].
     """
 
     def __init__(self, limit_n: float, slew_n: float, period_ns: int, reach_m: float) -> None:
@@ -86,18 +86,18 @@ class Audit:
         self._displaced_m = (reach_m + GLITCH_M) / 2
 
     def take(self, samples: Any) -> None:
-        """Look at ``samples`` (recarray of ``SAMPLE``), those that follow the last ones looked at."""
+        """Check the next ``samples`` (recarray of ``SAMPLE``)."""
         look(self.counts, samples, self._displaced_m)
 
 
 def prepare() -> None:
-    """Compile what looks, or load it from the cache."""
+    """Compile the checks, or load them from the cache."""
     look(records(_COUNTS, 1)[0], records(SAMPLE, 0), 1.0)
 
 
 @kernel
 def look(counts: Any, samples: Any, displaced_m: float) -> None:
-    """Count every one of ``samples``."""
+    """Check and count each of ``samples``."""
     for i in range(samples.shape[0]):
         sample = samples[i]
         counts.samples += 1
@@ -185,7 +185,7 @@ def _look_at_force(counts: Any, sample: Any) -> None:
 
 @kernel
 def _look_at_time(counts: Any, sample: Any) -> None:
-    """Predict each deadline from the one before and from when that tick ended."""
+    """Compare a deadline with the one predicted from the previous deadline and the end of that tick."""
     deadline_ns = sample.time_ns - sample.lateness_ns
     counts.latest_s = max(counts.latest_s, sample.lateness_ns * 1e-9)
     if counts.follows != 0 and deadline_ns != counts.next_deadline_ns:

@@ -56,14 +56,14 @@ _FASTEST_MPS: Final = 1.0
 
 
 class _RestlessHand(ScriptedDevice):
-    """A hand that draws what it does next from a stream of its own."""
+    """A hand that draws its next motion from its own random stream."""
 
     def __init__(self, random: Random, *, force_limit_n: float = 8.0) -> None:
         super().__init__(random, force_limit_n=force_limit_n)
         self._draw = random.random
 
     def go_on(self) -> float:
-        """Begin another motion; return how long to leave it at that [s]."""
+        """Begin another motion; return how long to continue it [s]."""
         self._shake(TREMOR_M)
         kind = self._draw()
         if kind < 0.3:
@@ -74,7 +74,7 @@ class _RestlessHand(ScriptedDevice):
         return self._circle() if kind < 0.7 else self._tick_sharply()
 
     def keep_still(self) -> None:
-        """Stay, without a tremor: the encoders come to rest."""
+        """Stay at rest without tremor, so that the encoder counts are constant."""
         self._shake(0.0)
         self.rest()
 
@@ -95,7 +95,7 @@ class _RestlessHand(ScriptedDevice):
         return x_m, y_m, z_m
 
     def _circle(self) -> float:
-        """Go around at an even speed, up and down meanwhile."""
+        """Move in circles at a constant speed, and up and down at the same time."""
         radius_m = _REACH_M * (0.1 + 0.9 * self._draw())
         duration_s = 1.0 + 5.0 * self._draw()
         t_s = np.arange(round(duration_s / _ROW_S) + 1) * _ROW_S
@@ -105,7 +105,7 @@ class _RestlessHand(ScriptedDevice):
         return duration_s
 
     def _tick_sharply(self) -> float:
-        """Go along straight legs to random places, without slowing down at the corners."""
+        """Move along straight lines to random positions without slowing down at the corners."""
         legs = 4 + int(8 * self._draw())
         places_m = np.array([self._place_m() for _ in range(legs)])
         lengths_m = np.linalg.norm(np.diff(places_m, axis=0), axis=1)
@@ -145,7 +145,7 @@ Part: TypeAlias = Literal["rough", "steady", "rest"]
 
 
 class Stretch(NamedTuple):
-    """A part of a round, and the tick before which it ends."""
+    """A part of a round; ``end`` is the tick before which it ends."""
 
     part: Part
     round: int
@@ -154,7 +154,7 @@ class Stretch(NamedTuple):
 
 @dataclass(slots=True, kw_only=True)
 class _Due:
-    """At which tick the host does something next; below 0: it does not."""
+    """The ticks at which the host acts next; a negative tick means never."""
 
     motion: int = 0
     scene: int = -1
@@ -163,10 +163,10 @@ class _Due:
 
 
 class Soak:
-    """One soak: step it until it is over, then ask for its report; leaving it as a context stops the servo.
+    """One soak test: call `step` until it is over, then `report`; leaving the context stops the servo.
 
-    The scenes have one rate; ``hours`` are those of the servo's clock. ``virtual``: on a virtual clock, as fast as it
-    computes. Motions, scenes and faults follow from ``seed``.
+    All scenes have the same rate; ``hours`` are on the servo's clock. ``virtual`` uses a virtual clock, which runs as
+    fast as possible. Motions, scenes and faults follow from ``seed``.
     """
 
     def __init__(self, scenes: Mapping[str, Scene], hours: float, *, virtual: bool, seed: int = 1) -> None:
@@ -221,7 +221,7 @@ class Soak:
         self.servo.stop()
 
     def step(self, ending: threading.Event | None = None) -> None:
-        """Do what is due, let some ticks pass, and look at them; an ``ending`` that is set cuts the waiting short."""
+        """Carry out the due actions, let some ticks pass, and check them; setting ``ending`` ends the wait early."""
         tick = self.done
         stretch = self._at(tick)
         if self.stretch is None or (stretch.part, stretch.round) != (self.stretch.part, self.stretch.round):
@@ -241,7 +241,7 @@ class Soak:
         self._watch(tick)
 
     def _watch(self, before: int) -> None:
-        """Raise ``ServoFault`` where ticks have stopped coming without a fault: waiting longer would find no end."""
+        """Raise ``ServoFault`` if the ticks have stopped without a fault, to avoid waiting forever."""
         now_s = time.perf_counter()
         if self.done > before:
             self._ticked_s = now_s
@@ -249,7 +249,7 @@ class Soak:
             raise ServoFault(f"the servo has taken no tick for {PATIENCE_S:g} s, after {before} of {self.ticks} ticks")
 
     def report(self) -> SoakResult:
-        """Stop the servo, look at what is left, and say what was found so far."""
+        """Stop the servo, check the remaining samples, and return the result so far."""
         took_s = time.perf_counter() - self._began_s
         if self.done >= self.ticks:
             self._leave()
@@ -318,12 +318,12 @@ class Soak:
 
     @property
     def _is_left_alone(self) -> bool:
-        """Whether the hand keeps still in a liquid that leaves no force by itself."""
+        """Whether the hand is at rest in a liquid that produces no force by itself."""
         effects = {effect for liquid in self._scenes[self._presented].liquids for effect in liquid.effects}
         return self.stretch is not None and self.stretch.part == "rest" and not effects - {"drag", "wake"}
 
     def _act(self, stretch: Stretch, tick: int) -> None:
-        """Do what is due: another motion, another liquid, the force stopped, the force let on again."""
+        """Carry out the due actions: change the motion or the liquid, stop the force, or release it again."""
         due = self._due
         if 0 <= due.motion <= tick:
             due.motion = tick + max(1, round(self.hand.go_on() * self._rate_hz))
@@ -344,14 +344,14 @@ class Soak:
         return tick + max(1, round((least_s + (most_s - least_s) * self._draw()) * self._rate_hz))
 
     def _load(self, name: str) -> None:
-        """Present a liquid; a servo that has just stopped itself gets it when it has recovered."""
+        """Present a liquid; a servo that has stopped itself receives it after its recovery."""
         self._presented = name
         with suppress(DeviceLost, ServoFault):
             self.drift.expect(self.servo.load(self._scenes[name]), self._scenes[name])
             self._loads += 1
 
     def _recover(self) -> None:
-        """Start a servo that has stopped itself anew, as a host does once the cable is back."""
+        """Restart a servo that has stopped itself, as a host does once the cable is reconnected."""
         self.servo.stop()
         self._look()
         self._recoveries += 1
@@ -360,7 +360,7 @@ class Soak:
         self._load(self._presented)
 
     def _look(self) -> None:
-        """Look at all samples that are new, and at every tenth at the memory."""
+        """Check all new samples and, at every tenth of the test, the memory."""
         samples = self.reader.read()
         self.audit.take(samples)
         self.drift.take(samples)
@@ -372,7 +372,7 @@ class Soak:
 
 
 def _size(vector: Floats) -> float:
-    """Return the length of (3,), infinite where it is not finite."""
+    """Return the length of a vector (3,); infinite if it is not finite."""
     return float(np.nan_to_num(np.linalg.norm(vector), nan=np.inf))
 
 
@@ -385,9 +385,9 @@ def soak(
     ending: threading.Event | None = None,
     progress: Callable[[str], None] = lambda _line: None,
 ) -> SoakResult:
-    """Soak the servo in ``scenes`` and return what was found; one that is asked to end early says what it has.
+    """Run a soak test of the servo in ``scenes`` and return its result, also if it is ended early.
 
-    ``progress`` hears a line at the start and at every tenth, ``ending`` is set by whoever wants no more.
+    ``progress`` is called with one line at the start and at every tenth; setting ``ending`` ends the test.
 
     Raises
     ------

@@ -44,7 +44,7 @@ DIRECTION: Final = np.array([0.8, 0.0, 0.6])
 class Bench:
     """The records of one closed loop, with the safety layer (``safe``) or without.
 
-    ``limits`` are tried in place of the table's, ``scene`` and ``dynamics`` in place of the case's.
+    ``limits`` replace those of the table, ``scene`` and ``dynamics`` those of the case.
     """
 
     def __init__(
@@ -103,7 +103,7 @@ class Bench:
         return self.model, self.safety[0], self.sample[0], self.handle, self.pace, self.loop
 
     def copy(self) -> Bench:
-        """Return a bench of its own, in the same state."""
+        """Return an independent copy of this bench in the same state."""
         other = copy.copy(self)
         rows = type(self.model.rows)(*(array.copy() for array in self.model.rows))
         other.model = Model._make([*(array.copy() for array in self.model[:-1]), rows])
@@ -112,18 +112,18 @@ class Bench:
         return other
 
     def begin(self) -> None:
-        """Put hand and handle where the motion begins, at its speed."""
+        """Move hand and handle to the start of the motion, with its initial speed."""
         begin(self.loop, self.handle)
 
     def run(self, trace: Any, first: int, until_s: float) -> int:
-        """Run ticks into ``trace`` from row ``first`` on until a time [s]; return the row after the last."""
+        """Run ticks until ``until_s`` [s], writing rows of ``trace`` from ``first``; return the next row."""
         self.loop.until_s = until_s
         return int(run(*self._records, trace, first))
 
     def follow(self, path_m: Floats, *, rigid: bool = False) -> Any:
-        """Return the trace of a hand that means to be at ``path_m`` (ticks, 3) [m], one row a tick.
+        """Return the trace of a hand that follows ``path_m`` (ticks, 3) [m], one row per tick.
 
-        With ``rigid`` the handle is there, whatever the force.
+        With ``rigid`` the handle follows the path regardless of the force.
         """
         self.loop.rigid = rigid
         trace = records(TRACE, len(path_m))
@@ -131,22 +131,22 @@ class Bench:
         return trace
 
     def play(self, trace: Any, places_m: Floats) -> None:
-        """Let the tick answer a motion (rows, 3) [m] at the times of ``trace``, as `closed_loop.play` does."""
+        """Run the tick along a given motion (rows, 3) [m] at the times of ``trace``; see `closed_loop.play`."""
         play(*self._records, trace, places_m)
 
 
 def lasts_s(case: Case) -> float:
-    """Return how long a case lasts [s]."""
+    """Return the duration of a case [s]."""
     return max(_LASTS_S, case.release_s + _FREE_S) if case.hand == LETS_GO else _LASTS_S
 
 
 def new_trace(case: Case, seconds: float | None = None) -> Any:
-    """Return an empty trace that has room for a case, or for so many seconds of it."""
+    """Return an empty trace with room for a case, or for so many seconds of it."""
     return records(TRACE, math.ceil(((seconds or lasts_s(case)) + 0.1) * case.rate_hz))
 
 
 def _dynamics_of(case: Case) -> Dynamics:
-    """Return what the device states: its least mass and its delay, as they are believed, and its velocity's lag."""
+    """Return the dynamics that the device reports: least mass and delay as believed, and velocity lag."""
     least_kg = case.believed_kg or (min(case.mass_kg, case.other_kg) if case.other_kg else case.mass_kg)
     lag_s = case.velocity_lag / case.rate_hz if case.estimator == DEVICE else None
     return Dynamics(
@@ -158,14 +158,14 @@ def _dynamics_of(case: Case) -> Dynamics:
 
 
 def sine_path(amplitude_m: float, rate_per_s: float, seconds: float, rate_hz: float) -> Floats:
-    """Return the places (ticks, 3) [m] of a hand along a straight sine, ``rate_per_s`` being its angular frequency."""
+    """Return positions (ticks, 3) [m] along a straight sine of angular frequency ``rate_per_s``."""
     t_s = np.arange(round(seconds * rate_hz)) / rate_hz
     path_m: Floats = np.outer(amplitude_m * np.sin(rate_per_s * t_s), DIRECTION)
     return path_m
 
 
 def law_along(scene: Scene, trace: Any) -> Floats:
-    """Return the force (ticks, 3) [N] of the scene on the handle's true motion, with its velocities given."""
+    """Return the scene's force (ticks, 3) [N] for the handle's true motion, with exact velocities."""
     law = simulate(
         scene, Motion(trace.t_s, scene.scale * trace.position_m, velocity_mps=scene.scale * trace.velocity_mps)
     )
@@ -174,11 +174,11 @@ def law_along(scene: Scene, trace: Any) -> Floats:
 
 @kernel
 def lowest_balance(trace: Any) -> tuple[float, float, float]:
-    """Return the lowest balance of hand and liquid [J], the strongest force [N] and the longest step [m].
+    """Return the lowest energy balance of hand and liquid [J], the greatest force [N] and the longest step [m].
 
-    From tick to tick the hand does the work -f·Δp on the liquid, with the force that acts on the handle, buoyancy and
-    weight aside, over its true step in the frame of the current. The balance begins at 0 and never exceeds what the
-    liquid could give back.
+    In each tick the hand does the work -f·Δp on the liquid, with the force that acts on the handle, without buoyancy
+    and weight, and its true step in the frame of the current. The balance begins at 0 and is limited to the energy that
+    the liquid could return.
     """
     balance_j = lowest_j = strongest_n = longest_m = 0.0
     for k in range(1, trace.shape[0]):
@@ -202,7 +202,7 @@ def lowest_balance(trace: Any) -> tuple[float, float, float]:
 
 @kernel
 def given_out_j(trace: Any) -> float:
-    """Return the most that the force that acts gave to the handle, beyond what it took from it before [J]."""
+    """Return the most energy that the acting force gave to the handle in excess of what it had taken before [J]."""
     energy_j = most_j = 0.0
     for k in range(1, trace.shape[0]):
         for axis in range(3):
@@ -213,7 +213,7 @@ def given_out_j(trace: Any) -> float:
 
 @kernel
 def smooth(trace: Any, spread_s: float, out_m: Any, out_n: Any) -> None:
-    """Write motion and force without what is fast into ``out_m``, ``out_n`` (rows, 3): a Gaussian mean over time."""
+    """Write Gaussian-smoothed motion and force over time into ``out_m`` and ``out_n`` (rows, 3)."""
     rows = trace.shape[0]
     first = 0
     for k in range(rows):
@@ -237,9 +237,9 @@ def smooth(trace: Any, spread_s: float, out_m: Any, out_n: Any) -> None:
 
 
 def fast_part(vectors: Any, rate_hz: float, corner_hz: float, first: int, last: int, aside_s: float = 0.0) -> float:
-    """Return the mean square root of vectors (rows, 3) above a frequency, over the rows from ``first`` to ``last``.
+    """Return the RMS of vectors (rows, 3) above a frequency, over the rows from ``first`` to ``last``.
 
-    The strongest ``aside_s`` of it are left aside.
+    The strongest ``aside_s`` seconds are excluded.
     """
     squares = np.zeros(max(last - first, 1))
     _fast_squares(vectors, rate_hz, corner_hz, first, squares)
@@ -251,9 +251,9 @@ def fast_part(vectors: Any, rate_hz: float, corner_hz: float, first: int, last: 
 
 @kernel
 def _fast_squares(vectors: Any, rate_hz: float, corner_hz: float, first: int, out: Any) -> None:
-    """Add the squares of what is above the corner to ``out``, from row ``first`` on.
+    """Add the squares of the high-pass filtered vectors to ``out``, from row ``first`` onwards.
 
-    Butterworth of second order by the bilinear transform, begun at rest a while before.
+    The filter is a second-order Butterworth by the bilinear transform, started at rest some rows earlier.
     """
     w = math.tan(math.pi * corner_hz / rate_hz)
     gain = 1.0 / (1.0 + math.sqrt(2.0) * w + w * w)

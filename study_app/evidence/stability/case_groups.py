@@ -108,19 +108,19 @@ _FALCONS: Final[Mapping[str, tuple[Any, ...]]] = {
 
 
 class Group(NamedTuple):
-    """Cases that have something in common, which ``name`` says."""
+    """Named cases with a common property."""
 
     name: str
     cases: tuple[Case, ...]
 
 
 def sweep(seed: str = "stability") -> tuple[Case, ...]:
-    """Return the cases of the sweep: each liquid at each scale, rate, delay and grip; the rest from a fixed seed."""
+    """Return the cases of the sweep: each liquid at each scale, rate, delay and grip; the rest is drawn."""
     return tuple(_drawn(seed, _grid(GRIPS)))
 
 
 def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ...]:
-    """Return all groups but the sweep itself, with at most ``count`` cases each."""
+    """Return all groups except the sweep, with at most ``count`` cases each."""
     light = {**_DRAWN, "mass_kg": _HANDLES_KG}
     held, released = [tuple(_grid(hands)) for hands in (("light", "middle", "firm"), (LETS_GO, THROWN))]
     both = [dataclasses.replace(case, plant=plant) for plant in PLANTS for case in (*held, *released)]
@@ -179,7 +179,7 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
 def _of_liquids(
     name: str, names: Callable[[], Iterable[str]], seed: str, choices: Mapping[str, tuple[Any, ...]], count: int | None
 ) -> Iterator[Group]:
-    """Yield groups for liquids outside the sweep: its own cases, with misjudged delays, and with releases."""
+    """Yield groups for liquids outside the sweep: plain cases, misjudged delays, and releases."""
     whole = tuple(_grid(GRIPS, names=names))
     yield Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
     for change in _MISJUDGED:
@@ -191,20 +191,20 @@ def _of_liquids(
 
 
 def _half_damper(name: str, count: int, seed: str, choices: Mapping[str, tuple[Any, ...]]) -> Group:
-    """Return loops that are held, thrown and let go, in half of them the strongest damper."""
+    """Return loops that are held, thrown and released; half of them present the strongest damper."""
     whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
     return Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
 
 
 def some(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
-    """Return ``count`` of the cases, spread over all of them: the same in every run."""
+    """Return ``count`` cases, evenly spread over all of them."""
     if count is None or count >= len(cases):
         return tuple(cases)
     return tuple(Random(count).sample(cases, count))  # noqa: S311 - no secret
 
 
 def _believing(less: int) -> Callable[[Case], Case | None]:
-    """Return what makes a loop believe its delay to be shorter by ``less`` ticks; None of those that cannot."""
+    """Return a function that makes a loop underestimate its delay by ``less`` ticks, or returns None if it cannot."""
 
     def change(case: Case) -> Case | None:
         believed = case.delay - less
@@ -214,7 +214,7 @@ def _believing(less: int) -> Callable[[Case], Case | None]:
 
 
 def _measuring(less: int) -> Callable[[Case], Case | None]:
-    """Return what makes a loop begin with such a belief, and the device measure its delay."""
+    """Return a function that makes a loop start with an underestimated delay on a device that measures it."""
 
     def change(case: Case) -> Case | None:
         believed = case.delay - less
@@ -259,7 +259,7 @@ def _grid(
 
 
 def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ...]] = _DRAWN) -> Iterator[Case]:
-    """Yield cases, the rest of each drawn from ``choices``."""
+    """Yield cases with the remaining values drawn from ``choices``."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:
         yield dataclasses.replace(case, **{name: _one(draw, values) for name, values in choices.items()})
@@ -268,9 +268,9 @@ def _drawn(seed: str, cases: Iterable[Case], choices: Mapping[str, tuple[Any, ..
 def _releases(
     seed: str, plants: Iterable[str], masses_kg: Iterable[float], names: Callable[[], Iterable[str]] = liquids
 ) -> Iterator[Case]:
-    """Yield releases at every phase of strokes of 1 to 4 Hz ±30 mm, in the loop of a study.
+    """Yield releases at every phase of strokes of 1 to 4 Hz and ±30 mm, in the loop of a study.
 
-    The damper's are drawn from a stream of their own, so that those of the liquids stay the ones that were judged.
+    The damper has its own random stream, so that the liquids' cases are unchanged.
     """
     shared, own = Random(seed), {DAMPER: Random(f"{seed} {DAMPER}")}  # noqa: S311 - the same cases in every run
     for plant, liquid, mass_kg, phase in itertools.product(plants, names(), masses_kg, range(_PHASES)):
@@ -288,7 +288,7 @@ def _releases(
 
 
 def _in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
-    """Yield releases at a moment at which samples are missing, after which they may be off."""
+    """Yield releases during missing samples, after which positions may be offset."""
     draw = Random(seed)  # noqa: S311 - the same cases in every run
     for case in cases:
         burst_ms, jump_mm = _one(draw, _JUMPS["burst_ms"]), _one(draw, (0.0, *_JUMPS["jump_mm"]))
@@ -297,7 +297,7 @@ def _in_gap(seed: str, cases: Iterable[Case]) -> Iterator[Case]:
 
 
 def peak_mps(frequency_hz: float, amplitude_m: float) -> float:
-    """Return the greatest speed of a sine."""
+    """Return the greatest speed [m/s] of a sine."""
     return 2.0 * math.pi * frequency_hz * amplitude_m
 
 

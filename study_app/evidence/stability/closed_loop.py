@@ -59,7 +59,7 @@ _MEASURED = np.dtype(
 
 @kernel
 def measure_velocity(measured: Any, velocity_mps: Any, shown: int, pace: Any) -> None:
-    """Take the handle's velocity of this tick in; where it is ``shown``, write what is measured into ``seen_mps``."""
+    """Add the handle's velocity in this tick; if it is ``shown``, write the measured velocity to ``seen_mps``."""
     if measured.ticks == 0:  # it has always been that
         copy(velocity_mps, measured.slow_mps)
         for row in range(_KEPT):
@@ -84,7 +84,7 @@ def measure_velocity(measured: Any, velocity_mps: Any, shown: int, pace: Any) ->
 
 @kernel
 def _mean(measured: Any, newest: int, oldest: int, axis: int) -> float:
-    """Return the mean of the velocities of so many ticks ago, before this tick is counted."""
+    """Return the mean velocity over a range of past ticks, before this tick is counted."""
     total = 0.0
     for back in range(newest, oldest + 1):
         total += measured.kept_mps[(measured.ticks - back) % _KEPT, axis]
@@ -147,7 +147,7 @@ def new_arm(
     motor_step_n: float = 0.0,
     delay: int = 0,
 ) -> Any:
-    """Return the record of an arm that holds a handle, both at rest in the middle of the workspace."""
+    """Return the record of an arm that holds a handle, both at rest in the centre of the workspace."""
     record = records(_ARM, 1)[0]
     record.used = record.held = 1
     record.arm_kg, record.arm_npm, record.arm_nspm = arm.mass_kg, arm.stiffness_npm, arm.damping_nspm
@@ -159,7 +159,7 @@ def new_arm(
 
 @kernel
 def advance(arm: Any, from_m: Any, to_m: Any, duration_s: float) -> None:
-    """Let ``duration_s`` pass while the intended position goes straight ``from_m`` to ``to_m`` (each (3,) [m])."""
+    """Advance by ``duration_s`` while the intended position moves from ``from_m`` to ``to_m`` (each (3,) [m])."""
     if duration_s <= 0.0:
         return
     steps = math.ceil(duration_s / _LONGEST_STEP_S)
@@ -169,7 +169,7 @@ def advance(arm: Any, from_m: Any, to_m: Any, duration_s: float) -> None:
 
 @kernel
 def _midpoint_step(arm: Any, from_m: Any, to_m: Any, duration_s: float, share: float, step_s: float) -> None:
-    """Solve, axis by axis, both equations for the mean velocities s_a, s_h of the step: x ← x + h s, v ← 2 s - v."""
+    """Solve both equations per axis for the mean velocities s_a, s_h of the step: x ← x + h s, v ← 2 s - v."""
     tissue_npm = tissue_nspm = speed_mps2 = 0.0
     if arm.held:
         tissue_npm, tissue_nspm = arm.tissue_npm, arm.tissue_nspm
@@ -198,7 +198,7 @@ def _midpoint_step(arm: Any, from_m: Any, to_m: Any, duration_s: float, share: f
 
 @kernel
 def write_force(arm: Any, force_n: Any) -> None:
-    """Take the force (3,) [N] that the servo writes; the one written ``delay`` writes ago acts from now on."""
+    """Accept the force (3,) [N] that the servo writes; the one written ``delay`` writes ago takes effect."""
     for i in range(3):
         for row in range(MOST_DELAY, 0, -1):
             arm.queue_n[row, i] = arm.queue_n[row - 1, i]
@@ -284,7 +284,7 @@ TRACE = np.dtype(
 
 @kernel
 def begin(loop: Any, handle: Any) -> None:
-    """Put hand and handle where the motion begins, at its speed."""
+    """Move hand and handle to the start of the motion, with its initial speed."""
     loop.now_s = 0.0
     place(loop, 0.0, loop.was_m)
     place(loop, 1e-4, loop.goes_m)
@@ -300,7 +300,7 @@ def begin(loop: Any, handle: Any) -> None:
 
 @kernel
 def place(loop: Any, t_s: float, out: Any) -> None:
-    """Write where the hand means to be into ``out`` (3,): reaches, circles, one straight stroke, or a sine."""
+    """Write the hand's intended position into ``out`` (3,): reaches, circles, one straight stroke, or a sine."""
     t = min(t_s, loop.moving_s)
     if loop.motion == REACHES:
         ticks = t * loop.speed_mps / (1.875 * loop.way_m)
@@ -325,7 +325,7 @@ def place(loop: Any, t_s: float, out: Any) -> None:
 
 @kernel
 def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any, trace: Any, first: int) -> int:
-    """Take ticks, one to each row of ``trace`` from ``first`` on, until ``loop.until_s``; return the next row."""
+    """Run ticks until ``loop.until_s``, one per row of ``trace`` from ``first``; return the next row."""
     k = first
     while k < trace.shape[0] and loop.now_s < loop.until_s and loop.broken == 0:
         if k > 0:
@@ -356,16 +356,16 @@ def run(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any,
 
 @kernel
 def delay_at(loop: Any, t_s: float) -> int:
-    """Return the delay of the device [ticks] at a time."""
+    """Return the device's delay [ticks] at a time."""
     slower = t_s >= _SLOWER_S and (loop.swaps == 0 or math.floor(t_s / _STRETCH_S) % 2.0 == 1.0)
     return int(max(loop.delay, loop.slows_to) if slower else loop.delay)
 
 
 @kernel
 def follow(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any, trace: Any, path_m: Any) -> None:
-    """Run a tick at each row of ``trace``, the hand meaning to be at ``path_m`` (rows, 3) [m] and never letting go.
+    """Run one tick per row of ``trace`` while the hand follows ``path_m`` (rows, 3) [m] without a release.
 
-    With ``loop.rigid`` the handle is there, whatever the force.
+    With ``loop.rigid`` the handle follows the path regardless of the force.
     """
     period_s = pace.period_s
     for k in range(trace.shape[0]):
@@ -386,7 +386,7 @@ def follow(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: A
 
 @kernel
 def _move(handle: Any, loop: Any, elapsed_s: float) -> None:
-    """Let time pass; of the second plant, ``handle`` is what the encoder sees."""
+    """Let time pass; for the second plant, ``handle`` is the position that the encoder sees."""
     if loop.arm.used == 0:
         move(handle, loop.was_m, loop.goes_m, elapsed_s)
         return
@@ -397,7 +397,6 @@ def _move(handle: Any, loop: Any, elapsed_s: float) -> None:
 
 @kernel
 def _push(handle: Any, loop: Any, force_n: Any) -> None:
-    """Write a force to the motors."""
     if loop.arm.used == 0:
         push(handle, force_n[0], force_n[1], force_n[2])
         return
@@ -407,7 +406,6 @@ def _push(handle: Any, loop: Any, force_n: Any) -> None:
 
 @kernel
 def _record(model: Any, safety: Any, sample: Any, handle: Any, loop: Any, row: Any) -> None:
-    """Write one row of the trace."""
     write_row(model, safety, sample, handle, row)
     row.t_s = loop.now_s
     row.fresh, row.measured = sample.fresh, loop.measured
@@ -434,11 +432,11 @@ def write_row(model: Any, safety: Any, sample: Any, handle: Any, row: Any) -> No
 
 @kernel
 def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any, trace: Any, places_m: Any) -> None:
-    """Let the tick answer a motion (rows, 3) at the times of ``trace``, and write its force over ``sent_n`` there.
+    """Run the tick along a motion (rows, 3) at the times of ``trace``, and write its force to ``sent_n``.
 
-    Samples are lost and repeated in the same ticks as in the trace. An estimator that uses the force receives what
-    ``sent_n`` held before: the force that belongs to the motion; a device that measures the velocity, what
-    ``velocity_mps`` holds. No work is done on anything, so the passivity controller stays out of it.
+    Samples are lost and repeated in the same ticks as in the trace. An estimator that uses the force receives the
+    previous content of ``sent_n``, the force that belongs to the motion; a device that measures the velocity reports
+    ``velocity_mps``. No work is done, so the passivity controller does not act.
     """
     for k in range(trace.shape[0]):
         loop.now_s = trace[k].t_s
@@ -456,7 +454,7 @@ def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any
 
 @kernel
 def _settle_passivity(passivity: Any) -> None:
-    """Owe nothing: each balance begins the tick as high as the liquid's reserve lets it be."""
+    """Reset the passivity controller: each balance starts the tick as high as the liquid's reserve permits."""
     passivity.balance_j = passivity.late_balance_j = passivity.later_balance_j = passivity.fast.balance_j = math.inf
     passivity.gain = 1.0
     passivity.settling = 0
@@ -484,7 +482,7 @@ def _see(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
 
 @kernel
 def _read(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
-    """Take position and velocity that the device shows now, or keep those of the sample before."""
+    """Read the device's current position and velocity, or keep those of the previous sample."""
     sample.time_ns = round(loop.now_s * 1e9)
     if loop.velocity.filter != NONE:
         measure_velocity(loop.velocity, handle.velocity_mps, loop.measured, pace)
@@ -501,7 +499,7 @@ def _read(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
 
 @kernel
 def _answer(model: Any, safety: Any, sample: Any, loop: Any) -> None:
-    """Take a tick; without safety the force of the effects is sent as it is."""
+    """Run a tick; without safety the force of the effects is sent unchanged."""
     if loop.safe:
         tick(model, safety, sample)
         return

@@ -66,11 +66,10 @@ def boundary_nspm(
     mass_kg: float = FREE_HANDLE_KG,
     friction_nspm: float = _FRICTION_NSPM,
 ) -> float:
-    """Return the greatest linear damping [N·s/m] under which a handle let go comes to rest, to 1 %.
+    """Return the greatest linear damping [N·s/m] at which a released handle comes to rest, to 1 %.
 
-    ``believed`` is the delay that the loop takes for its own, by default ``delay``. The safety layer is off. The
-    encoder is exact, but for "kalman": there it has counts of a Falcon's size, since what the filter makes of them is
-    not linear.
+    ``believed`` is the delay that the loop assumes, by default ``delay``. The safety layer is off. The encoder is
+    exact, except for "kalman": this filter is nonlinear in the counts, so they have the size of a Falcon's.
     """
     believed = delay if believed is None else believed
     low, high = 0.1, 1e5
@@ -84,10 +83,10 @@ def boundary_nspm(
 
 
 def passive_nspm(friction_nspm: float, period_s: float = NOMINAL_S, delay: int = 0, alpha: float = 0.1) -> float:
-    """Return the greatest damping B that filter and delay leave passive on a handle of friction b, whatever holds it.
+    """Return the greatest damping B that is passive on a handle with friction b, for this filter and delay.
 
-    After Colgate & Schenkel (1997) with K = 0, for v filtered by v += α(u - v): b > B · sup -α Re(e^(-jdθ) / (e^jθ -
-    (1 - α))) over 0 < θ ≤ π, which is b > B α/(2 - α) for d = 0.
+    After Colgate & Schenkel (1997) with K = 0, for v filtered by v += α(u - v): b > B · sup -α Re(e^(-jdθ) / (e^jθ - (1
+    - α))) over 0 < θ ≤ π, which is b > B α/(2 - α) for d = 0.
     """
     weight = _weight(alpha, period_s)
     angles = np.linspace(1e-4, math.pi, 20_001)
@@ -96,14 +95,14 @@ def passive_nspm(friction_nspm: float, period_s: float = NOMINAL_S, delay: int =
 
 
 def measured_estimators() -> tuple[Velocity, ...]:
-    """Return the estimators that the table has entries of."""
+    """Return the estimators that the table contains."""
     return (*(Ewma(alpha=alpha) for alpha in NAMED["ewma"].measured), Raw(), Kalman())
 
 
 def measure_limits(
     velocities: Iterable[Velocity] | None = None, *, executor: Executor | None = None
 ) -> Iterator[Entry]:
-    """Yield the table of limits, line by line; of all estimators, or of some; by an executor or here."""
+    """Yield the table of limits, line by line, for all or some estimators; in parallel with an executor."""
     loops = itertools.product(velocities or measured_estimators(), PERIODS_S, DELAYS[1:])
     in_turn = map if executor is None else executor.map
     yield from in_turn(_entry, *zip(*loops, strict=True))
@@ -118,9 +117,9 @@ def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
 
 
 def _limit_nspm(velocity: Velocity, period_s: float, delay: int, *, unaltered: bool) -> float:
-    """Return the limit of drag: a share of the boundary, less where that is noisy or the filter may be mistaken.
+    """Return the damping limit: a fraction of the boundary, less if it is noisy or the filter may be wrong.
 
-    The raw difference passes a count of the encoder on whole, EWMA as `_weight` says.
+    The raw difference passes one encoder count on in full, EWMA according to `_weight`.
     """
     fast = period_s < NOMINAL_S
     share = _UNALTERED_SHARE if unaltered else _FAST_SHARE if fast else _SHARE
@@ -158,7 +157,7 @@ def _comes_to_rest(
     mass_kg: float,
     friction_nspm: float,
 ) -> bool:
-    """Return whether a handle thrown into a linear damper comes to rest; ``delays``: the loop's, the one believed."""
+    """Return whether a handle thrown into a linear damper comes to rest; ``delays``: true and believed."""
     counts = isinstance(velocity, Kalman)
     case = Case(
         rate_hz=1.0 / period_s,

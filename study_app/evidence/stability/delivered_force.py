@@ -30,7 +30,7 @@ from study_app.evidence.table import Evidence, run
 
 
 class _Limit(NamedTuple):
-    """The greatest error [%], or multiple of the Wiener bound for liquids of `_BOUNDED`, and share withheld [%]."""
+    """The greatest permitted error [%] (a multiple of the Wiener bound in `_BOUNDED`) and withheld share [%]."""
 
     error: float
     withheld: float
@@ -73,7 +73,7 @@ _LIMITS: Final[Mapping[tuple[str, str], tuple[_Limit, _Limit, _Limit]]] = {
 
 
 class Device(NamedTuple):
-    """Encoder count and mass of a handle, and the least mass that its driver states."""
+    """Encoder count and mass of a handle, and the least mass that its driver reports."""
 
     count_um: float
     mass_kg: float
@@ -94,7 +94,7 @@ _RELEASES: Final = 4
 
 
 class Delivered(NamedTuple):
-    """One liquid in one loop: error, Wiener bound and share withheld [%], and the unstable cases."""
+    """One liquid in one loop: error, Wiener bound and withheld share [%], and the unstable cases."""
 
     liquid: str
     estimator: str
@@ -119,7 +119,7 @@ class Delivered(NamedTuple):
 
 @cache
 def _shipped_liquids() -> Mapping[str, tuple[str, ...]]:
-    """Return the liquids of all shipped studies, those of the same force once, with the names of the others."""
+    """Return the liquids of all shipped studies; liquids with the same force appear once, with all names."""
     liquids: dict[str, list[str]] = {}
     for name, scene in scenes().items():
         if name not in {"dense", DAMPER}:
@@ -137,7 +137,7 @@ def measure(
     *,
     executor: Executor | None = None,
 ) -> tuple[Delivered, ...]:
-    """Return what arrives of liquids (by default all), by an executor or here."""
+    """Return the delivered force of liquids (by default all); in parallel with an executor."""
     planned = itertools.product(devices, estimators, names or _shipped_liquids(), delays)
     return run(_measured, planned, executor)
 
@@ -164,7 +164,7 @@ def _measured(device: str, estimator: str, liquid: str, delay: int) -> Delivered
 
 
 class Errors(NamedTuple):
-    """The error, the Wiener bound, and the share withheld [%]."""
+    """The error, the Wiener bound, and the withheld share [%]."""
 
     error: float
     bound: float
@@ -186,7 +186,7 @@ def errors(case: Case) -> Errors:
 
 
 def _strokes(case: Case) -> Iterator[Case]:
-    """Yield the strokes that are judged: held, and released at phases of a cycle."""
+    """Yield the strokes that are judged: held, and released at several phases of a cycle."""
     for hand in ("light", "middle", "firm"):
         yield replace(case, hand=hand)
     for plant, phase in itertools.product((FIRST, SECOND), range(_RELEASES)):

@@ -65,7 +65,7 @@ _ours = threading.local()
 
 
 class _Falcon(EmulatedFalcon):
-    """A Falcon in the hand of a case, which is as new for each."""
+    """An emulated Falcon in the hand of a case; it is reset for each case."""
 
     def __init__(self) -> None:
         super().__init__(emulator=Emulator(running=True, tremor_m=0.0))
@@ -75,12 +75,12 @@ class _Falcon(EmulatedFalcon):
         self._opened = self.memory.copy(), self.hand.memory.copy()
 
     def renew(self) -> None:
-        """Be as after it was opened."""
+        """Reset the device to its state after opening."""
         self.memory[:], self.hand.memory[:] = self._opened
 
 
 class _Scripted(ScriptedDevice):
-    """The scripted device, as late as a Falcon."""
+    """The scripted device with the delay of a Falcon."""
 
     def __init__(self, count_m: float) -> None:
         super().__init__(tremor_m=0.0, quantum_m=count_m)
@@ -88,7 +88,7 @@ class _Scripted(ScriptedDevice):
 
 
 def judge_driven(case: Case) -> Verdict:
-    """Run a case through the Falcon's driver, and say whether it is stable."""
+    """Run a case through the Falcon driver and return the verdict on its stability."""
     falcon = _opened_falcon()
     falcon.renew()
     dynamics = falcon.dynamics
@@ -130,13 +130,13 @@ def judge_driven(case: Case) -> Verdict:
 
 
 def _scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
-    """Return the traces of a case on scripted devices, one for each encoder count."""
+    """Return the traces of a case on scripted devices, one per encoder count."""
     devices = [_Scripted(count_m) for count_m in _COUNTS_M]
     return [_trace(case, device, device, dynamics) for device in devices]
 
 
 def _opened_falcon() -> _Falcon:
-    """Return the opened Falcon of this thread."""
+    """Return this thread's open emulated Falcon."""
     if not hasattr(_ours, "falcon"):
         _ours.falcon = _Falcon()
         _ours.falcon.open()
@@ -145,7 +145,7 @@ def _opened_falcon() -> _Falcon:
 
 
 def _trace(case: Case, device: Driver, hand: Any, dynamics: Dynamics) -> Any:
-    """Return the trace of a case from the begin of its motion on, on a device and the hand at it."""
+    """Return the trace of a case, from the start of its motion, on a device and its hand."""
     handle, grip = hand.state.handle, GRIPS[case.hand]
     handle.mass_kg, handle.viscous_nspm, handle.coulomb_n = case.mass_kg, case.viscous_nspm, case.coulomb_n
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = grip.mass_kg, grip.stiffness_npm, grip.damping_nspm
@@ -187,7 +187,7 @@ def _follow(
     trace: Any,
     released: int,
 ) -> int:
-    """Take a tick of the servo's loop for each row of ``trace``; let go before row ``released``; return how many."""
+    """Run one servo tick per row of ``trace`` and release before row ``released``; return the number of ticks."""
     one: Any = np.int64(1)  # with a literal the loop is compiled a second time
     for k in range(trace.shape[0]):
         if k == released:
@@ -203,7 +203,7 @@ def _follow(
 
 
 def _motion(case: Case) -> tuple[Any, Any]:
-    """Return times (n,) [s] and places (n, 3) [m] of the hand: to the begin, a rest there, and the case's motion."""
+    """Return times (n,) [s] and positions (n, 3) [m] of the hand: to the start, a rest there, and the case's motion."""
     loop = Bench(case).loop
     t_s = np.arange(0.0, _RESTS_S + lasts_s(case), _ROW_S)
     places_m = np.zeros((len(t_s), 3))
@@ -218,7 +218,7 @@ def _places(loop: Any, t_s: Any, out_m: Any) -> None:
 
 
 def _given_out(case: Case, trace: Any) -> float:
-    """Return the most that the motors gave to the handle from its release until it met an end stop [J]."""
+    """Return the most energy given to the handle from its release until it met an end stop [J]."""
     first = int(np.searchsorted(trace.t_s, case.release_s - 1e-9))
     met = (np.abs(trace.position_m[first:]) >= _AT_STOP * np.array(_STOP_M)).any(axis=1)
     last = first + int(np.argmax(met)) if met.any() else len(trace)
@@ -226,7 +226,7 @@ def _given_out(case: Case, trace: Any) -> float:
 
 
 def _restlessness(case: Case, trace: Any, others: list[Any]) -> tuple[float, float]:
-    """Return the force's fast part, and the scripted device's greatest, where they differ most."""
+    """Return the RMS of the force's fast part and the greatest of the scripted devices', where they differ most."""
     swings = []
     for window_s in windows(case):
         begins, ends = np.searchsorted(trace.t_s, window_s)

@@ -44,14 +44,14 @@ def measure(
     delays_ms: Iterable[float] = _DELAYS_MS,
     progress: Callable[[int], object] = lambda _done: None,
 ) -> tuple[Entry, ...]:
-    """Return the table, line by line; ``progress`` is called with the number of lines so far."""
+    """Return the table line by line; ``progress`` is called with the number of lines so far."""
     return run(_entry, itertools.product(liquids, estimators, hands, delays_ms), None, progress)
 
 
 def evidence(entries: Sequence[Entry], file: str) -> Evidence:
-    """Return the shares left [%] as a table, and the file that ``protocol.warnings.delayed_force`` reads.
+    """Return the remaining share [%] as a table, and the file that ``protocol.warnings.delayed_force`` reads.
 
-    The table has a line for each liquid, estimator and hand, a column for each delay.
+    The table has one line per liquid, estimator and hand, and one column per delay.
     """
     delays_ms = sorted({it.delay_ms for it in entries})
     kept = {it[:4]: it.left_percent for it in entries}
@@ -64,7 +64,7 @@ def evidence(entries: Sequence[Entry], file: str) -> Evidence:
 
 
 def delayed_trace(case: Case) -> Any:
-    """Return the trace of a hand that stirs the case's liquid, buoyancy aside, with the case's delay of the force."""
+    """Return the trace of a hand that stirs the case's liquid without buoyancy, with the case's force delay."""
     path_m = sine_path(_AMPLITUDE_M, _SPEED_MPS / _AMPLITUDE_M, _LASTS_S, case.rate_hz)
     return Bench(case, scene=without_buoyancy(scene_of(case))).follow(path_m)
 

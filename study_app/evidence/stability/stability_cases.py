@@ -58,7 +58,7 @@ _OF_SOME: Final = ("swaps", "jump_mm", "outliers", "outlier_mm")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grip:
-    """A hand as mass, spring and damper that hold the handle (van Beek et al. 2015; Hasser & Cutkosky 2002)."""
+    """A hand modelled as mass, spring and damper (van Beek et al. 2015; Hasser & Cutkosky 2002)."""
 
     mass_kg: float
     stiffness_npm: float
@@ -112,24 +112,24 @@ _ESTIMATORS: Final[Mapping[str, Any]] = {it.name: it.model() for it in KINDS if 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One closed loop. ``delay`` is in ticks, ``jitter`` in periods, ``missed`` a share of ticks; sizes as named.
+    """One closed loop. ``delay`` is in ticks, ``jitter`` in periods, ``missed`` a fraction of ticks.
 
-    ``hand`` is a grip of `GRIPS`: "thrown" is let go from the start, "lets-go" after ``release_s``. ``speed_mps`` is
+    ``hand`` is a grip of `GRIPS`: "thrown" is released at the start, "lets-go" after ``release_s``. ``speed_mps`` is
     the greatest speed of the hand along its ``motion``, ``way_mm`` the length of a reach, the diameter of a circle and
     twice the amplitude of a sine.
 
-    ``plant`` is the device and hand of ``haptics.kernels.plant``, the second one, of `arm`, or "falcon": the driver and
-    its emulator (`driven`), whose delay, encoders and samples are their own. ``believed`` is the delay that
-    the loop believes (-1: the true one), ``slows_to`` that of the device from 0.5 s on, with ``swaps`` 1 in every
-    second stretch of 150 ms alone; above 0, the device measures its delay. ``lost`` is a share of ticks without a
-    new sample, ``duplicated`` one of samples that repeat the position before; for the last ``burst_ms`` of every 300 ms
-    there is no new sample, and after them all positions are off by up to ``jump_mm`` along each axis. ``outliers`` is a
-    share of ticks whose position is off by up to ``outlier_mm``. ``believed_kg`` is the least mass that the device
-    states (0: the true one), ``other_kg`` the mass of the handle in every second stretch of 150 ms (0: the same).
-    ``force_delay_ms``, ``force_jitter_ms`` and ``force_loss`` are the study's own force link.
+    ``plant`` selects device and hand: that of ``haptics.kernels.plant``, the second one, of `arm`, or "falcon", the
+    driver with its emulator (`driven`), which has its own delay, encoders and samples. ``believed`` is the delay that
+    the loop assumes (-1: the true one), ``slows_to`` the device's delay from 0.5 s onwards, with ``swaps`` 1 only in
+    every second interval of 150 ms; above 0, the device measures its delay. ``lost`` is the fraction of ticks without a
+    new sample, ``duplicated`` that of samples that repeat the previous position; for the last ``burst_ms`` of every 300
+    ms there is no new sample, and all later positions are offset by up to ``jump_mm`` along each axis. ``outliers`` is
+    the fraction of ticks whose position is wrong by up to ``outlier_mm``. ``believed_kg`` is the least mass that the
+    device reports (0: the true one), ``other_kg`` the mass of the handle in every second interval of 150 ms (0: the
+    same). ``force_delay_ms``, ``force_jitter_ms`` and ``force_loss`` define the study's own force link.
 
-    With ``estimator`` "device" the device measures the velocity: ``velocity_lag`` [ticks] is the mean lag, which it
-    states, of its ``velocity_filter``; noise from peak to peak and counts come on top of it.
+    With the ``estimator`` "device" the device measures the velocity: ``velocity_lag`` [ticks] is the mean lag of its
+    ``velocity_filter``, which it reports; peak-to-peak noise and quantisation are added.
     """
 
     liquid: str = "water"
@@ -171,12 +171,12 @@ class Case:
 
     @property
     def believed_delay(self) -> int:
-        """The delay [ticks] that the loop believes at the start."""
+        """The delay [ticks] that the loop assumes at the start."""
         return self.delay if self.believed < 0 else self.believed
 
     @property
     def misjudged(self) -> bool:
-        """Whether the loop believes another delay than the device has, at some time."""
+        """Whether the delay that the loop assumes ever differs from the device's."""
         return self.believed_delay != self.delay or self.slows_to > self.delay
 
     def __str__(self) -> str:
@@ -187,7 +187,7 @@ class Case:
 
 
 def parse(line: str) -> Case:
-    """Return the case that a line of ``name=value`` words describes; what it leaves out has the default.
+    """Return the case described by a line of ``name=value`` words; omitted values have their defaults.
 
     Raises
     ------
@@ -232,10 +232,10 @@ def parse(line: str) -> Case:
 
 @cache
 def liquids() -> Mapping[str, Scene]:
-    """Return what the sweep presents, each with its scene.
+    """Return the scenes of the sweep by liquid.
 
-    Every liquid of the shipped studies, tar among them, one far denser, and the strongest linear damper that a file may
-    ask for.
+    They are the liquids of the shipped studies, including tar, a far denser one, and the strongest permitted linear
+    damper.
     """
     named: dict[str, Scene] = {}
     for protocol, prefix in _OF_SWEEP.items():
@@ -249,7 +249,7 @@ def liquids() -> Mapping[str, Scene]:
 
 @cache
 def scenes() -> Mapping[str, Scene]:
-    """Return what a case may present: what the sweep does, and the liquids of all other shipped studies."""
+    """Return all scenes that a case may present: those of the sweep, and the liquids of all other shipped studies."""
     named = dict(liquids())
     for protocol in shipped():
         if protocol in _OF_SWEEP:
@@ -261,18 +261,18 @@ def scenes() -> Mapping[str, Scene]:
 
 @cache
 def materials() -> tuple[str, ...]:
-    """Return the names of the non-Newtonian liquids among them."""
+    """Return the names of the non-Newtonian liquids in `scenes`."""
     return tuple(name for name, scene in scenes().items() if scene.liquids[0].non_newtonian is not None)
 
 
 @cache
 def of_physical2() -> tuple[str, ...]:
-    """Return the names of the liquids of physical2: unsteady drag where the Reynolds number permits it."""
+    """Return the liquid names of physical2, which has unsteady drag where the Reynolds number permits it."""
     return tuple(name for name in scenes() if name.startswith("physical2_"))
 
 
 def scene_of(case: Case) -> Scene:
-    """Return what the case presents."""
+    """Return the scene that the case presents."""
     velocity = _ESTIMATORS["ewma" if case.estimator == DEVICE else case.estimator]  # a device's own takes its place
     link = _link_of(case)
     changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": velocity, "link": link}

@@ -60,7 +60,7 @@ _MARKS: Final = dict(zip(_MAP_DELAYS, "osD^", strict=True))
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw_map(off: Sequence[Verdict]) -> Figure:
-    """Draw the map; ``off`` are the verdicts of a sweep without safety."""
+    """Draw the stability map; ``off`` are the verdicts of a sweep without safety."""
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, _HEIGHT_PT / 72), facecolor="white")
     width_pt = style.PAGE_WIDTH_PT
     axes = [
@@ -76,7 +76,7 @@ def draw_map(off: Sequence[Verdict]) -> Figure:
 
 
 def _boundary(axes: Axes) -> None:
-    """Draw the maximum stable damping of a handle with some friction, and that which its friction alone proves."""
+    """Draw the maximum stable damping of a handle with some friction, and the passive limit given by friction alone."""
     for delay in _MAP_DELAYS:
         measured = [boundary_nspm(Ewma(), NOMINAL_S, delay, friction_nspm=b) for b in _FRICTIONS_NSPM]
         proved = [passive_nspm(b, NOMINAL_S, delay) for b in _FRICTIONS_NSPM]
@@ -105,7 +105,7 @@ def _limits(axes: Axes) -> None:
 
 
 def _found(axes: Axes, off: Sequence[Verdict]) -> None:
-    """Draw the share of the sweep's cases that are unstable without safety, over rate and delay."""
+    """Draw the share of sweep cases that are unstable without safety, against rate and delay."""
     total: collections.Counter[tuple[float, int]] = collections.Counter()
     bad: collections.Counter[tuple[float, int]] = collections.Counter()
     for verdict in off:
@@ -163,8 +163,8 @@ _MOVING_S: Final = 1.2
 class Fidelity(NamedTuple):
     """One liquid in one loop, in the worst of its motions.
 
-    ``difference_n`` and ``force_n`` are mean square roots [N] over a motion; ``beyond`` is the greatest share of ticks
-    in which a single force is further off than the target.
+    ``difference_n`` and ``force_n`` are RMS values [N] over a motion; ``beyond`` is the greatest share of ticks whose
+    force differs by more than the target.
     """
 
     liquid: str
@@ -180,7 +180,7 @@ class Fidelity(NamedTuple):
 
     @property
     def target_n(self) -> float:
-        """How great the difference may be."""
+        """The greatest permitted difference [N]."""
         return max(_RELATIVE * self.force_n, _ABSOLUTE_N)
 
     @property
@@ -191,18 +191,18 @@ class Fidelity(NamedTuple):
 def fidelities(
     names: Sequence[str] | None = None, loops: Sequence[tuple[float, int]] = LOOPS, *, executor: Executor | None = None
 ) -> tuple[Fidelity, ...]:
-    """Measure what safety takes away from liquids (by default all) in each of the loops, by an executor or here.
+    """Measure how much the safety layer changes the force of liquids (by default all) in each loop.
 
-    Each liquid has its own scale and estimator, and is moved by a middling hand (0.55 kg, 135 N/m, 6.5 N·s/m) along
+    Each liquid has its own scale and estimator, and is moved by a medium hand (0.55 kg, 135 N/m, 6.5 N·s/m) along
     reaches, circles and strokes of 0.1 to 1 m/s. The force sent is compared with the model's, clamped to 8 N. The
-    target is that of the choice of effects: 5 % or 0.05 N, whichever is more, of the mean square root over a motion.
-    Single ticks may be further off, as where a wake breaks or a hand turns back.
+    target is that for the selection of effects: an RMS of 5 % or 0.05 N, whichever is greater, over a motion. Single
+    ticks may differ by more, for example when a wake breaks or the hand reverses.
     """
     return run(_worst_fidelity, itertools.product(names or liquids(), loops), executor)
 
 
 def _worst_fidelity(liquid: str, loop: tuple[float, int]) -> Fidelity:
-    """Return the fidelity of the motion that is furthest off its target."""
+    """Return the fidelity of the motion that exceeds its target most."""
     measured = list(_motions(liquid, *loop))
     beyond = max(fidelity.beyond for fidelity in measured)
     return max(measured, key=lambda one: one.difference_n / one.target_n)._replace(beyond=beyond)
@@ -228,7 +228,7 @@ def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
 
 
 def _compare(case: Case, trace: Any) -> Fidelity:
-    """Compare the force sent with the one asked for, clamped in the same direction."""
+    """Compare the force sent with the model's force, clamped in the same direction."""
     asked_n = np.linalg.norm(trace.asked_n, axis=1)
     clamped_n = trace.asked_n * np.minimum(1.0, FORCE_LIMIT_N / np.maximum(asked_n, 1e-12))[:, None]
     force_n = np.linalg.norm(clamped_n, axis=1)
@@ -248,7 +248,7 @@ _MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n
 
 @dataclass(frozen=True, slots=True)
 class _Judged:
-    """The verdicts on a group of cases, with safety on."""
+    """The verdicts on a group of cases with safety on."""
 
     name: str
     verdicts: tuple[Verdict, ...]
@@ -260,7 +260,7 @@ class _Judged:
 
 @dataclass(frozen=True, slots=True)
 class Swept:
-    """The verdicts on the sweep with safety off and on, those on other groups, and how long they took."""
+    """The verdicts on the sweep with safety off and on, those on other groups, and the computation time."""
 
     off: tuple[Verdict, ...]
     on: tuple[Verdict, ...]
@@ -269,12 +269,12 @@ class Swept:
 
     @property
     def unstable(self) -> tuple[Verdict, ...]:
-        """Those that are unstable although safety is on."""
+        """The verdicts that are unstable although safety is on."""
         return tuple(verdict for group in self.groups for verdict in group.unstable)
 
     @property
     def groups(self) -> tuple[_Judged, ...]:
-        """All groups, the sweep with safety on, if it was judged, before the others."""
+        """All groups; the sweep with safety on, if it was judged, comes first."""
         return (*([_Judged("first plant", self.on)] if self.on else []), *self.others)
 
 
@@ -284,9 +284,9 @@ def run_sweep(
     executor: Executor,
     progress: Callable[[int, int], object] = lambda _done, _of: None,
 ) -> Swept:
-    """Judge the sweep's cases with safety off and on, and the other groups with it, by an executor.
+    """Judge the sweep's cases with safety off and on, and the other groups with safety on, by an executor.
 
-    ``progress`` is called with the number of verdicts so far and the number of all.
+    ``progress`` is called with the number of verdicts so far and the total number.
     """
     began = time.perf_counter()
     planned = [(case, safe) for safe in (False, True) for case in cases]
@@ -298,7 +298,7 @@ def run_sweep(
 
 
 def verdicts_on(case: Case) -> tuple[Verdict, ...]:
-    """Judge a case with safety off and on; through the Falcon's driver, which knows no other loop, with it alone."""
+    """Judge a case with safety off and on; only with safety on if it uses the Falcon driver."""
     return tuple(_judge(case, safe) for safe in ((True,) if case.plant == FALCON else (False, True)))
 
 
@@ -323,7 +323,7 @@ def in_words(verdict: Verdict) -> str:
 
 
 def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
-    """Return what came out, as text: how many are unstable and why, which limiters acted, what they take away."""
+    """Return a summary as text: the number of unstable cases and why, the active limiters, and the force withheld."""
     return "\n".join((*_counts(swept), "", group_table(swept), "", *_limiters(swept), "", *_fidelity(fidelities)))
 
 
@@ -339,7 +339,7 @@ def _counts(swept: Swept) -> Iterator[str]:
 
 
 def group_table(swept: Swept) -> str:
-    """Return, for each group, the unstable cases and the most energy that the handle got from a liquid."""
+    """Return, for each group, the unstable cases and the most energy that the handle gained from a liquid."""
     return "\n".join(_group_lines(swept))
 
 
@@ -381,7 +381,7 @@ def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
 
 
 def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidence:
-    """Return the summary, or of groups alone their table; the cases as CSV, the unstable ones as text, and the map."""
+    """Return a summary (or a table of groups), the cases as CSV, the unstable ones as text, and the map."""
     text = f"seed {seed}\n\n{summary(swept, fidelities) if swept.on else group_table(swept)}"
     lines = ("# When the simulation is stable", "", "```", text, "```", "", "![Map](map.png)", "")
     unstable = (*(f"- unstable with safety on: `{verdict.case}`" for verdict in swept.unstable), "")
@@ -396,7 +396,7 @@ def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidenc
 def limits(executor: Executor, progress: Callable[[int, int], object], file: str) -> Evidence:
     """Measure the table of limits that `haptics.model.slope_limits` reads, by an executor.
 
-    The rows of "line", which are for velocities that a device measures, are those of the shipped table.
+    The rows of "line", for velocities that a device measures, are copied from the shipped table.
     """
     lines = len(measured_estimators()) * len(PERIODS_S) * len(DELAYS[1:])
     rows = []

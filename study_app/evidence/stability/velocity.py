@@ -50,7 +50,7 @@ _BATCHES: Final = 200
 
 
 class Stroke(NamedTuple):
-    """A sine of ±``amplitude_m``, or a minimum-jerk reach of twice that in ``reach_s``."""
+    """A sine of ±``amplitude_m``, or a minimum-jerk reach of twice the amplitude in ``reach_s``."""
 
     amplitude_m: float
     frequency_hz: float = 0.0
@@ -107,7 +107,7 @@ def _error(velocity: Velocity, stroke: Stroke) -> float:
 
 
 def noise_mmps(velocity: Velocity) -> Mapping[float, float]:
-    """Return the velocity above 20 Hz [mm/s, RMS of an axis] at constant speeds [m/s], at rest with tremor."""
+    """Return the velocity noise above 20 Hz [mm/s, RMS per axis] at constant speeds [m/s]; at rest with tremor."""
     noise = {}
     t_s = np.arange(5000) / _RATE_HZ
     for speed_mps in _NOISE_MPS:
@@ -123,7 +123,7 @@ def noise_mmps(velocity: Velocity) -> Mapping[float, float]:
 
 
 def estimated(velocity: Velocity, t_s: Floats, x_m: Floats) -> Floats:
-    """Return the velocities (n,) [m/s] that an estimator finds in positions (n,) [m] along one axis."""
+    """Return the velocities (n,) [m/s] estimated from positions (n,) [m] along one axis."""
     seen_m = np.floor(x_m / COUNT_M + 0.5) * COUNT_M
     motion = Motion(t_s, np.column_stack([seen_m, 0 * seen_m, 0 * seen_m]))
     found: Floats = np.array(simulate(Scene(scale=1, velocity=velocity, knee=Knee(law="none")), motion).vx_mps)
@@ -131,7 +131,7 @@ def estimated(velocity: Velocity, t_s: Floats, x_m: Floats) -> Floats:
 
 
 def _cost_ns(velocity: Velocity) -> float:
-    """Return the computation time of a tick [ns] less that with the raw difference; medians of batches."""
+    """Return the computation time per tick [ns] in excess of the raw difference; medians of batches."""
     dynamics = Dynamics(delay_s=1 / _RATE_HZ)
     benches = [TickTimer(Scene(velocity=it), dynamics) for it in (velocity, Raw())]
     for _ in range(_BATCHES):
@@ -162,7 +162,7 @@ def plain_forces() -> tuple[Scene, ...]:
 
 
 def _whole_forces() -> tuple[Scene, ...]:
-    """Return the liquids of physical2, effects chosen, without buoyancy."""
+    """Return the liquids of physical2 with their selected effects but without buoyancy."""
     return tuple(
         without_buoyancy(scenes()[f"physical2_{name}"].model_copy(update={"scale": _WHOLE_SCALE}))
         for name in _WHOLE_LIQUIDS
@@ -170,14 +170,14 @@ def _whole_forces() -> tuple[Scene, ...]:
 
 
 def _plain_errors(velocity: Velocity, strokes: Iterable[Stroke] = _STROKES) -> tuple[float, ...]:
-    """Return the error [%] of each plain force, in each grip and stroke."""
+    """Return the error [%] of each plain force for each grip and stroke."""
     return tuple(
         held_error(scene, velocity, hand, stroke) for scene in plain_forces() for hand in _HANDS for stroke in strokes
     )
 
 
 def held_error(scene: Scene, velocity: Velocity, hand: str, stroke: Stroke) -> float:
-    """Return the error of a scene's force [%] in a loop of one tick of delay."""
+    """Return the error of a scene's force [%] in a loop with one tick of delay."""
     scene = scene.model_copy(update={"velocity": velocity})
     bench = Bench(Case(delay=_DELAY, hand=hand), scene=scene)
     bench.handle.motor_step_n = 0.0
@@ -195,7 +195,7 @@ _TAPS: Final = 400
 
 
 def wiener_bound(scene: Scene, count_m: float, delay_s: float) -> float:
-    """Return the least RMS error of the force at the time ``delay_s`` after a sample [s], over the RMS of the force.
+    """Return the least relative RMS error of the force ``delay_s`` after a sample [s].
 
     ``count_m`` is one encoder count at the hand [m].
     """
@@ -218,15 +218,15 @@ def _spectrum(rate_hz: float) -> tuple[Any, Floats]:
 
 
 def _course(values: Any) -> Floats:
-    """Return the real course (`_ROWS`,) of sines whose amplitude and phase at each frequency above 0 are given."""
+    """Return the real signal (`_ROWS`,) with the given amplitude and phase at each frequency above 0."""
     found: Floats = np.fft.irfft(np.concatenate([[0], values, [0]]), _ROWS) * _ROWS / 2
     return found
 
 
 def _linear_law(scene: Scene, turns: Any, size_m: Floats) -> Any:
-    """Return the force of the linear law closest to the scene's over the hand's velocity [N·s/m], at each frequency.
+    """Return the transfer function from velocity to force [N·s/m] of the linear law closest to the scene's.
 
-    It has damping, added mass and history, fitted along one course of the motion, in the second of two periods.
+    It has damping, added mass and history, fitted to one realisation of the motion, in the second of two periods.
     """
     phase = np.random.default_rng(1).uniform(0, 2 * math.pi, len(turns))
     x_m = np.sqrt(2) * size_m * np.exp(1j * phase)
@@ -257,9 +257,9 @@ _Progress = Callable[[str], None]
 
 
 class Row(NamedTuple):
-    """One quantity: its values by estimator, and the limit of the first, a least one where ``least`` says so.
+    """One quantity by estimator; the limit applies to the first, as a lower limit if ``least``.
 
-    ``bound`` is the least value of a linear estimator (`wiener_bound`), None where it is not computed.
+    ``bound`` is the least value of a linear estimator (`wiener_bound`), None if it is not computed.
     """
 
     name: str
@@ -270,14 +270,14 @@ class Row(NamedTuple):
 
     @property
     def met(self) -> bool:
-        """Whether the first estimator reaches the goal, as far as there is one."""
+        """Whether the first estimator meets the limit, if there is one."""
         if self.goal is None:
             return True
         return self.values[0] >= self.goal if self.least else self.values[0] <= self.goal
 
 
 def measure(progress: _Progress) -> tuple[Row, ...]:
-    """Measure everything; ``progress`` is called with the name of each part before it is measured."""
+    """Measure all rows; ``progress`` is called with the name of each part before it is measured."""
     rows: list[Row] = []
     for name, part in PARTS.items():
         progress(name)

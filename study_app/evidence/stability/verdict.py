@@ -69,9 +69,9 @@ _SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gau
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """What became of a case: ``reasons`` why it is unstable, none if it is not, and what was measured.
+    """The verdict on a case: ``reasons`` why it is unstable, empty if it is stable, and the measured quantities.
 
-    ``acted`` is the share of ticks in which each limiter acted, in the order of ``LIMITER_NAMES``.
+    ``acted`` is the fraction of ticks in which each limiter acted, in the order of ``LIMITER_NAMES``.
     """
 
     case: Case
@@ -90,7 +90,7 @@ class Verdict:
 
 
 def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
-    """Return the verdict on a loop that blew up."""
+    """Return the verdict on a loop whose values became infinite or NaN."""
     return Verdict(
         case=case,
         safe=safe,
@@ -105,14 +105,14 @@ def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
 
 
 def reasons_of(*found: bool) -> tuple[str, ...]:
-    """Return the names of the reasons after the first, in their order, that were found."""
+    """Return the names of the reasons that apply, after the first, in order."""
     return tuple(reason for reason, holds in zip(REASONS[1:], found, strict=True) if holds)
 
 
 def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Verdict:
-    """Run a case, with the safety layer or without, and say whether it is stable.
+    """Run a case with or without the safety layer, and return the verdict on its stability.
 
-    ``limits`` are tried in place of the table's.
+    ``limits`` replace those of the table.
     """
     bench = Bench(case, safe=safe, limits=limits)
     trace = new_trace(case)
@@ -154,7 +154,7 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
 
 
 def windows(case: Case) -> Iterator[tuple[float, float]]:
-    """Yield the stretches of time [s] over which the force's fast part is compared."""
+    """Yield the time intervals [s] over which the force's fast part is compared."""
     if case.hand == THROWN:
         yield _SETTLES_S, 1.0
         yield 1.0, lasts_s(case)
@@ -167,18 +167,18 @@ def windows(case: Case) -> Iterator[tuple[float, float]]:
 
 
 def swing(trace: Any, case: Case) -> float:
-    """Return the least swing [m/s] over the last 0.4 s if it does not tire, or over a second of the motion before."""
+    """Return the least sustained oscillation [m/s] over the last 0.4 s, or over a second of the motion before."""
     moving = _swing_between(trace, case, FAST_HZ, np.linspace(_SETTLES_S, _SETTLES_S + 1.0, 6))
     return max(_resting_swing(trace, case, lasts_s(case)), moving)
 
 
 def _resting_swing(trace: Any, case: Case, end_s: float) -> float:
-    """Return the least swing [m/s] over the 0.4 s before a time [s] if it does not tire."""
+    """Return the least oscillation [m/s] over the 0.4 s before a time [s]; 0 if it decays."""
     return _swing_between(trace, case, _SLOW_HZ, np.linspace(end_s - 0.4, end_s, 5))
 
 
 def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> float:
-    """Return the least swing above a frequency [m/s] over the stretches between times [s]; 0 if it tires."""
+    """Return the least oscillation above a frequency [m/s] between successive times [s]; 0 if it decays."""
     rows = np.searchsorted(trace.t_s, times_s)
     swings = [
         fast_part(trace.velocity_mps, case.rate_hz, corner_hz, first, last) for first, last in itertools.pairwise(rows)
@@ -189,7 +189,7 @@ def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> fl
 def _restlessness(
     case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None
 ) -> tuple[float, float]:
-    """Return the force's fast part, and that of the same motion without feedback, where they differ most."""
+    """Return the RMS of the force's fast part and that without feedback, where they differ most."""
     calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
     smooth(trace, _SPREAD_S, calm_m, calm_n)
     calm_mps = np.gradient(calm_m, trace.t_s, axis=0)
@@ -215,7 +215,7 @@ def _restlessness(
 
 
 def _passive(case: Case, safe: bool, limits: DampingLimits | None) -> Any | None:
-    """Return the trace of a hand that holds the handle while the motors are off, as long as it holds it."""
+    """Return the trace of a hand that holds the handle with the motors off, for as long as it holds it."""
     if case.hand == THROWN:
         return None
     off = Bench(case, safe=safe, limits=limits)
@@ -226,5 +226,5 @@ def _passive(case: Case, safe: bool, limits: DampingLimits | None) -> Any | None
 
 
 def acted(trace: Any) -> tuple[float, ...]:
-    """Return the share of ticks in which each limiter acted."""
+    """Return the fraction of ticks in which each limiter acted."""
     return tuple(float(np.mean((trace.limiters >> k) & 1)) for k in range(len(LIMITER_NAMES)))

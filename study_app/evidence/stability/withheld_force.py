@@ -23,7 +23,7 @@ from study_app.evidence.table import Evidence, run
 
 
 class _Stroke(NamedTuple):
-    """A straight motion to and fro."""
+    """A straight motion back and forth."""
 
     frequency_hz: float
     amplitude_mm: float
@@ -66,7 +66,7 @@ MODES: Final = (_IMPOSED, _HELD, SHAKEN)
 
 
 class Withheld(NamedTuple):
-    """Shares of one liquid's force: of each stroke in `STROKES`, and of each second after each shake in `QUICK`."""
+    """Withheld shares of one liquid's force: in each stroke of `STROKES`, and in each second after `QUICK`."""
 
     liquid: str
     estimator: str
@@ -76,7 +76,7 @@ class Withheld(NamedTuple):
 
     @property
     def quick(self) -> float:
-        """The greatest share of all strokes that have a goal."""
+        """The greatest share over all strokes that have a limit."""
         return 0.0 if self.mode == SHAKEN else max(self.strokes)
 
     @property
@@ -85,12 +85,12 @@ class Withheld(NamedTuple):
 
     @property
     def lasting(self) -> float:
-        """The greatest share from one second after a shake on."""
+        """The greatest share from one second after a shake onwards."""
         return max(share for seconds in self.after for share in seconds[1:])
 
     @property
     def met(self) -> bool:
-        """Whether the liquid keeps both goals; tar has none."""
+        """Whether the liquid meets both limits; tar has none."""
         return self.liquid in _EXEMPT or (self.quick <= self.most and self.lasting < MOST_AFTER)
 
 
@@ -101,7 +101,7 @@ def measure(
     delay: int = 1,
     executor: Executor | None = None,
 ) -> tuple[Withheld, ...]:
-    """Return the shares of liquids (by default all that ship), each at its own scale, at 1 kHz."""
+    """Return the withheld shares of liquids (by default all shipped ones), each at its own scale, at 1 kHz."""
     shipped = [name for name in liquids() if name not in {"dense", "damper"}]
     planned = [
         (
@@ -120,7 +120,7 @@ def measure(
 
 
 def evidence(found: Sequence[Withheld]) -> Evidence:
-    """Return the table of shares in percent, and whether each goal is met."""
+    """Return the table of shares in percent, and whether each limit is met."""
     text = "\n".join(_lines(found)) + "\n"
     return Evidence(text, {"withheld.txt": text}, missed=not all(withheld.met for withheld in found))
 
@@ -170,7 +170,7 @@ def _stroke_m(stroke: _Stroke, lasts_s: float) -> NDArray[np.float64]:
 
 
 def _stirring_m(from_m: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return places (rows, 3) [m] of slow stirring that begins at a place."""
+    """Return positions (rows, 3) [m] of slow stirring that starts at a position."""
     angle = _STIRRING_MPS / _STIRRING_M * np.arange(1, round(SECONDS * _RATE_HZ) + 1) / _RATE_HZ
     return from_m + _STIRRING_M * np.column_stack([np.cos(angle) - 1.0, np.zeros_like(angle), np.sin(angle)])
 

@@ -91,7 +91,7 @@ _KIND_SHARE: Final = 20
 
 
 class Verdict(NamedTuple):
-    """One judged value: what it is of, the value and its limit in words, and whether it keeps to the limit."""
+    """One judged quantity: its name, value and limit as text, and whether the limit is met."""
 
     study: str
     what: str
@@ -102,7 +102,7 @@ class Verdict(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measure:
-    """A value that is judged: its limit, and the interval in which the true value lies at a confidence.
+    """A quantity with a limit, and the interval that contains its true value at a given confidence.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Measure:
     written: Callable[[float], str]
 
     def judged(self, confidence: float) -> Verdict:
-        """Return the verdict: the limit is exceeded if the interval lies wholly beyond it."""
+        """Return the verdict: the limit is exceeded if the whole interval lies beyond it."""
         low, high = self.interval(confidence)
         value = self.written(self.value)
         if low < high:
@@ -140,12 +140,12 @@ class Measure:
 
 
 def verdicts_on(measures: Sequence[Measure]) -> list[Verdict]:
-    """Return the verdicts: that any limit is exceeded by chance has a probability of at most `_FAMILY_ERROR`."""
+    """Return the verdicts; the probability that any limit is exceeded by chance is at most `_FAMILY_ERROR`."""
     return [measure.judged(1.0 - _FAMILY_ERROR / len(measures)) for measure in measures]
 
 
 def mean_interval(values: ArrayLike) -> Callable[[float], tuple[float, float]]:
-    """Return the interval of the mean of the values of independent studies, by Student's t."""
+    """Return Student's t interval for the mean over independent studies, as a function of the confidence."""
     of_studies = np.asarray(values, float)
     mean, error = float(of_studies.mean()), float(of_studies.std(ddof=1)) / math.sqrt(len(of_studies))
 
@@ -157,10 +157,10 @@ def mean_interval(values: ArrayLike) -> Callable[[float], tuple[float, float]]:
 
 
 def share_interval(shares: ArrayLike, each: int) -> Callable[[float], tuple[float, float]]:
-    """Return the interval of a mean share of studies (n,), each of so many cases, which may depend on each other.
+    """Return the interval of the mean share of studies (n,) with ``each`` cases, which may be correlated.
 
-    That of Clopper and Pearson for the number of independent cases whose share would vary as much (Korn & Graubard
-    1998, Survey Methodology 24, 193–201).
+    It is the Clopper–Pearson interval for the effective number of independent cases (Korn & Graubard 1998, Survey
+    Methodology 24, 193–201).
     """
     of_studies = np.asarray(shares, float)
     share, studies = float(of_studies.mean()), len(of_studies)
@@ -176,7 +176,7 @@ def share_interval(shares: ArrayLike, each: int) -> Callable[[float], tuple[floa
 
 
 class Estimated(NamedTuple):
-    """A value as the analysis estimates it, with its 95 % interval, and the true one."""
+    """A value that the analysis estimates, with its 95 % interval, and the true value."""
 
     value: float
     low: float = math.nan
@@ -190,7 +190,7 @@ class Estimated(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class StudyFound:
-    """What the analysis estimates in one study, at each standard: the group's value, and each participant's."""
+    """The estimates of one study at each standard: the group's value, and each participant's."""
 
     group: tuple[Estimated, ...]
     own: tuple[tuple[Estimated, ...], ...]
@@ -198,7 +198,7 @@ class StudyFound:
 
 @dataclass(frozen=True, slots=True)
 class Rehearsed:
-    """The share of intervals delivered as requested, findings of verify, reproduce and replay, and estimated values."""
+    """Share of intervals delivered as requested, findings of verify, reproduce and replay, and estimated values."""
 
     delivered: float
     findings: int
@@ -207,7 +207,7 @@ class Rehearsed:
 
 @dataclass(frozen=True, slots=True)
 class _KnownValue(ABC):
-    """A study's main block, of which the true value is known."""
+    """A study's main block whose true value is known."""
 
     name: str
     protocol: Protocol
@@ -218,7 +218,7 @@ class _KnownValue(ABC):
         """Return the mean error of values."""
 
     def spread(self, studies: Sequence[StudyFound], people: int) -> float:
-        """Return the standard deviation of the error over studies of so many participants, beyond their own values."""
+        """Return the standard deviation over studies of the error relative to their own participants."""
         errors = [
             self.error([estimate.value for estimate in some]) - self.error([one.truth for one in some])
             for study in studies
@@ -227,14 +227,14 @@ class _KnownValue(ABC):
         return float(np.std(errors, ddof=1))
 
     def _apart(self, people: int, seed: int, number: int) -> tuple[list[float], Draw]:
-        """Return how far people lie from the mean in a study, in ln of `BETWEEN_PEOPLE`, and what else to draw from."""
+        """Return the participants' deviations from the mean, in ln of `BETWEEN_PEOPLE`, and the random generator."""
         draw = stream(seed, f"validate/{self.name}/{number}/people").random
         return [math.log(BETWEEN_PEOPLE) * normal(draw) for _ in range(people)], draw
 
     def _simulated(
         self, observers: Sequence[Observer], seed: int, number: int, sense: Callable[[Any], float] = as_requested
     ) -> pd.DataFrame:
-        """Return the answers in the block; ``sense`` returns what observers attend to in an interval."""
+        """Return the answers in the block; ``sense`` returns the quantity that observers perceive in an interval."""
         who = {f"P{at:03d}": observer for at, observer in enumerate(observers, start=1)}
         rows = pd.DataFrame(simulate_study(self.protocol, who, seed, f"validate/{self.name}/{number}", sense))
         return rows[rows["block"] == self.block.id]
@@ -242,13 +242,13 @@ class _KnownValue(ABC):
 
 @dataclass(frozen=True, slots=True)
 class KnownThreshold(_KnownValue):
-    """The threshold of a block with an adaptive method, by its observer; errors are of its logarithm."""
+    """The threshold of a block with an adaptive method, given its observer; errors are in ln threshold."""
 
     observer: Observer = OBSERVER
 
     @property
     def threshold(self) -> float:
-        """The mean threshold, as a level: a Weber fraction or a difference [ms]."""
+        """The mean threshold as a level: a Weber fraction or a difference [ms]."""
         return self._threshold(self.observer)
 
     def _threshold(self, observer: Observer) -> float:
@@ -259,14 +259,14 @@ class KnownThreshold(_KnownValue):
         return stimulus_of(self.protocol, self.block).vary in DELAYS
 
     def error(self, values: Sequence[float]) -> float:
-        """Return the mean of ln value over threshold."""
+        """Return the mean of ln(value/threshold)."""
         return sum(math.log(value / self.threshold) for value in values) / len(values)
 
     def people(self, number: int, seed: int, kind: str = "") -> Iterator[tuple[Observer, float]]:
-        """Yield the people of a study, with their thresholds, in which they differ.
+        """Yield the participants of a study with their different thresholds.
 
-        In the study's session the threshold is another one than on average over sessions. ``kind`` is one of `KINDS`
-        or `MIXED`; by default they differ in lapses up to `LAPSES_MOST`.
+        Thresholds also vary between sessions. ``kind`` is one of `KINDS` or `MIXED`; by default participants differ in
+        lapse rates up to `LAPSES_MOST`.
         """
         apart, draw = self._apart(PEOPLE, seed, number)
         name = "delay_jnd_s" if self._of_delay else "weber_fraction"
@@ -277,7 +277,7 @@ class KnownThreshold(_KnownValue):
             yield replace(own, **{name: today}), self._threshold(own)
 
     def simulate(self, number: int, seed: int, kind: str = "", observers: Sequence[Observer] = ()) -> StudyFound:
-        """Return what a study finds of ``observers``, by default of `people`."""
+        """Return the estimates of one study of ``observers``, by default from `people`."""
         people = [(observer, self._threshold(observer)) for observer in observers] or [*self.people(number, seed, kind)]
         rows = self._simulated([observer for observer, _ in people], seed, number)
         frame = rows.assign(session=1, level_delivered=rows["level"], analysed=True)
@@ -304,13 +304,13 @@ class KnownThreshold(_KnownValue):
         return StudyFound(group, tuple(map(tuple, found.values())))
 
     def errors(self, studies: Sequence[StudyFound]) -> Array:
-        """Return the error of the group's ln threshold in each study, beyond that of the people in it."""
+        """Return the error of the group's ln threshold in each study, relative to its own participants."""
         truths = [[estimate.truth for person in study.own for estimate in person] for study in studies]
         of_groups = [self.error([estimate.value for estimate in study.group]) for study in studies]
         return np.array(of_groups) - [self.error(of_people) for of_people in truths]
 
     def measures(self, studies: Sequence[StudyFound]) -> Iterator[Measure]:
-        """Yield error and, with several standards, the slope of ln JND over ln standard."""
+        """Yield the error and, with several standards, the slope of ln JND against ln standard."""
         errors = self.errors(studies)
         yield _error_measure(self.name, errors)
         near = np.abs(np.expm1(errors)) <= _NEAR
@@ -347,7 +347,7 @@ class KnownThreshold(_KnownValue):
         return (row.threshold for row in thresholds(block, rows) if row.participant is not None)
 
     def recovered(self, values: Sequence[float], spread: float) -> Measure:
-        """Return the threshold of rehearsed people; ``spread`` is that of its logarithm over studies of as many."""
+        """Return the threshold of rehearsed participants; ``spread`` is the standard error (ln) of such a study."""
         error = self.error(values)
 
         def ends(confidence: float) -> tuple[float, float]:
@@ -370,27 +370,27 @@ class KnownThreshold(_KnownValue):
 class KnownExponent(_KnownValue):
     """The exponent of a block of magnitude estimation.
 
-    ``resistances`` are those of each level, ascending: mean force over RMS speed at the pace [N·s/m].
+    ``resistances`` are those of each level in ascending order: mean force over RMS speed at the pace [N·s/m].
     """
 
     resistances: tuple[float, ...] = ()
 
     @property
     def observer(self) -> Observer:
-        """Who estimates with the known exponent."""
+        """The observer whose exponent is the known one."""
         return self._observer(EXPONENT)
 
     def _observer(self, exponent: float) -> Observer:
-        """Return who estimates; the slope of ln resistance over ln level is by least squares."""
+        """Return an observer; the slope of ln resistance against ln level is a least-squares fit."""
         slope = float(np.polyfit(np.log(_levels(self.protocol, self.block)), np.log(self.resistances), 1)[0])
         return replace(OBSERVER, estimates=(exponent / slope, ESTIMATE_NOISE))
 
     def error(self, values: Sequence[float]) -> float:
-        """Return the mean less the exponent."""
+        """Return the mean difference from the exponent."""
         return sum(values) / len(values) - EXPONENT
 
     def simulate(self, number: int, seed: int, people: int = PEOPLE) -> StudyFound:
-        """Return what a study finds; observers estimate what would reach the hand at the pace."""
+        """Return the estimates of one study; observers perceive the force that reaches the hand at the pace."""
         reached = dict(zip(_levels(self.protocol, self.block), self.resistances, strict=True))
         truths = [EXPONENT * (1 + one) for one in self._apart(people, seed, number)[0]]
         observers = [self._observer(truth) for truth in truths]
@@ -423,7 +423,7 @@ class KnownExponent(_KnownValue):
         )
 
     def recovered(self, values: Sequence[float], spread: float) -> Measure:
-        """Return the mean exponent of rehearsed people; ``spread`` is that over studies of as many."""
+        """Return the mean exponent of rehearsed participants; ``spread`` is the standard error of such a study."""
         mean = float(np.mean(values))
         return Measure(
             study=self.name,
@@ -441,7 +441,7 @@ Known: TypeAlias = KnownThreshold | KnownExponent
 
 
 def known_value(name: str, protocol: Protocol) -> Known:
-    """Return what is known of a study: the exponent of estimates of a liquid at a pace, or else a threshold.
+    """Return the known value of a study: the exponent of magnitude estimates, or a threshold.
 
     Raises
     ------
@@ -471,7 +471,7 @@ def known_value(name: str, protocol: Protocol) -> Known:
 
 
 def _levels(protocol: Protocol, block: Block) -> list[float]:
-    """Return the levels of a block, ascending, in the unit of the varied number."""
+    """Return the levels of a block in ascending order, in the unit of the varied number."""
     return sorted(method_of(protocol, block).levels_of(stimulus_of(protocol, block)))
 
 
@@ -483,7 +483,7 @@ def _resistance(scene: Any, fastest_mps: float) -> float:
 
 
 def rehearsed(known: Known, source: bytes, seed: int) -> Rehearsed:
-    """Rehearse `REHEARSED` participants in a temporary folder, from the source of a protocol; return what they show."""
+    """Rehearse `REHEARSED` participants of a protocol in a temporary folder; return the results."""
     with tempfile.TemporaryDirectory() as place:
         file, folder = Path(place) / f"{known.name}.toml", Path(place) / "study"
         file.write_bytes(source)
@@ -506,12 +506,12 @@ def percent(share: float) -> str:
 
 
 def _normal_half(confidence: float) -> float:
-    """Return half the interval of a normal distribution [standard deviations]."""
+    """Return half the width of a normal interval [standard deviations]."""
     return NormalDist().inv_cdf((1 + confidence) / 2)
 
 
 def _error_measure(study: str, errors: Array) -> Measure:
-    """Return the mean error of thresholds from errors of their logarithm in each study."""
+    """Return the mean error of thresholds from their ln errors in each study."""
     ends = mean_interval(errors)
     return Measure(
         study=study,
@@ -526,7 +526,7 @@ def _error_measure(study: str, errors: Array) -> Measure:
 
 
 def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
-    """Yield in how many cases the 95 % intervals of groups and of participants hold the truth."""
+    """Yield how often the 95 % intervals of groups and of participants contain the true value."""
     of_groups = [[estimate.covered for estimate in study.group] for study in studies]
     of_people = [
         [estimate.covered for person in study.own for estimate in person if not math.isnan(estimate.low)]
@@ -549,7 +549,7 @@ def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
 
 
 def rehearsed_measures(known: Known, found: Rehearsed, spread: float) -> Iterator[Measure]:
-    """Yield what rehearsed participants show; ``spread`` is that of studies of as many."""
+    """Yield the measures of rehearsed participants; ``spread`` is that over studies of the same size."""
     yield Measure(
         study=known.name,
         what="intervals delivered as requested",
@@ -579,10 +579,10 @@ def validate(
     progress: Callable[[str, float | None], object],
     say: Callable[[str], object] = lambda _text: None,
 ) -> list[Verdict]:
-    """Return all verdicts on known values, each with the source of its protocol; studies of all seeds count together.
+    """Return all verdicts on known values; ``known`` gives the protocol source of each. Seeds are pooled.
 
-    Sessions are rehearsed with the first seed. ``progress`` is called with what is done, and the share of it; ``say``
-    with a line for each study and each kind of people when it is finished.
+    Sessions are rehearsed with the first seed. ``progress`` is called with the current part and the fraction done;
+    ``say`` with a line when each study and each kind of participants is finished.
     """
     measures: list[Measure] = []
     every: list[StudyFound] = []
@@ -615,7 +615,7 @@ def validate(
 
 
 def evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:
-    """Return a row for each value, with its limit, as Markdown below a heading and as CSV."""
+    """Return one row per value with its limit, as Markdown below a heading and as CSV."""
     table = Table(Verdict._fields, [(*it[:-1], "yes" if it.holds else "no") for it in verdicts], left=5)
     csv = Table(Verdict._fields, [(*it[:-1], str(it.holds).lower()) for it in verdicts]).csv()
     text = f"{heading}\n\n{table.markdown()}\n"

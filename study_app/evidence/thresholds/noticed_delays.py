@@ -40,9 +40,9 @@ LIKERT, FORCED_CHOICE = "rek2024", "delaydetect"
 
 @dataclass(frozen=True, slots=True)
 class Person:
-    """Someone who takes part in both procedures.
+    """A simulated participant of both procedures.
 
-    ``observer.delay_noise_s`` is the spread of a delay as it is perceived, ``rater.threshold_s`` the criterion.
+    ``observer.delay_noise_s`` is the standard deviation of the perceived delay, ``rater.threshold_s`` the criterion.
     """
 
     observer: Observer
@@ -51,9 +51,9 @@ class Person:
 
 @dataclass(frozen=True, slots=True)
 class Rated:
-    """The ratings of all people under one mean criterion [s].
+    """The ratings of all participants for one mean criterion [s].
 
-    ``adapted_s`` is how far the delay that seems to be none has moved [s]; ``found`` the delay at which half of the
+    ``adapted_s`` is the shift of the delay that is perceived as none [s]; ``found`` is the delay at which half of the
     ratings agree, as in the report.
     """
 
@@ -72,10 +72,10 @@ class Detected(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """What both procedures find of the same people.
+    """The results of both procedures for the same participants.
 
-    ``detected_ms`` is the group's threshold in the forced choice [ms]; ``rated`` are the ratings by
-    criterion, the last one after adaptation.
+    ``detected_ms`` is the group's threshold in the forced choice [ms]; ``rated`` are the ratings by criterion, the last
+    one after adaptation.
     """
 
     people: int
@@ -85,7 +85,7 @@ class Compared:
 
 
 def people_of(count: int, seed: int) -> tuple[Person, ...]:
-    """Return people whose just-noticeable differences differ by a factor of 1.2."""
+    """Return participants whose just-noticeable differences differ by a factor of 1.2."""
     found = []
     for number in range(1, count + 1):
         draw = stream(seed, f"noticed/person/{number}").random
@@ -95,14 +95,14 @@ def people_of(count: int, seed: int) -> tuple[Person, ...]:
 
 
 def compare(count: int, seed: int) -> Compared:
-    """Return what ``count`` people, three or more, detect and rate as noticed."""
+    """Return the delays that ``count`` participants (at least three) detect, and those that they rate as noticed."""
     people = people_of(count, seed)
     both = [(criterion_s, 0.0) for criterion_s in CRITERIA_S] + [(MEAN_CRITERION_S, _ADAPTED_S)]
     return Compared(count, seed, detected(people, seed), tuple(rated(people, *one, seed) for one in both))
 
 
 def detected(people: Sequence[Person], seed: int) -> Detected:
-    """Return the group's threshold in `FORCED_CHOICE` with the ends of its 95 % interval [ms]."""
+    """Return the group's threshold in `FORCED_CHOICE` with its 95 % interval [ms]."""
     known = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
     assert isinstance(known, KnownThreshold)  # noqa: S101 - it has forced choices alone
     (group,) = known.simulate(0, seed, observers=[person.observer for person in people]).group
@@ -110,9 +110,9 @@ def detected(people: Sequence[Person], seed: int) -> Detected:
 
 
 def rated(people: Sequence[Person], criterion_s: float, adapted_s: float, seed: int) -> Rated:
-    """Return the delay from which people agree that it is different, in `LIKERT`.
+    """Return the delay above which participants agree with "different" in `LIKERT`.
 
-    People keep their distances from the mean criterion [s]; the noise is the same for every criterion.
+    The participants' deviations from the mean criterion [s] and the noise are the same for every criterion.
     """
     protocol = load(LIKERT)
     (block,) = (main_block for main_block in protocol.main_blocks if protocol.compared_in(main_block.id) == "delays")

@@ -37,9 +37,9 @@ _TAIL_PERCENT: Final = 99.0
 
 @dataclass(frozen=True, slots=True)
 class Shown:
-    """The frames of one trial: when they were painted or swapped, and of which moment they were [ns] (n,).
+    """The frames of one trial: their paint or swap times and the times that they show [ns] (n,).
 
-    ``screen`` names the screen, ``paced`` says what its frames followed, ``load`` the concurrent load.
+    ``screen`` names the screen, ``paced`` the source of the frame timing, ``load`` the concurrent load.
     """
 
     screen: str
@@ -56,13 +56,13 @@ class Shown:
 
     @property
     def errors_ms(self) -> NDArray[np.float64]:
-        """Achieved less requested delay of each frame [ms] (n,)."""
+        """Achieved minus requested delay of each frame [ms] (n,)."""
         ages_ms = np.asarray(self.painted_ns - self.sample_ns, np.float64) * 1e-6
         return np.asarray(ages_ms - 1e3 * self.delay_s, np.float64)
 
     @property
     def frame_ms(self) -> float:
-        """How long a refresh of the screen lasts [ms]."""
+        """The refresh period of the screen [ms]."""
         return 1e3 / self.refresh_hz
 
     @property
@@ -82,12 +82,12 @@ class Shown:
 
     @property
     def late(self) -> int:
-        """How many frames were shown more than a refresh later than requested."""
+        """The number of frames shown more than one refresh later than requested."""
         return int((self.errors_ms > self.frame_ms).sum())
 
     @property
     def missed(self) -> int:
-        """How many refreshes between the first frame and the last had no frame of their own."""
+        """The number of refreshes without a new frame between the first frame and the last."""
         gaps = np.rint(np.diff(self.painted_ns) * 1e-6 / self.frame_ms)
         return int(np.maximum(gaps - 1, 0).sum())
 
@@ -102,7 +102,7 @@ class Shown:
 
 @dataclass(frozen=True, slots=True)
 class Delayed:
-    """What one run found, trial by trial; ``size_px`` is that of the participant's window on a virtual screen."""
+    """The results of one run, trial by trial; ``size_px`` is the size of the window on a virtual screen."""
 
     machine: str
     seconds: float
@@ -123,7 +123,7 @@ class Delayed:
         return tuple(sorted(here, key=lambda one: one.delay_s))
 
     def limits(self) -> tuple[str, ...]:
-        """Return the limits on each screen under each load, and whether they were met."""
+        """Return the limits for each screen and load, and whether they are met."""
         return tuple(self._of(screen, load) for screen in self.screens for load in self.loads)
 
     def _of(self, screen: str, load: LoadName) -> str:
@@ -152,7 +152,7 @@ _LOOKS: Final[dict[LoadName, dict[str, Any]]] = {
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(delays: Delayed) -> Figure:
-    """Draw what was found."""
+    """Draw the delay errors of all trials."""
     width, height = delays.size_px
     caption = (
         f"Marks: mean of all frames; lines reach up to the {_TAIL_PERCENT:g}th percentile, which is written if it is "
@@ -170,7 +170,7 @@ def draw(delays: Delayed) -> Figure:
 
 
 def _panel(axes: Axes, delays: Delayed, screen: str, *, first: bool) -> None:
-    """Draw every trial on a screen: a sign at the mean, a line from there to the 99th percentile."""
+    """Draw every trial on a screen: a marker at the mean, and a line from it to the 99th percentile."""
     frame_ms = delays.on(screen, delays.loads[0])[0].frame_ms
     top_ms = _MOST_FRAMES * frame_ms
     for number, load in enumerate(delays.loads):
@@ -305,5 +305,5 @@ def _errors(trial: Shown) -> tuple[str, ...]:
 
 
 def _measures_ms(trial: Shown) -> tuple[float, ...]:
-    """Return mean, 95th and 99th percentile and the worst [ms]."""
+    """Return mean, 95th and 99th percentile, and maximum [ms]."""
     return trial.mean_ms, trial.percentile_ms(95), trial.percentile_ms(99), trial.worst_ms

@@ -28,7 +28,8 @@ _REACH_M: Final = 0.02
 class DeviceLateness:
     """The lateness of ticks with a device; ``low`` and ``high`` are the ends of the 95 % interval of ``ratio``.
 
-    ``ratio`` is that of the 99th percentile to the scripted hand's; resampled are quarter seconds, both devices' alike.
+    ``ratio`` is the 99th percentile relative to the scripted hand's; quarter seconds of both devices are resampled
+    together.
     """
 
     name: str
@@ -41,7 +42,7 @@ class DeviceLateness:
 
     @property
     def missed(self) -> bool:
-        """Whether the ratio is above the limit, and not by chance."""
+        """Whether the ratio is significantly above the limit."""
         return self.low > _MOST_RATIO
 
     @property
@@ -64,7 +65,7 @@ def time_devices(
     ending: threading.Event,
     progress: Callable[[str], object] = lambda _line: None,
 ) -> tuple[DeviceLateness, ...]:
-    """Return how late ticks begin with each of the devices ``names``, the scripted hand first.
+    """Return the lateness of ticks with each device in ``names``, the scripted hand first.
 
     Raises
     ------
@@ -109,7 +110,7 @@ def _compared(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> DeviceL
 
 
 def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rounds: Any) -> float:
-    """Return the ratio of the 99th percentiles of both over the same ``rounds``."""
+    """Return the ratio of the 99th percentiles of both devices over the same ``rounds``."""
     late, early = (float(np.percentile(np.concatenate([one[k] for k in rounds]), 99)) for one in (own, reference))
     return late / early
 

@@ -61,7 +61,7 @@ _reading_at = record_at(READING)
 
 
 class PlayedHand:
-    """A device that gives one place of a motion at every reading and takes any force: what is timed is the tick."""
+    """A device that replays a motion and ignores forces, so that only the tick is timed."""
 
     name = "played"
     force_limit_n = 8.0
@@ -113,7 +113,7 @@ _sleep = call_at(SLEEP)
 
 
 class Ticks(NamedTuple):
-    """What a loop did: how late each tick began, how long it took [ns] (n,), and how many deadlines it passed over."""
+    """The timing of a loop: the lateness and duration of each tick [ns] (n,), and the number of skipped deadlines."""
 
     lateness_ns: _Whole
     busy_ns: _Whole
@@ -125,7 +125,7 @@ _Timer: TypeAlias = Callable[[int, int, Callable[[], object]], int]
 
 
 class Loop(Protocol):
-    """One of the loops: of a kind, in a priority class."""
+    """A loop to be timed, of one kind and in one priority class."""
 
     kind: Kind
     grant: Grant
@@ -134,7 +134,7 @@ class Loop(Protocol):
 
 
 class ServoLoop:
-    """The product: the servo with a full scene, in a thread of its own; on ``device``, None: one that costs nothing."""
+    """The product's servo with a full scene in its own thread, on ``device`` or (None) one without any cost."""
 
     kind: Kind = "servo"
 
@@ -146,7 +146,7 @@ class ServoLoop:
         self.servo.prepare()
 
     def run(self, ticks: int) -> Ticks:
-        """Take at least so many ticks."""
+        """Run at least so many ticks."""
         servo = self.servo
         reader = servo.telemetry.reader()
         began = int(servo.telemetry.written[0])
@@ -166,7 +166,7 @@ class ServoLoop:
 
 
 class _BareLoop:
-    """The limit of this machine: compiled like the servo, sleeping by the same C function on a clock like its own."""
+    """The limit of this machine: a compiled loop that only sleeps, by the servo's C function and clock."""
 
     kind: Kind = "bare"
 
@@ -202,7 +202,7 @@ def _sleep_on(sleep: int, context: int, start_ns: int, lateness_ns: Any, overrun
 
 
 class _SameTick:
-    """The servo's tick as Python calls it: one tick of the same compiled loop, its time passed by hand."""
+    """The servo's tick called from Python: the same compiled loop, one tick at a time."""
 
     def __init__(self) -> None:
         self.servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
@@ -214,7 +214,7 @@ class _SameTick:
 
 
 class _ThreadLoop:
-    """What is usual: a thread of Python that sleeps until its deadline and calls the same tick."""
+    """The usual approach: a Python thread that sleeps until its deadline and calls the same tick."""
 
     kind: Kind = "thread"
 
@@ -247,7 +247,7 @@ class _ThreadLoop:
 
 
 class _QtLoop:
-    """What a program of windows offers: a precise timer of Qt, in their thread, that calls the same tick."""
+    """The usual approach in a GUI: a precise Qt timer in the GUI thread that calls the same tick."""
 
     kind: Kind = "qt"
 
@@ -268,9 +268,9 @@ class _QtLoop:
 
 
 def ticks_at(start_ns: int, times: Sequence[tuple[int, int]]) -> Ticks:
-    """Return the lateness of ticks that began and ended at ``times`` [ns], a deadline every millisecond from a start.
+    """Return the lateness of ticks that began and ended at ``times`` [ns], with a deadline every millisecond.
 
-    After each tick the deadlines that it ran past are passed over, but for the last; one that comes early is not late.
+    After each tick, missed deadlines are skipped except the last; a tick that is early counts as on time.
     """
     began, ended = np.array(times, np.int64).reshape(-1, 2).T
     lateness_ns = np.zeros(len(began), np.int64)
@@ -291,14 +291,14 @@ def _in_a_thread(take: Callable[[], None]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Classes:
-    """What this system grants: its best priority class, and the ordinary one."""
+    """The priority classes that this system grants: the best one, and the ordinary one."""
 
     normal: Grant
     best: Grant | None
 
 
 def granted() -> Classes:
-    """Return the priority classes there are to be timed; the best is None where it is the ordinary one."""
+    """Return the priority classes to be timed; the best is None if it is the ordinary one."""
     grants: list[Grant] = []
 
     def ask() -> None:
@@ -321,7 +321,7 @@ _BUSY_US: Final = 5.0
 
 @dataclass(frozen=True, slots=True)
 class LoopTiming:
-    """One loop in one priority class: its latenesses, and how long its ticks took (empty: nothing was to do) [ns]."""
+    """One loop in one priority class: its lateness and its tick durations [ns] (empty if it does no work)."""
 
     kind: Kind
     grant: Grant
@@ -338,7 +338,7 @@ class LoopTiming:
         return len(self.lateness_ns)
 
     def late_us(self, percent: float) -> float:
-        """Return a percentile of the lateness [µs]; 100 is the worst."""
+        """Return a percentile of the lateness [µs]; 100 is the maximum."""
         return float(np.percentile(self.lateness_ns, percent)) * 1e-3
 
     def busy_us(self, percent: float) -> float:
@@ -346,7 +346,7 @@ class LoopTiming:
 
     @property
     def late(self) -> int:
-        """How many ticks began more than 1 ms late, or not at all: a deadline passed over is one of them."""
+        """The number of ticks that began more than 1 ms late, including skipped deadlines."""
         return int((self.lateness_ns > LATE_NS).sum()) + self.overruns
 
     @property
@@ -357,7 +357,7 @@ class LoopTiming:
 
 @dataclass(frozen=True, slots=True)
 class Limit:
-    """A limit of the servo in a priority class, and what was found; ``said`` has both in words."""
+    """A limit for the servo in a priority class, and the measured value; ``said`` states both."""
 
     level: Level
     said: str
@@ -369,7 +369,7 @@ class Limit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timed:
-    """What one run found; ``loops`` come by priority class, the best last, the servo first in each."""
+    """The results of one run; ``loops`` are ordered by priority class, the best last, the servo first in each."""
 
     machine: str
     load: LoadName
@@ -388,7 +388,7 @@ class Timed:
         return next((loop for loop in self.loops if (loop.kind, loop.grant.level) == (kind, level)), None)
 
     def ratio(self, loop: LoopTiming, percent: float) -> float:
-        """Return how many times as late as the bare loop of its class a loop is, at a percentile."""
+        """Return the ratio of a loop's lateness percentile to that of the bare loop in its class."""
         bare = self.loop("bare", loop.grant.level)
         return loop.late_us(percent) / max(bare.late_us(percent), 1e-3) if bare is not None else float("nan")
 
@@ -421,14 +421,14 @@ class Timed:
 
 
 def _fewer(thread: LoopTiming, other: LoopTiming) -> str:
-    """Return in words how many times fewer ticks over 1 ms late one loop has than a Python thread."""
+    """Return a phrase for the ratio of a Python thread's ticks over 1 ms late to those of another loop."""
     if other.late == 0:
         return f"{thread.late:,} fewer"
     return f"{thread.late_share / other.late_share:.1f} times fewer"
 
 
 def _loop_timing(kind: Kind, grant: Grant, parts: Sequence[Ticks]) -> LoopTiming:
-    """Return what a loop did in all its turns."""
+    """Return the pooled timing of a loop over all its turns."""
     return LoopTiming(
         kind,
         grant,
@@ -451,10 +451,10 @@ def timing(
     ending: threading.Event | None = None,
     progress: Callable[[str], object] = lambda _line: None,
 ) -> Timed:
-    """Time all loops for ``seconds`` each, in turn, and return what was found.
+    """Time all loops for ``seconds`` each, in turn, and return the results.
 
-    ``windows`` is the windows' thread, None where there is no Qt. Servo and bare loop poll the clock for ``spin_us``
-    before a deadline; default: the system's own. ``ending`` set by another thread ends the measurement.
+    ``windows`` gives access to the GUI thread, None without Qt. Servo and bare loop poll the clock for ``spin_us``
+    before a deadline; default: the system's own. Setting ``ending`` from another thread ends the measurement.
 
     Raises
     ------

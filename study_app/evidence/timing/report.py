@@ -24,7 +24,7 @@ _LETTERS: Final = 132
 
 
 class Layout(NamedTuple):
-    """Sizes [pt] of a figure with panels abreast."""
+    """Sizes [pt] of a figure with side-by-side panels."""
 
     height_pt: float
     top_pt: float
@@ -36,7 +36,7 @@ class Layout(NamedTuple):
 def panels_abreast(
     layout: Layout, count: int, handles: Sequence[Line2D], handlelength: float, caption: str
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure of a page's width with its panels, a key in one row above them and a caption below."""
+    """Return a page-wide figure with its panels, a common legend above them and a caption below."""
     width_pt, height_pt = style.PAGE_WIDTH_PT, layout.height_pt
     figure = Figure(figsize=(width_pt / 72, height_pt / 72), facecolor="white")
     panel_pt = (width_pt - layout.left_pt - layout.right_pt - layout.gap_pt * (count - 1)) / count
@@ -79,7 +79,7 @@ _LOADS: Final = {
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(timing: Timed) -> Figure:
-    """Draw what was found."""
+    """Draw the lateness of all loops."""
     caption = (
         f"Share of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom: the 99th percentile of each. "
         f"{timing.seconds:g} s of each loop at 1 kHz alternating every quarter second, {_LOADS[timing.load]}. "
@@ -127,7 +127,7 @@ def _panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, first:
 
 
 def _tails(axes: Axes, loops: list[LoopTiming], least: float) -> None:
-    """Mark the 99th percentiles along the foot of a panel."""
+    """Mark the 99th percentiles along the bottom of a panel."""
     for loop in loops:
         look = _LOOKS[loop.kind]
         face = look["color"] if loop.kind in {"servo", "thread"} else "white"
