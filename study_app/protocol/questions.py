@@ -104,6 +104,9 @@ ValueType: TypeAlias = Literal["integer", "number", "text"]
 
 _MOST_LETTERS: Final = 5000
 """No answer is longer."""
+POSITIVE: Final = 1e-9
+"""The smallest number of a question whose numbers are above 0."""
+
 _MOST: Final = 1e12
 """No greater number can be given as an answer."""
 _Bound: TypeAlias = Annotated[float, within(-_MOST, _MOST, "answers cannot be larger")]
@@ -441,7 +444,7 @@ class Number(Question):
     def problem(self, answer: Value, context: Context) -> str | None:
         if isinstance(answer, int | float) and self.view(0, context).permits(answer):
             return None
-        least = "" if self.least is None else f" from {self.least:g}"
+        least = "" if self.least is None else " above 0" if self.least == POSITIVE else f" from {self.least:g}"
         most = "" if self.most is None else f" to {self.most:g}"
         return f"answer {answer} is not permitted: give a {'whole ' if self.whole else ''}number{least}{most}"
 

@@ -36,7 +36,7 @@ from study_app.store.blinded.blinding import (
     verified_key,
 )
 from study_app.store.checksums import replace_checksums
-from study_app.store.csv_files import align_columns
+from study_app.store.csv_files import Column, align_columns
 from study_app.store.exclusions import (
     MISSING_RULE,
     Exclusion,
@@ -263,19 +263,16 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
 def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
     """Write the sealed columns and open the recordings; a table gets no columns that its version did not have.
 
-    A table of a session without an end may be behind its journal: it is written whole if its lines begin that table.
+    A table of a session without an end may be behind its journal, and is then written whole.
     """
     left: list[str] = []
     ours: dict[str, tuple[str, str]] = {}
-    ended = isinstance(lines[-1], SessionEnded)
     before, after = (dict(table_files(place, lines, reader)) for reader in (None, key))
     for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
         held = read_if_there(path) or b""
         written = [replace(column, later=False) if column.sealed else column for column in columns]
         sealed, content = (align_columns(held, whole[path], written)[0] for whole in (before, after))
-        whole_lines = held[: held.rfind(b"\n") + 1]
-        is_behind = not ended and any(table.startswith(whole_lines) for table in (sealed, content))
-        if held not in (sealed, content) and not is_behind:
+        if held not in (sealed, content) and not _is_behind(held, path, place, lines, key, written):
             left.append(
                 f"{path} differs from the journal, so it was not changed: "
                 f"rebuild it with liquid-study rebuild {place.folder.path}"
@@ -293,6 +290,18 @@ def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
     if is_there(place.folder.checksums):
         replace_checksums(place.folder, ours)
     return left
+
+
+def _is_behind(held: bytes, path: Path, place: Place, lines: list[Event], key: Key, columns: Sequence[Column]) -> bool:
+    """Return whether a table of a session without an end begins as after some line of its journal."""
+    if isinstance(lines[-1], SessionEnded):
+        return False
+    whole_lines = held[: held.rfind(b"\n") + 1]
+    return any(
+        align_columns(held, dict(table_files(place, lines[:count], reader))[path], columns)[0].startswith(whole_lines)
+        for count in range(len(lines), 0, -1)
+        for reader in (None, key)
+    )
 
 
 def _recordings(place: Place, lines: list[Event], key: Key) -> Iterator[tuple[Path, tuple[str, str]]]:

@@ -1,9 +1,13 @@
 import codecs
 import json
+import shutil
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_as_test
 
 from study_app.errors import StoreError
 from study_app.store import unblinding
@@ -161,3 +165,55 @@ def test_a_list_that_a_link_leads_out_of_the_folder_is_refused(tmp_path: Path, n
     (study / name).symlink_to(outside)
     with pytest.raises(StoreError, match="leads by a link out of"):
         (exclusions if name.endswith("csv") else reversals)(study)
+
+
+DECIDED = st.tuples(st.sampled_from(["P007", "P008"]), st.sampled_from([None, 1, 2, 3, 5, 6]))
+REASONS = st.text("""aé —,;'"=+-@n/\n\u2028""", min_size=1, max_size=12)
+
+
+def test_exclusions_are_a_set_that_decisions_change(folder: Path) -> None:
+    """Exclude and include in any order, with any reasons; a dict and a list say what must be recorded."""
+    count = iter(range(10**6))
+
+    class Decisions(RuleBasedStateMachine):
+        def __init__(self) -> None:
+            super().__init__()
+            self.excluded: dict[tuple[str, int | None], Exclusion] = {}
+            self.reversed: list[Exclusion] = []
+            self.place = folder.parent / f"copy-{next(count)}"
+            shutil.copytree(folder, self.place)
+
+        @rule(decided=DECIDED, reason=REASONS)
+        def exclude(self, decided: tuple[str, int | None], reason: str) -> None:
+            person, trial = decided
+            recorded = trial is None or (person == "P007" and trial <= 5)
+            if recorded and reason.strip() and not {decided, (person, None)} & self.excluded.keys():
+                now = NOW + timedelta(seconds=next(count))
+                made = exclude(self.place, person, 1, trial=trial, by="AB", reason=reason, now=now)
+                assert (made.what, made.reason) == ((person, 1, trial), " ".join(reason.split()))
+                assert made.excluded_at == now.isoformat(timespec="milliseconds")
+                self.excluded[decided] = made
+            else:
+                with pytest.raises(StoreError):
+                    exclude(self.place, person, 1, trial=trial, by="AB", reason=reason)
+            self.check()
+
+        @rule(decided=DECIDED)
+        def include(self, decided: tuple[str, int | None]) -> None:
+            if decided in self.excluded:
+                self.reversed.append(self.excluded.pop(decided))
+                include(self.place, decided[0], 1, trial=decided[1], by="CD", reason="it counts")
+            else:
+                with pytest.raises(StoreError, match="is not excluded"):
+                    include(self.place, decided[0], 1, trial=decided[1], by="CD", reason="it counts")
+            self.check()
+
+        def check(self) -> None:
+            assert list(exclusions(self.place)) == [*self.excluded.values()]
+            assert list(reversals(self.place)) == self.reversed
+
+    few = settings(
+        max_examples=8, stateful_step_count=20, deadline=None, derandomize=True, database=None,
+        phases=[Phase.generate], suppress_health_check=list(HealthCheck),
+    )  # fmt: skip
+    run_state_machine_as_test(Decisions, settings=few)

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from study_app.haptics.model.ranges import within
 from study_app.protocol.questionnaires import Questionnaire
-from study_app.protocol.questions import Choice, Number, Option, Question, Rating
+from study_app.protocol.questions import POSITIVE, Choice, Number, Option, Question, Rating
 from study_app.protocol.table import Id, Localised, Table
 from study_app.protocol.wording.languages import words
 from study_app.psychophysics import detection
@@ -356,10 +356,6 @@ def default_design(kind: str) -> Design:
     return KINDS[kind].model_validate({"kind": kind})
 
 
-_LEAST: Final = 1e-9
-"""An estimate is above 0, and no estimate is smaller."""
-
-
 def question_of(design: Design, languages: Sequence[str]) -> Questionnaire:
     """Return the question of a design, in the program's own words if it has none."""
     text: Localised = design.question or {
@@ -376,7 +372,7 @@ def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question
     if design.reply == "rating":
         return Rating(**about, scale=str(getattr(design, "scale", "")))
     if design.reply == "number":
-        return Number(**about, least=_LEAST)
+        return Number(**about, least=POSITIVE)
     if design.reply == "setting":
         return Number(**about, whole=True, unit="steps")
     named = {
