@@ -16,13 +16,12 @@ def compare_conduct(compared: Compared, answers: pd.DataFrame, trials: pd.DataFr
     own |= {"sessions_left_out": (~sessions.any(axis=1)).sum(), "sessions_excluded": sessions["excluded_session"].sum()}
     compared.check("study", own)
     counting, blocks = trials[trials["counts"]], compared.codebook["blocks"]
-    settings = [(block["id"], setting) for block in blocks for setting in block["settings"]]
-    for number, (block, setting) in enumerate(settings):
+    for number, (block, setting) in enumerate((one["id"], setting) for one in blocks for setting in one["settings"]):
         rows = counting[(counting["block"] == block) & (counting["code"] == setting["code"])]
         errors = rows["delay_error_mean_ms"].dropna().to_numpy(float)
         own = _validity(rows) | {"delay_ms": setting["delay_ms"], "measured": len(errors)}
         if len(errors):
-            own |= {"error_mean_ms": errors.mean(), "error_worst_ms": errors[np.abs(errors).argmax()]}
+            own |= {"error_mean_ms": errors.mean(), "error_worst_ms": max(errors, key=abs)}
             own |= {"achieved_ms": setting["delay_ms"] + errors.mean()}
         compared.check(f"results.delivered.{number}", own)
     _motion(compared, counting)

@@ -31,8 +31,7 @@ def compare_levels(compared: Compared, answers: pd.DataFrame, intervals: pd.Data
             seconds = rows.loc[rows["code"] == times["code"], "response_s"]
             compared.check(f"{place}.times.{which}.numbers", {"n": len(seconds), **quartiles(seconds)})
         parts = {"answers": _answers(rows, design), "conduct": _delivery(rows), "catches": []}
-        caught = rows[rows["catch"].eq(True)].groupby(SESSION)["right"] if wrong else ()
-        for (_, session), right in caught:
+        for (_, session), right in rows[rows["catch"].eq(True)].groupby(SESSION)["right"] if wrong else ():
             parts["catches"].append({"session": session, "n": len(right), "wrong": (~right).sum(), "most": wrong})
         if design in ANSWERS:
             people = rows.groupby(["standard", "participant"])
@@ -71,8 +70,7 @@ def _delivery(rows: pd.DataFrame) -> list[Numbers]:
     for standard, own in rows.groupby("standard", dropna=False):
         errors = (own["delivered"] - own["level"])[own["level"] != 0].dropna()
         found = {"standard": standard, "trials": len(own), "repeated": 0, "measured": len(errors)}
-        found |= {"error_mean": errors.mean(), "error_largest": errors.abs().max()}
-        lines.append(found | dict(own[MEASURED].mean()))
+        lines.append(found | {"error_mean": errors.mean(), "error_largest": errors.abs().max(), **own[MEASURED].mean()})
     return lines
 
 
@@ -87,8 +85,8 @@ def _answers(rows: pd.DataFrame, design: str) -> list[Numbers]:
         people = here.groupby("participant")
         means = people["number"].mean() - units[people["number"].mean().index]
         own = [where | {"n": len(here), "participants": len(people), "value": means.mean(), **student(means)}]
-        own[0] |= {end: np.clip(own[0][end], 0, 1) for end in ("low", "high")} if is_share else {}
-        own[0] |= {"count": here["success"].sum()} if is_share else {}
+        ends = {end: np.clip(own[0][end], 0, 1) for end in ("low", "high")}
+        own[0] |= ends | {"count": here["success"].sum()} if is_share else {}
         for person, one in people:
             own.append(where | {"n": len(one), "participants": 1, "value": one["number"].mean(), "_person": person})
             count, hidden = one["success"].sum(), {"_delivered": one["delivered"].mean()}
@@ -171,7 +169,8 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     else:
         variance = sides[0]["variance"] + sides[1]["variance"]
         samples = [pd.DataFrame({"value": sides[0]["value"] - sides[1]["value"], "variance": variance}).dropna()]
-    means, errors = zip(*(_mean(one, weighted=ratio) for one in samples), strict=True)
+    mean_of = random_effects if ratio else lambda one: (one["value"].mean(), stats.sem(one["value"]))
+    means, errors = zip(*map(mean_of, samples), strict=True)
     mean, error, freedom = means[0] - sum(means[1:]), math.hypot(*errors), min(map(len, samples)) - 1
     t, scale = stats.t(freedom), math.exp if ratio else float
     above, below, reach = t.sf(mean / error), t.cdf(mean / error), t.ppf(0.975) * error
@@ -179,18 +178,15 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     n = sum(map(len, samples))
     own = {"n": n, "dropped": len(members) - n, "statistic": mean / error, "p": p, "effect": scale(mean)}
     own |= named("interval", {"low": scale(mean - reach), "high": scale(mean + reach), "level": 0.95})
+    if not groups:
+        own |= {"higher": (samples[0]["value"] > 0).sum(), "sd": samples[0]["value"].std()}
     held = samples if groups else [side.loc[samples[0].index] for side in sides]
-    own |= {} if groups else {"higher": (samples[0]["value"] > 0).sum(), "sd": samples[0]["value"].std()}
-    for number, (middle, spread) in enumerate(_mean(one, weighted=ratio) for one in held):
+    for number, (middle, spread) in enumerate(map(mean_of, held)):
         values, reach = held[number]["value"], stats.t.ppf(0.975, len(held[number]) - 1) * spread
         side = {"mean": scale(middle), "low": scale(middle - reach), "high": scale(middle + reach), "sd": values.std()}
         people = {str(who): scale(value) for who, value in values.items()}
         own |= named(f"sides.{number}", side) | named(f"sides.{number}.values", people)
     return own | _standardised([one["value"].to_numpy() for one in samples])
-
-
-def _mean(sample: pd.DataFrame, *, weighted: bool) -> tuple[float, float]:
-    return random_effects(sample) if weighted else (sample["value"].mean(), stats.sem(sample["value"]))
 
 
 def _standardised(samples: Sequence[Any]) -> Numbers:

@@ -31,10 +31,8 @@ class Compared:
     def __init__(self, folder: Path) -> None:
         report, self.codebook = (json.loads((folder / f"{one}.json").read_bytes()) for one in ("report", "codebook"))
         self.folder, self.results, self.numbers = folder, report["results"], dict(leaves(report))
-        self.places: set[str] = set()
-        self.differences: list[tuple[str, Any, Any]] = []
-        self.rows: dict[tuple[str, ...], Numbers] = {}
-        self.values: dict[tuple[str, str], Any] = {}
+        self.places, self.differences = set[str](), list[tuple[str, Any, Any]]()
+        self.rows, self.values = dict[tuple[str, ...], Numbers](), dict[tuple[str, str], Any]()
 
     def check(self, place: str, recomputed: Mapping[str, Any], tolerance: float = 1e-6) -> None:
         """Compare the numbers without "_" before their names with a part of the report; None and NaN are the same."""
@@ -81,10 +79,8 @@ def read_table(folder: Path, name: str, study: Path) -> pd.DataFrame:
     (path,) = folder.glob(f"*_description-{name}_data.csv")
     rows, listed = read_csv(path), study / "exclusions.csv"
     excluded = read_csv(listed) if listed.exists() else pd.DataFrame(columns=TRIAL)
-    of_session, of_trial = (
-        pd.MultiIndex.from_frame(rows[keys]).isin(pd.MultiIndex.from_frame(some[keys]))
-        for keys, some in ((SESSION, excluded[excluded["trial"].isna()]), (TRIAL, excluded.dropna(subset="trial")))
-    )
+    parts = (SESSION, excluded[excluded["trial"].isna()]), (TRIAL, excluded.dropna(subset="trial"))
+    of_session, of_trial = (rows.set_index(keys).index.isin(some.set_index(keys).index) for keys, some in parts)
     here = rows["session_status"].isin(["completed", "incomplete"]) & ~of_session
     rows = rows.assign(here=here, kept=here & ~of_trial, excluded_session=of_session)
     rows["last_attempt"] = rows.groupby(TRIAL)["attempt"].transform("max")
@@ -97,17 +93,15 @@ def quartiles(values: pd.Series) -> Numbers:
 
 
 def exact_share(count: int, n: int) -> Numbers:
-    ends = stats.binomtest(count, n).proportion_ci(0.95, "exact")
-    return {"low": ends.low, "high": ends.high}
+    return stats.binomtest(count, n).proportion_ci(0.95, "exact")._asdict()
 
 
 def student(values: Iterable[float], level: float = 0.95) -> Numbers:
     """Return the ends of Student's interval of a mean; NaN without spread."""
-    array = np.asarray(list(values), float)
-    if len(array) < 2 or np.ptp(array) < 1e-9:
-        return {"low": math.nan, "high": math.nan}
-    low, high = stats.t.interval(level, len(array) - 1, array.mean(), stats.sem(array))
-    return {"low": low, "high": high}
+    array, ends = np.asarray([*values], float), (math.nan, math.nan)
+    if len(array) > 1 and np.ptp(array) >= 1e-9:
+        ends = stats.t.interval(level, len(array) - 1, array.mean(), stats.sem(array))
+    return dict(zip(("low", "high"), ends, strict=True))
 
 
 def named(prefix: str, numbers: Mapping[str, Any] | Iterable[tuple[int, Any]]) -> Numbers:

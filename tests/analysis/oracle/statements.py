@@ -3,7 +3,6 @@
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from itertools import combinations, permutations, product
 
 import numpy as np
@@ -15,20 +14,23 @@ from statsmodels.stats.multitest import multipletests
 from tests.analysis.oracle.recomputed import Compared, Floats, Numbers, exact_share, named, quartiles, student
 
 
-@dataclass
 class Block:
     """A block of statements: its place in the report, its answers that count, and each person's medians by item."""
 
-    compared: Compared
-    place: str
-    found: Numbers
-    codes: list[str]
-    delays: list[float]
-    answers: pd.DataFrame
-    wide: dict[str, pd.DataFrame]
-    primary: list[str]
-    sides: dict[str, str]
-    gate: float
+    def __init__(self, compared: Compared, number: int, answers: pd.DataFrame, gate: float) -> None:
+        self.compared, self.place, self.gate = compared, f"results.blocks.{number}", gate
+        found, decided = compared.results["blocks"][number], compared.results["decided"]
+        settings = next(one["settings"] for one in compared.codebook["blocks"] if one["id"] == found["id"])
+        self.codes, self.delays = ([setting[name] for setting in settings] for name in ("code", "delay_ms"))
+        self.answers = answers[(answers["block"] == found["id"]) & answers["counts"]]
+        people, self.found, self.wide = sorted(self.answers["participant"].unique()), found, dict[str, pd.DataFrame]()
+        for item in (one["id"] for one in found["items"]):
+            own = self.answers[self.answers["item"] == item].groupby(["participant", "code"])["response"].median()
+            self.wide[item] = own.unstack("code").reindex(people)[self.codes]
+            conditions = {setting["code"]: setting["condition"] for setting in settings}
+            compared.values[found["id"], item] = self.wide[item].rename(columns=conditions)
+        self.primary = [item for item in self.wide if item in (decided["primary"] or self.wide)]
+        self.sides = dict.fromkeys(decided["rising"], "greater") | dict.fromkeys(decided["falling"], "less")
 
     def record(self, name: str, recomputed: Numbers, question: str, item: str = "", comparison: str = "") -> None:
         self.compared.check(f"{self.place}.{name}", recomputed)
@@ -49,21 +51,10 @@ class Block:
 def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.DataFrame) -> None:
     answers = answers[answers["kind"] == "statement"] if "kind" in answers else answers
     answers = answers.assign(response=pd.to_numeric(answers["response"], errors="coerce"))
-    found, decided = compared.results["blocks"], compared.results["decided"]
-    gates = adjusted([(block["overall"] or {}).get("p") for block in found])
-    sides = dict.fromkeys(decided["rising"], "greater") | dict.fromkeys(decided["falling"], "less")
-    for number, (own, gate) in enumerate(zip(found, gates, strict=True)):
-        settings = next(one["settings"] for one in compared.codebook["blocks"] if one["id"] == own["id"])
-        counting = answers[(answers["block"] == own["id"]) & answers["counts"]]
-        codes, wide = [setting["code"] for setting in settings], {}
-        for item in (one["id"] for one in own["items"]):
-            medians = counting[counting["item"] == item].groupby(["participant", "code"])["response"].median()
-            wide[item] = medians.unstack("code").reindex(sorted(counting["participant"].unique()))[codes]
-            conditions = {setting["code"]: setting["condition"] for setting in settings}
-            compared.values[own["id"], item] = wide[item].rename(columns=conditions)
-        delays, primary = [setting["delay_ms"] for setting in settings], decided["primary"] or [*wide]
-        given = (codes, delays, counting, wide, [item for item in wide if item in primary], sides, gate)
-        block = Block(compared, f"results.blocks.{number}", own, *given)
+    gates = adjusted([(found["overall"] or {}).get("p") for found in compared.results["blocks"]])
+    for number, gate in enumerate(gates):
+        block = Block(compared, number, answers, gate)
+        own, noticed = block.found, compared.results["decided"]["noticed"]
         _measures(block, trials[trials["block"] == own["id"]])
         _settings_differ(block)
         _pairs(block)
@@ -73,7 +64,7 @@ def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.Dat
             _trends(block)
             _equivalence(block)
         if own["threshold"] is not None:
-            noticing = counting[counting["item"] == decided["noticed"]].dropna(subset="response")
+            noticing = block.answers[block.answers["item"] == noticed].dropna(subset="response")
             block.record("threshold", {"n": noticing["participant"].nunique()}, "a delay is noticed")
 
 
@@ -139,8 +130,7 @@ def _settings_differ(block: Block) -> None:
     method = block.found["overall"]["method"].split()
     draws = int(method[3]) if "draws," in method else math.inf
     own = {"n": len(people), "dropped": len(block.wide[next(iter(whole))]) - len(people), "items": len(tested)}
-    own |= {"statistic": sum(statistic for statistic, _ in tested)}
-    own |= {"effect": np.mean([statistic / n / (k - 1) for statistic, n in tested])}
+    own |= {"statistic": sum(one for one, _ in tested), "effect": np.mean([one / n / (k - 1) for one, n in tested])}
     own |= {"incomplete": len(people) * len(whole) - sum(map(len, whole.values()))}
     own |= {"smallest_p": max(1 / (1 + draws), math.factorial(k) ** (1.0 - len(people)))}
     block.record("overall", own, "settings differ, all statements")
@@ -222,7 +212,9 @@ def _recognition(block: Block) -> None:
     """Recompute which name was rated highest, its hits among all exchanges of settings, and McNemar's tests."""
     labels, truth = block.found["named"]["labels"], [one.get("label") for one in block.found["settings"]]
     ratings = np.stack([block.wide[label].to_numpy() for label in labels], axis=2)
-    names = [[_highest(cell, labels) for cell in person] for person in ratings]
+    highest = ratings == ratings.max(axis=2, keepdims=True)
+    decided = np.where(highest.sum(axis=2) == 1, np.array(labels)[highest.argmax(axis=2)], "undecided")
+    names = np.where(np.isnan(ratings).any(axis=2), "unanswered", decided).tolist()
     used = [person for person in names if set(person) != {"unanswered"}]
     given = [pair for person in used for pair in zip(truth, person, strict=True)]
     hits, people = sum(right == name for right, name in given), []
@@ -243,11 +235,6 @@ def _recognition(block: Block) -> None:
     for number, (rate, p) in enumerate(zip(rates, adjusted([rate["p"] for rate in rates]), strict=True)):
         own |= named(f"rates.{number}", rate | {"p_adjusted": p})
     block.record("named.found", own, "liquids are recognised")
-
-
-def _highest(ratings: Floats, labels: Sequence[str]) -> str:
-    highest = [label for label, rating in zip(labels, ratings, strict=True) if rating == ratings.max()]
-    return "unanswered" if np.isnan(ratings).any() else highest[0] if len(highest) == 1 else "undecided"
 
 
 def _rate(used: Sequence[Sequence[str]], setting: int, truth: Sequence[str | None]) -> Numbers:
@@ -315,9 +302,9 @@ def _equivalence(block: Block) -> None:
         if differences.nunique() > 1:
             lower = stats.ttest_1samp(differences, -bound, alternative="greater")
             upper = stats.ttest_1samp(differences, bound, alternative="less")
-            own |= {"t_lower": lower.statistic, "p_lower": lower.pvalue, "t_upper": upper.statistic}
-            own |= {"p_upper": upper.pvalue, "p": max(lower.pvalue, upper.pvalue)}
-            own |= {"statistic": min(lower.statistic, -upper.statistic)}
+            own |= {"p_lower": lower.pvalue, "p_upper": upper.pvalue, "p": max(lower.pvalue, upper.pvalue)}
+            t_lower, t_upper = lower.statistic, upper.statistic
+            own |= {"t_lower": t_lower, "t_upper": t_upper, "statistic": min(t_lower, -t_upper)}
             own |= named("interval", student(differences, 1 - 2 * alpha) | {"level": 1 - 2 * alpha})
         block.record(f"against.{number}.found", own, "a delay is equivalent", item, f"{delay:g} ms − {control:g} ms")
         block.compared.check(f"{block.place}.against.{number}", {"delay_ms": delay, "control_ms": control})
