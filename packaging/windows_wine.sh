@@ -205,8 +205,8 @@ tests() { # with cp1252, as on a German or Dutch Windows: PYTHONUTF8=1 would hid
     step "Tests"
     export QT_QPA_PLATFORM=offscreen
     if [ $# -eq 0 ]; then set -- tests; fi
-    wine_python -X faulthandler -m pytest -q -n 2 --dist loadfile -p no:cacheprovider --continue-on-collection-errors \
-        -m "not slow and not nightly" --tb=short "$@" >"$folder/tests.log" || true
+    wine_python -X faulthandler -m pytest -q -n 2 --dist loadfile --timeout 3600 -p no:cacheprovider \
+        --continue-on-collection-errors -m "not slow and not nightly" --tb=short "$@" >"$folder/tests.log" || true
     tail -n 1 "$folder/tests.log"
     grep -E '^(FAILED|ERROR) ' "$folder/tests.log" | sed 's/ - .*//' | sort -u >"$folder/failed.txt" || true
     sed 's/ *#.*//' "$here/packaging/wine_known.txt" | sort -u | comm -23 "$folder/failed.txt" - >"$folder/new.txt"
