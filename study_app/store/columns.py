@@ -72,7 +72,7 @@ PARTICIPANTS: tuple[Column, ...] = (
         "validity",
         "text",
         "Whether the session's main trials were valid; n/a until the first has ended.",
-        levels=(("valid", "all did"), ("invalid", "at least one was not valid")),
+        levels=(("valid", "all were"), ("invalid", "at least one was not valid")),
     ),
 )
 TRIALS_MISSING = optional(

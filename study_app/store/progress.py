@@ -39,10 +39,10 @@ class Progress:
     ``here`` is the index of the step that was shown last (−1 before the first), ``durations_s`` how long the steps left
     behind were shown, ``away_s`` how long no program held the session, which no duration counts. ``targets`` counts
     those reached in the latest trial; it began at ``trial_since_s``, None while a page is shown or after a gap, and its
-    task took ``trial_lasted_s``, None until it ended. ``answered`` counts the responses to each trial and form, of a
-    trial's last attempt; ``broken`` has for each trial done the limits that it broke: column, value and limit. ``lost``
-    says why a trial's recording could not be kept, ``lacking`` how many samples it lacks; ``outlets_lost`` why an
-    outlet to other programs failed since the session began or was resumed.
+    task took ``trial_lasted_s``, None until it ended. ``answered`` counts the answers to each main trial and form, of
+    a trial's last attempt; ``broken`` has for each trial done the limits that it broke: column, value and limit.
+    ``lost`` says why a trial's recording could not be kept, ``lacking`` how many samples it lacks; ``outlets_lost`` why
+    an outlet to other programs failed since the session began or was resumed.
 
     ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
     ``repeated`` says of each why it was presented again, ``undelivered`` names the limits that its intervals broke, in
@@ -87,6 +87,7 @@ class Progress:
     _main: dict[int, events.TrialStarted] = field(default_factory=dict)
     _failed: set[int] = field(default_factory=set)
     _reason: str = ""
+    _phase: str = ""
     _left_open: dict[tuple[int, int], dict[str, events.Answer]] = field(default_factory=dict)
 
     @property
@@ -182,7 +183,8 @@ class Progress:
     def _confirm(self, line: events.Responses | events.FormAnswered) -> None:
         """Record the answers of a trial or form as confirmed."""
         of = (line.form, line.after) if isinstance(line, events.FormAnswered) else line.trial
-        self.answered[of] = len(line.items)
+        if isinstance(line, events.FormAnswered) or self._phase == "main":
+            self.answered[of] = sum(item.first_s is not None for item in line.items)
         if isinstance(line, events.Responses) and line.items and line.trial == self.of_intervals:
             answer = line.items[0]
             seconds = None if answer.onset_s is None or answer.first_s is None else answer.first_s - answer.onset_s
@@ -222,7 +224,7 @@ class Progress:
         self.presented[trial] = max(line.attempt, self.presented.get(trial, 0))
         self._enter(line.t_s)
         self.trial_since_s, self.trial_lasted_s, self.targets, self.paused = line.t_s, None, 0, False
-        self.of_intervals = trial if line.has_intervals else None
+        self.of_intervals, self._phase = trial if line.has_intervals else None, line.phase
         if line.has_intervals and line.phase == "main":
             self._main[trial] = line
         if line.has_intervals and line.attempt > 1 and self._reason != events.UNDELIVERED:

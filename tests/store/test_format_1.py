@@ -5,12 +5,15 @@ import hashlib
 import io
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from study_app.devices.hand import HandOrders
+from study_app.protocol.trials.tasks import Task
+from study_app.session.simulated import rehearsal
 from study_app.store.blinded.blinding import Key, open_events, read_key, seal_event
 from study_app.store.columns import TABLES
 from study_app.store.folders import StudyFolder
@@ -29,8 +32,8 @@ UNEQUAL = (
 )
 """Fields of the journal that differ from run to run or with the program's version."""
 
-ADDED = ("text_sha256", "study_version", "limiter_saturated")
-"""Fields that later versions write besides: of the consent that the participant read, and a sealed count."""
+ADDED = ("text_sha256", "study_version", "limiter_saturated", "within_limits")
+"""Fields that later versions write besides: of the consent that the participant read, a sealed count, the verdict."""
 
 MEASURED = re.compile("path_length|mean_speed|force_|withheld|delivered|limiter_|delay_error")
 """Fields computed from motion and force: their last digits depend on the vector instructions of the processor."""
@@ -99,10 +102,20 @@ def recorded(folder: StudyFolder) -> Iterator[tuple[str, Any]]:
         yield f"{place}/protocol", sha256(json.loads(session.receipt.read_text(encoding="utf-8"))["protocol"])
 
 
+def rest_without_return(_task: Task, hand: HandOrders) -> None:
+    """Rest where the task ended, as the simulated hand did when the results were recorded."""
+    hand.rest()
+
+
 @pytest.mark.parametrize("name", sorted(RECORDED))
 @pytest.mark.slow
-def test_rehearsal_writes_the_bytes_recorded_for_format_1(name: str, rehearsal_of: Callable[[str], Path]) -> None:
-    assert dict(recorded(StudyFolder(rehearsal_of(name)))) == RECORDED[name]
+def test_rehearsal_writes_the_bytes_recorded_for_format_1(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rehearsal, "rest_hand", rest_without_return)
+    folder = rehearsal.rehearse(name, participants=2, seed=1, results=tmp_path / name)
+
+    assert dict(recorded(StudyFolder(folder))) == RECORDED[name]
 
 
 def test_hashes_of_format_1_cover_two_participants_of_each_shipped_study() -> None:

@@ -783,7 +783,7 @@ def _make_hand_for_page(
         elif page.interval is None or not page.interval.resting:
             return hand_behaviour(page.task, hand, draw, clock())
         else:
-            rest_hand(page.task, hand, returns=True)
+            rest_hand(page.task, hand)
         return None
 
     return hand_on

@@ -29,12 +29,21 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import capitalised, counted
-from study_app.store.blinded.blinding import open_events, opened_key
+from study_app.store.blinded.blinding import Codes, open_events, opened_key
 from study_app.store.delivered import beyond_limits
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import locate_session
 from study_app.store.journals import journal
-from study_app.store.journals.journal_events import UNDELIVERED, Answer, Event, Note, Repeat, TrialStarted, start_of
+from study_app.store.journals.journal_events import (
+    UNDELIVERED,
+    Answer,
+    Event,
+    Note,
+    Repeat,
+    SessionEnded,
+    TrialStarted,
+    start_of,
+)
 from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials
 from study_app.store.progress import progress_of
 from study_app.store.tables import session_tables
@@ -95,7 +104,9 @@ def read_record(folder: Path) -> SessionRecord:
     own = tuple(exclusion for exclusion in listed if exclusion.what[:2] == (facts.participant, facts.session))
     start = start_of(lines)
     rows = session_tables.SessionRows(lines).trials
-    trials = _trial_records(rows, lines, start.limits, own)
+    last = lines[-1]
+    verdict = last.within_limits if key is None and isinstance(last, SessionEnded) else None
+    trials = _trial_records(rows, lines, start.limits, own, verdict=verdict, codes=key.codes if key else {})
     return SessionRecord(
         facts=facts,
         about=_about_text(lines, incidents_text(facts)),
@@ -104,6 +115,7 @@ def read_record(folder: Path) -> SessionRecord:
             progress_of(lines).missing_trials,
             excluded=facts.excluded is not None,
             sealed=key is None and bool(start.measures_sealed),
+            verdict=verdict,
         ),
         trials=trials,
         notes=tuple(_note_texts(lines)),
@@ -117,9 +129,17 @@ def read_record(folder: Path) -> SessionRecord:
 
 
 def _limits_sentence(
-    trials: Sequence[TrialRecord], missing: MissingTrials, *, excluded: bool = False, sealed: bool
+    trials: Sequence[TrialRecord],
+    missing: MissingTrials,
+    *,
+    excluded: bool = False,
+    sealed: bool,
+    verdict: bool | None = None,
 ) -> str:
-    """Return sentences on undelivered trials and on trials within the study's limits."""
+    """Return sentences on undelivered trials and on trials within the study's limits.
+
+    ``verdict`` is the recorded one on all limits of a ``sealed`` session, None if it has not been recorded.
+    """
     lost = f"{_missing_sentence(missing, excluded=excluded)} " if missing.count else ""
     repeated = sum(trial.outcome == UNDELIVERED for trial in trials)
     again = (
@@ -127,9 +147,8 @@ def _limits_sentence(
         if repeated
         else ""
     )
-    return (
-        f"{lost}{again}{_judged_sentence([trial for trial in trials if trial.outcome != UNDELIVERED], sealed=sealed)}"
-    )
+    delivered = [trial for trial in trials if trial.outcome != UNDELIVERED]
+    return f"{lost}{again}{_judged_sentence(delivered, sealed=sealed, verdict=verdict)}"
 
 
 def _missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
@@ -142,10 +161,13 @@ def _missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
     return f"{missing}. Nobody answered them.{states}"
 
 
-def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
+def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bool | None) -> str:
     judged = [trial for trial in trials if trial.valid is not None]
     outside = [trial for trial in judged if not trial.valid]
-    later = " Delay error, force held back and targets reached are checked after unblinding." if sealed else ""
+    if verdict is False and not outside:
+        return "Out of limits: at least one trial exceeded a limit of the study. Unblinding shows which one."
+    later = " Delay error, force held back and targets reached are checked after unblinding."
+    later = later if sealed and not verdict else ""
     if not judged:
         return f"Trials have not been measured yet.{later}"
     if not outside:
@@ -159,9 +181,17 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool) -> str:
 
 
 def _trial_records(
-    rows: Sequence[Mapping[str, Any]], lines: Sequence[Event], limits: Mapping[str, float], own: Sequence[Exclusion]
+    rows: Sequence[Mapping[str, Any]],
+    lines: Sequence[Event],
+    limits: Mapping[str, float],
+    own: Sequence[Exclusion],
+    *,
+    verdict: bool | None,
+    codes: Codes,
 ) -> tuple[TrialRecord, ...]:
+    """Return the records of trials; which trial broke a limit is open if only the session's ``verdict`` is known."""
     reasons = {exclusion.trial: exclusion.reason for exclusion in own}
+    is_hidden = verdict is False and all(row["valid"] is not False for row in rows)
     answered: dict[tuple[int, int], int] = {}
     unconfirmed = progress_of(lines).unconfirmed
     for row in session_tables.SessionRows(lines).responses:
@@ -171,9 +201,9 @@ def _trial_records(
         TrialRecord(
             number=row["trial"],
             attempt=row["attempt"],
-            words=_setting_text(row),
+            words=_setting_text(row, codes),
             outcome=row["outcome"] or "running",
-            valid=row["valid"],
+            valid=None if is_hidden else row["valid"],
             broken=tuple(broken_limit_text(*limit) for limit in beyond_limits(row, limits)),
             answers=answered.get((row["trial"], row["attempt"]), 0),
             unconfirmed=_choice_texts(unconfirmed.get((row["trial"], row["attempt"]), {})),
@@ -196,11 +226,12 @@ def _row_note_texts(row: Mapping[str, Any]) -> list[str]:
     return [word for word, holds in said if holds] + (row["notes"] or "").splitlines()
 
 
-def _setting_text(row: Mapping[str, Any]) -> str:
-    """Return a trial's setting without a condition: "Part 1, L2", "practice, 2nd attempt"."""
+def _setting_text(row: Mapping[str, Any], codes: Codes) -> str:
+    """Return what a trial presented: "Part 1, L2", "Part 1, L2: thick" with opened ``codes``, "Practice, attempt 2"."""
+    name = codes.get(row["block"], {}).get(row["code"])
     phase = f"Part {row['part']}" if row["part"] is not None else str(row["phase"]).capitalize()
     again = "" if row["attempt"] == 1 else f", attempt {row['attempt']}"
-    return f"{phase}, {row['code']}{again}"
+    return f"{phase}, {row['code']}{f': {name}' if name else ''}{again}"
 
 
 def _about_text(lines: Sequence[Event], happened: str) -> str:
@@ -271,7 +302,7 @@ def _trial_limits_text(trial: TrialRecord) -> str:
     if trial.broken:
         said += "; ".join(trial.broken) + "."
     else:
-        said += "not measured." if trial.valid is None else "within all limits."
+        said += "not known yet." if trial.valid is None else "within all limits."
     if trial.lost:
         said += f" The recording was lost: {trial.lost}."
     if trial.unconfirmed:

@@ -75,9 +75,10 @@ class Orders:
 
     @property
     def answers(self) -> int:
-        """The maximum number of answers in a complete session, practice and forms included."""
+        """The maximum number of analysed answers in a complete session: those in main trials and forms."""
         forms = (step for step in self.steps if isinstance(step, FormOrder))
-        return sum(block.trials * len(block.items) for block in self.blocks) + sum(len(form.items) for form in forms)
+        main = (block.trials * len(block.items) for block in self.blocks if block.phase == "main")
+        return sum(main) + sum(len(form.items) for form in forms)
 
 
 def block_codes(protocol: Protocol, block: Block) -> tuple[str, ...]:

@@ -206,7 +206,6 @@ class Answering(SimulatedParticipant):
             if over or not steps:
                 break
             self._post(Stepped(self._time.seconds, steps))
-        self.answers += 1
         self._post(TaskDone(self._time.seconds, "timeout" if over else "complete", {}))
 
     def _features_felt(self, _trial: int | None) -> TrialFeatures:

@@ -289,18 +289,15 @@ def _target_path(task: Task, times_s: Floats) -> Floats:
     return np.array([task.target_m(float(time_s)) for time_s in times_s])
 
 
-def rest_hand(task: Task, device: HandOrders, *, returns: bool) -> None:
-    """Move a simulated hand after a task to the start of the next interval, if that is a fixed position.
+def rest_hand(task: Task, device: HandOrders) -> None:
+    """Move a simulated hand after a task to the start of the next interval: a fixed position, or the middle.
 
-    Otherwise it ``returns`` to the middle, where an exploration begins, or stays, and jumps there as the next trial
-    begins, which asks for forces that no person feels.
+    A hand that stayed would jump there as the next trial begins, which asks for forces that no person feels.
     """
     if task.start_m is not None:
         device.reach_to(*task.start_m)
-    elif returns:
-        device.reach_to(0.0, 0.0, 0.0, _RETURN_S)
     else:
-        device.rest()
+        device.reach_to(0.0, 0.0, 0.0, _RETURN_S)
 
 
 @dataclass(frozen=True, slots=True)

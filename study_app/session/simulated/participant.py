@@ -71,7 +71,6 @@ class SimulatedParticipant(ABC):
     """Answer the pages of a session; subclasses define how time passes and where events go."""
 
     def __init__(self, study: Protocol, schedule: Schedule, observer: Observer | None = None) -> None:
-        self.answers = 0
         self.page: Page | None = None
         self._study = study
         self._seed, self._who = schedule.seed, schedule.participant
@@ -135,7 +134,6 @@ class SimulatedParticipant(ABC):
         if not isinstance(page, ChoicePage):  # on a choice page the answer continues the session
             self._wait(1.0)
         self._post(Submitted(self._seconds()))
-        self.answers += len(answers)
 
     def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
         """Return how a page is answered by what was felt."""

@@ -342,7 +342,7 @@ class RehearsedSession(SimulatedParticipant):
                 self._adjust_level(page, setting, view, samples)
             if wants_to_go_on and page is self.page:
                 self._post(Continue(self._now_s()))
-        rest_hand(page.task, arm, returns=self._study.format > 1)  # rehearsals of format 1 keep their results
+        rest_hand(page.task, arm)
         earlier = () if interval is None or interval.number == 1 else self._features_of.get(page.trial, ())
         self._features_of[page.trial] = (*earlier, senses.features())
         if self._tell_features is not None:
@@ -363,7 +363,6 @@ class RehearsedSession(SimulatedParticipant):
             self._post(Stepped(self._now_s(), steps))
         else:
             setting.done = True
-            self.answers += 1
             self._post(Submitted(self._now_s()))
 
     def _steps(self, page: TaskPage, setting: _Setting) -> int:
@@ -603,7 +602,8 @@ def _run_to_end(
         took_s = time.perf_counter() - began
         held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
         missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
-        progress(f"{participant}: {rehearsal.answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
+        answers = sum(progress_of(store.lines).answered.values())
+        progress(f"{participant}: {answers} responses, {held}, fingerprint {store.fingerprint}{missing}")
 
 
 @contextmanager

@@ -600,10 +600,15 @@ class DeviceReconnected(Event):
 
 
 class SessionEnded(Event):
-    """The session ended: always the last line."""
+    """The session ended: always the last line.
+
+    `within_limits` says whether all main trials were within the limits, also those of sealed measures; it is written in
+    a sealed session, so that unblinding does not change the session's validity.
+    """
 
     status: Text
     reason: Text
+    within_limits: _Flag | None = None
 
 
 def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:

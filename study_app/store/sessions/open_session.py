@@ -211,7 +211,8 @@ class SessionStore:
             missing = self.missing_trials
             if status == events.COMPLETED and missing.exceed:
                 status, reason = events.INCOMPLETE, str(missing)
-            self.append(events.SessionEnded(status=status, reason=reason), t_s=self._ended_s)
+            ended = events.SessionEnded(status=status, reason=reason, within_limits=self._sealed_verdict())
+            self.append(ended, t_s=self._ended_s)
             self.journal.close()
             self._receipt |= {"status": status, "reason": reason, "ended_at": self._lines[-1].at}
         self.write_tables()
@@ -229,6 +230,15 @@ class SessionStore:
                 "missing"
             ) from failures[0]
         self._over = True
+
+    def _sealed_verdict(self) -> bool | None:
+        """Return whether all main trials are within all limits; None if not sealed, or if nothing was measured."""
+        if not events.start_of(self._lines).measures_sealed:
+            return None
+        with contextlib.suppress(StoreError):  # a changed line must not prevent the end; `verify` reports it
+            validity = session_tables.participant_row(open_events(self._lines, self.key))["validity"]
+            return None if validity is None else validity == session_tables.VALID
+        return None
 
     @property
     def missing_trials(self) -> MissingTrials:

@@ -14,6 +14,7 @@ from study_app.store.delivered import is_within_limits
 from study_app.store.journals import journal_events as events
 from study_app.store.progress import progress_of
 
+VALID: Final = "valid"
 _PRESENTED: Final = {"S": "standard", "C": "comparison"}
 _OF_TRIAL: Final = {column.name: column.of_trial for column in (*TRIALS, *VIDEO)}
 _OF_THE_END = header(INTERVALS[[column.name for column in INTERVALS].index("invalid_reasons") :])
@@ -167,7 +168,9 @@ def participant_row(lines: Sequence[events.Event]) -> Row:
     after_main = latest_attempts(row for row in rows.responses if row["phase"] == "main")
     in_forms = (row for row in rows.responses if row.get("form") is not None)
     answered = [row for row in (*after_main, *in_forms) if row["first_choice_s"] is not None]
-    verdicts = [row["valid"] for row in main if row["valid"] is not None]
+    last = lines[-1]
+    recorded = last.within_limits if isinstance(last, events.SessionEnded) else None
+    verdicts = [row["valid"] for row in main if row["valid"] is not None] if recorded is None else [recorded]
     return {
         **_session_cells(start),
         **_group_cells(start),
@@ -179,7 +182,7 @@ def participant_row(lines: Sequence[events.Event]) -> Row:
         "language": done.language,
         "trials": len(main),
         "responses": len(answered),
-        "validity": None if not verdicts else "valid" if all(verdicts) else "invalid",
+        "validity": None if not verdicts else VALID if all(verdicts) else "invalid",
         **({TRIALS_MISSING.name: done.missing_trials.count} if start.intervals else {}),
     }
 

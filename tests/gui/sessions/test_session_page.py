@@ -12,8 +12,10 @@ from study_app.gui.sessions.session_page import SessionPage, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
+from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
+from study_app.store.unblinding import unblind
 from tests.golden import compare, each_once, what_comes
 from tests.golden_values import changed
 from tests.gui.transcript import told
@@ -109,7 +111,38 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
 
 def test_no_page_names_a_condition_of_a_sealed_study(study):
     record = read_record(next(iter(StudyFolder(study).sessions())).path)
-    assert "checked after unblinding" in record.limits
+    assert record.limits == "All 4 measured trials met the limits of the study."
     text = repr(record)
     protocol = load("demo")
     assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []
+
+
+def test_unblinding_keeps_the_validity_of_a_rehearsed_session_and_names_its_conditions(study):
+    (session,) = StudyFolder(study).sessions()
+    before = read_record(session.path)
+    unblind(study, "AK", "end of the study")
+    after = read_record(session.path)
+
+    assert (before.facts.validity, after.facts.validity) == ("valid", "valid")
+    codes = {code: name for block in read_key(study).codes.values() for code, name in block.items()}
+    assert [trial.words for trial in after.trials] == [
+        f"{trial.words}: {codes[trial.words.rpartition(' ')[2]]}" for trial in before.trials
+    ]
+
+
+def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblinding_already(tmp_path):
+    study = tmp_path / "results" / "demo"
+    with held(study) as store:
+        trial(store, 1, withheld_share=0.02)
+        trial(store, 2, withheld_share=0.2)
+        store.finish("completed")
+    folder = StudyFolder(study).session("P007", 1).path
+    before = read_record(folder)
+    unblind(study, "AK", "end of the study")
+    after = read_record(folder)
+
+    assert (before.facts.validity, after.facts.validity) == ("invalid", "invalid")
+    assert [trial.valid for trial in before.trials] == [None, None]  # which trial it was would tell the thick liquid
+    assert before.limits.endswith("Unblinding shows which one.")
+    assert [trial.valid for trial in after.trials] == [True, False]
+    assert after.limits.startswith("Out of limits: 1 of 2 measured trials")
