@@ -221,6 +221,7 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
     from study_app.store.merged import locate_participant
     from study_app.store.withdrawals import proof_of_withdrawal
     from study_app.store.withdrawals import withdraw as withdraw_from
+    from study_app.workspace import workspace
 
     done = withdraw_from(*locate_participant(results, participant), by=by, reason=reason, also=also)
     for folder in done.folders:
@@ -232,9 +233,10 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
         click.echo(f"nothing to erase: participant {participant} withdrew at {done.tombstone.at}")
     for output in done.elsewhere:
         state = "delete it, and create it again" if output.paths else "no longer there"
-        click.echo(f"warning: output of {output.at} outside the results folder ({state}): {output.to}", err=True)
+        click.echo(f"warning: output of {output.at} outside the workspace ({state}): {output.to}", err=True)
     for sentence in done.left:
         click.echo(f"warning: {sentence}", err=True)
+    click.echo(f"searched   {workspace().results}; for copies elsewhere repeat the command with --also DIR")
 
 
 def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Path]:

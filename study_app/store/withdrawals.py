@@ -97,10 +97,10 @@ def withdraw(
 ) -> Withdrawn:
     """Erase the sessions of a participant from the study in ``folder``, and from copies of it.
 
-    Erased are the participant's folder, the rows of tables and lists, and outputs in the results folder. A tombstone
+    Erased are the participant's folder, the rows of tables and lists, and outputs in the workspace. A tombstone
     remains, and the participant's ID is not used again. Withdrawing again completes an interrupted withdrawal, and
-    reaches further copies. Where a folder is the copy of a site in a merged study, outputs of the merged study are
-    erased, too.
+    reaches further copies. Copies in the results folder of the workspace are found without ``also``. Where a folder is
+    the copy of a site in a merged study, outputs of the merged study are erased, too.
 
     Parameters
     ----------
@@ -127,10 +127,14 @@ def withdraw(
     study = StudyFolder(folder)
     if not folder.is_dir():
         raise StoreError(f"{folder} is not a folder: give a study's folder, such as results/rek2024")
+    at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     copies, shared = _find_copies(study, also)
+    nearby, exports = _find_copies(study, filter(Path.is_dir, [workspace().results]))
+    of_person = _tombstone(study, participant, at, by, reason).sessions
+    copies += [copy for copy in nearby if copy not in copies and _has_copies(copy, participant, of_person)]
+    shared += [export for export in exports if export not in shared]
     for place in (study, *copies):
         refuse_special_files(place.data / f"sub-{participant}")
-    at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     with lock_folder(folder):
         tombstone = _tombstone(study, participant, at, by, reason)
         erased = [study.path] if _erase(study, tombstone) else []
@@ -154,9 +158,9 @@ def withdraw(
             )
             if known is not None and any(session.begun in begun for session in known.sessions):
                 reached.append(copy.path)
-    for merged in dict.fromkeys(filter(None, map(merged_above, reached))):
-        of_merged, merged_elsewhere = _outputs(merged)
-        outputs, elsewhere = (*outputs, *of_merged), (*elsewhere, *merged_elsewhere)
+    for made_from in dict.fromkeys((*reached[1:], *filter(None, map(merged_above, reached)))):
+        of_place, elsewhere_of_place = _outputs(made_from)
+        outputs, elsewhere = (*outputs, *of_place), (*elsewhere, *elsewhere_of_place)
     left += [
         f"{export.path} is an export with data of {participant}: delete it, and create it again"
         for export in shared
@@ -266,6 +270,14 @@ def _find_copies(study: StudyFolder, also: Iterable[Path]) -> tuple[list[StudyFo
     return copies, [study for study in by_path.values() if study not in copies and _study_name(study) == name]
 
 
+def _has_copies(copy: StudyFolder, participant: str, sessions: Iterable[ErasedSession]) -> bool:
+    """Return whether a study folder has, or had, a copy of one of a participant's sessions."""
+    begun = {session.begun for session in sessions if session.begun}
+    erased = tombstones(copy).get(participant)
+    held = (*map(describe_session, _sessions(copy, participant)), *(() if erased is None else erased.sessions))
+    return any(session.begun in begun for session in held)
+
+
 def _study_name(study: StudyFolder) -> str | None:
     """Return the name of a dataset's study, or None if its description is not of this program."""
     with suppress(StoreError):
@@ -351,8 +363,8 @@ def _reverses(line: bytes, participant: str) -> bool:
 
 
 def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
-    own, results = study.resolve(), workspace().results.resolve()
-    return erase_outputs(study, results if own.is_relative_to(results) else own)
+    own, within = study.resolve(), workspace().folder.resolve()
+    return erase_outputs(study, within if own.is_relative_to(within) else own)
 
 
 def _remaining_mentions(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str]:

@@ -27,7 +27,7 @@ from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import Withdrawn, proof_of_withdrawal, tombstones, withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
-from tests.studies import rehearsed
+from tests.studies import begun, rehearsed
 
 pytestmark = pytest.mark.slow
 
@@ -165,6 +165,25 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
         f"{one} is an export with data of {PERSON}: delete it, and create it again" for one in (named, shared)
     )
     assert contents(shared) == before
+
+
+def test_every_copy_and_output_in_the_workspace_is_erased_without_being_named(study: Path, results: Path) -> None:
+    pooled, saved, other = (results / name for name in ("pooled", "saved earlier/demo", "another"))
+    merge_sites({"A": study}, pooled)
+    shutil.copytree(study, saved)
+    with begun(other, PERSON) as store:  # another person with the same ID
+        store.finish("completed")
+    unrelated = contents(other)
+    report(study, results.parent / "report")
+
+    done = erase(pooled / "sites" / "A")
+
+    assert set(done.folders) == {pooled / "sites" / "A", study, saved}
+    assert not [path for path in results.parent.rglob(f"sub-{PERSON}") if not path.is_relative_to(other)]
+    assert results.parent / "report" / "report.html" in done.outputs
+    assert (done.left, done.elsewhere) == ((), ())
+    assert contents(other) == unrelated
+    assert verify_study(pooled).is_sound
 
 
 @needs_fork  # where folders can be linked, and pipes made
