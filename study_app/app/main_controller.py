@@ -16,7 +16,7 @@ from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, en
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.timing import collecting_in_this_thread
 from study_app.devices.registry import descriptor_of
-from study_app.errors import DeviceError, StoreError
+from study_app.errors import DeviceError, StoreError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.display.screens import place_window
@@ -28,8 +28,10 @@ from study_app.gui.kit.devices import device_named, screen_number, settings_here
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.gui.widgets.main_view import Place
+from study_app.protocol.source.files import protocol_file
 from study_app.session.start import NewSession
 from study_app.store import workstation
+from study_app.store.study_runs import content_changes, recorded_contents
 from study_app.store.workstation import DisplayOffset, MachineSettings, create_workspace
 from study_app.user_folder import settings_file
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
@@ -313,7 +315,17 @@ class MainController(QObject):
         self._go_to_designer(lambda designer: designer.open(source))
 
     def show_version(self, session: SessionFacts) -> None:
-        """Open the study designer at the changes since a session was run."""
+        """Open the study designer at the changes since a session was run; without the file, list what receipts hold."""
+        try:
+            protocol_file(session.study)
+        except StudyError:
+            changes = content_changes(recorded_contents(session.folder.parents[2]))
+            texts = [f"Version {after.name}: {'; '.join(sentences)}." for after, sentences in changes]
+            self.window.show_message(
+                f"{session.study}: changes between sessions",
+                "\n".join(texts) or "All sessions were run with the same study file.",
+            )
+            return
         self._go_to_designer(
             lambda designer: designer.open(session.study),
             lambda designer: designer.changes.compare_with_session(session.study, session.folder),

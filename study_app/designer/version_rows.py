@@ -89,7 +89,8 @@ def _kept_label(version: Kept, now: datetime) -> str:
         return f"Unsaved edits of another window, {when}"
     stated = _STATED.search((kept_content(version.hash) or b"").decode("utf-8", "replace"))
     how = "saved" if version.origin == "saved" else "in the file before it was saved"
-    return f"{stated[1] if stated else 'No version'}: {how} {when}"
+    by = f" by {version.by}" if version.by else ""
+    return f"{stated[1] if stated else 'No version'}: {how}{by} {when}"
 
 
 def _time_text(moment: str, now: datetime) -> str:

@@ -6,5 +6,5 @@ computes how far one is, ``verification`` proves that files were not changed, ``
 
 Reading order: atomic, delivered, folders, missing_trials, program_log; csv_files, output_files, workstation; columns;
 journals; checksums, progress, receipt; blinded, folder_lock, support; exclusions, recordings, study_versions; drafts,
-merged, recorder, study_runs, study_settings; tables; withdrawals; sessions, sites; unblinding, verification.
+merged, recorder, study_settings; study_runs, tables; withdrawals; sessions, sites; unblinding, verification.
 """

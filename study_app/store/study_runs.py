@@ -1,18 +1,22 @@
 """The contents of a study's file with which sessions were run, and the numbers of sessions."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import StoreError
+from study_app.protocol.differences import differences
 from study_app.protocol.source.files import with_liquid_files
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
+from study_app.store.merged import folders_of
 from study_app.store.study_versions import content_hash, keep_content, kept_content
 
+_HIDDEN_CHANGE: Final = "only comments, or liquids and conditions, which the receipts do not contain"
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 
@@ -106,6 +110,66 @@ def _read_run(path: Path, _changed_ns: int) -> Run:
         last=str(receipt.began_at(held) or ""),
         receipt=path,
     )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecordedContent:
+    """A content of a study's file as the receipts of a results folder hold it: without its conditions.
+
+    Attributes
+    ----------
+    version : str
+        Its version.
+    protocol : mapping
+        The protocol in the receipt.
+    participant : str
+        The participant of the first session that was run with it; of a merged study with the site.
+    began : str
+        When this session began, as ISO 8601.
+    saved_by : str
+        Initials of the operator who saved the content; "" if they are not recorded.
+    """
+
+    version: str
+    protocol: Mapping[str, Any]
+    participant: str
+    began: str
+    saved_by: str
+
+    @property
+    def name(self) -> str:
+        """The version and its first session: "0.2 (first session: P002, 2026-11-27; saved by AK)"."""
+        by = f"; saved by {self.saved_by}" if self.saved_by else ""
+        return f"{self.version} (first session: {self.participant}, {self.began[:10]}{by})"
+
+
+def recorded_contents(folder: Path) -> tuple[RecordedContent, ...]:
+    """Return the contents of the study's file that the receipts in a results folder hold, in the order of first use.
+
+    No file of the study is needed. A receipt that cannot be read is left out (`verify` reports it).
+    """
+    first: dict[str, RecordedContent] = {}
+    for prefix, place in folders_of(folder).items():
+        for session in StudyFolder(place).sessions():
+            run = run_of(session.receipt)
+            if run is None or (protocol := run.protocol) is None:
+                continue
+            known = first.get(run.hash)
+            if known is None or run.last < known.began:
+                first[run.hash] = RecordedContent(
+                    version=run.version,
+                    protocol=protocol,
+                    participant=f"{prefix}{session.participant}",
+                    began=run.last,
+                    saved_by=str(receipt.read(session.receipt).get("saved_by", "")),
+                )
+    return tuple(sorted(first.values(), key=lambda content: content.began))
+
+
+def content_changes(contents: Sequence[RecordedContent]) -> Iterator[tuple[RecordedContent, tuple[str, ...]]]:
+    """Yield each content after the first with a sentence for each difference from the one before."""
+    for before, after in pairwise(contents):
+        yield after, differences(before.protocol, after.protocol) or (_HIDDEN_CHANGE,)
 
 
 def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:

@@ -19,6 +19,7 @@ from study_app.store.atomic import (
     write_file,
 )
 from study_app.store.folder_lock import lock_folder
+from study_app.store.workstation import load_or_default
 from study_app.user_folder import data_folder
 
 _Origin: TypeAlias = Literal["saved", "found", "draft"]
@@ -28,11 +29,15 @@ _ORIGINS: Final = frozenset({"saved", "found", "draft"})
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """A stored content of a study's file, identified by its hash; ``at`` is ISO 8601 with the time zone."""
+    """A stored content of a study's file, identified by its hash; ``at`` is ISO 8601 with the time zone.
+
+    ``by`` are the initials of the operator who saved it; "" if they are not known.
+    """
 
     hash: str
     origin: _Origin
     at: str
+    by: str = ""
 
 
 class ChangedOutsideError(StoreError):
@@ -101,6 +106,8 @@ def keep_version(file: Path, content: bytes, origin: _Origin) -> None:
     if any(version.hash == hash_ for version in kept_versions(file)):
         return
     line = {"hash": hash_, "origin": origin, "at": datetime.now(UTC).astimezone().isoformat(timespec="seconds")}
+    if origin == "saved" and (by := load_or_default()[0].operator):
+        line["by"] = by
     path = _list_file(file)
     make_folder(path.parent, waits=False)
     append_line(path, json.dumps(line).encode() + b"\n")
@@ -108,8 +115,18 @@ def keep_version(file: Path, content: bytes, origin: _Origin) -> None:
 
 def kept_versions(file: Path) -> tuple[Kept, ...]:
     """Return the stored contents of a study's file, the oldest first; unreadable lines are left out."""
+    return _listed_versions(_list_file(file))
+
+
+def saver_of(hash_: str) -> str:
+    """Return the initials of the operator who saved a content on this computer; "" if they are not known."""
+    lists = sorted((data_folder() / "versions").glob("*.jsonl"))
+    return next((version.by for path in lists for version in _listed_versions(path) if version.hash == hash_), "")
+
+
+def _listed_versions(path: Path) -> tuple[Kept, ...]:
     try:
-        lines = _list_file(file).read_bytes().splitlines()
+        lines = path.read_bytes().splitlines()
     except OSError:
         return ()
     versions: list[Kept] = []
@@ -117,7 +134,8 @@ def kept_versions(file: Path) -> tuple[Kept, ...]:
         with contextlib.suppress(ValueError):
             held = parse_json(line)
             if isinstance(held, dict) and held.get("origin") in _ORIGINS:
-                versions.append(Kept(str(held.get("hash")), held["origin"], str(held.get("at"))))
+                at, by = str(held.get("at")), str(held.get("by", ""))
+                versions.append(Kept(str(held.get("hash")), held["origin"], at, by))
     return tuple(versions)
 
 

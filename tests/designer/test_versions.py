@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.main_controller import MainController
 from study_app.designer.controller import DesignerController
@@ -113,7 +113,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     designer.editing.handle_request(SetValue(REPETITIONS, 4))
     other("Typed elsewhere", "leave")
     designer.saving.leave()
-    assert designer.place.banner.words.text().startswith("Another window of the program edits this study, too")
+    assert designer.place.banner.words.text().startswith("Another window of the program also edits this study")
     next(iter(designer.place.banner.buttons.values())).click()
     QApplication.processEvents()
     assert any("Typed elsewhere" in line for line in lines(designer))
@@ -180,6 +180,13 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     assert changes.chosen == protocol_hash(source)
     assert changes.version.currentText().startswith("1.0: 1 session")
     assert visit.designer.place.pane.tab == "changes"
+    changed = source.replace(b'version = "1.0"', b'version = "1.1"', 1)
+    run(designer, "P002", changed, study="elsewhere", version="1.1", started_at="2026-11-20T12:00:00+00:00")
+    designer.file.unlink()
+    visit.show_version(facts)
+    assert visit.window.notice is not None
+    texts = [shown.text() for shown in visit.window.notice.findChildren(QLabel)]
+    assert any(text.startswith("Version 1.1 (first session: P002, 2026-11-20): ") for text in texts)
     visit.window.close()
     visit.end()
     visit.window.deleteLater()

@@ -24,6 +24,7 @@ from study_app.analysis.planned_exclusions import PlannedExclusions
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.questions import MEASURES
 from study_app.analysis.report.methods import late_exclusions
+from study_app.analysis.report.questions_in_full import changed_questions
 from study_app.analysis.results import (
     VERDICTS_MEAN,
     BlockResult,
@@ -47,6 +48,7 @@ from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import describe_exclusion
 from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_reason
+from study_app.store.study_runs import recorded_contents
 
 
 def of_levels(results: Results) -> tuple[str, ...]:
@@ -132,6 +134,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             f"The study file was changed between sessions without a new version: {study.contents} different files were "
             "run. Compare the protocols in the receipts; report.json lists each session's protocol_hash."
         )
+    yield from changed_questions(recorded_contents(study.folder))
     if study.late:
         yield (
             "Decisions after the key was opened, when their effect on the results was visible: "

@@ -36,6 +36,7 @@ from study_app.analysis.planning.preregistration import deviations_section as pr
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards, figures_shown, first_page
 from study_app.analysis.report.methods import methods, version_words
+from study_app.analysis.report.questions_in_full import appendix
 from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.results import BlockResult, Failure, Failures, LevelsResult, Progress, Results, name, silent
 from study_app.analysis.wording import counted, listed
@@ -48,6 +49,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.merged import MANIFEST, folders_of
 from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
+from study_app.store.study_runs import recorded_contents
 from study_app.store.unblinding import reveals_of
 
 _OF_FORMAT_2: Final = {
@@ -373,6 +375,7 @@ def _page(
         ("Reproducing this report", lambda: _again(study, results)),
         ("Licence and citation", lambda: (heading(2, "Licence and citation"), bullets(credit_lines(study)))),
         ("Answers, counted", lambda: sections.counts_of_answers(results)),
+        ("Questions in full", lambda: appendix(recorded_contents(study.folder))),
     ]
     first = attempted(failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn)])
     made = [

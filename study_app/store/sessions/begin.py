@@ -43,6 +43,7 @@ from study_app.store.journals.journal import FORMAT, Journal, SessionClock
 from study_app.store.journals.journal_events import Allocated, SessionStarted, start_of
 from study_app.store.recorder import Recorder
 from study_app.store.sessions.open_session import Place, SessionStore
+from study_app.store.study_versions import saver_of
 from study_app.store.tables.study_files import check_study, update_participants, write_description
 from study_app.store.withdrawals import tombstones
 
@@ -213,6 +214,7 @@ def first_records(
         "ended_at": None,
         "resumed": [],
         **fields,
+        **({"saved_by": saver} if (saver := saver_of(fields["protocol_hash"])) else {}),
         "generator": receipt.GENERATOR,
         **session_environment(
             protocol, start.device, start.screens, clock, start.motors_masked, start.outlets, start.video

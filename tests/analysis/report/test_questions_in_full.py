@@ -1,0 +1,67 @@
+"""The appendix of questions, and what changed between versions: from the receipts alone."""
+
+import json
+from pathlib import Path
+
+import pytest
+from markupsafe import escape
+
+from study_app.analysis.report.write_report import report
+from study_app.protocol.source.files import shipped_file
+from study_app.store import receipt
+from study_app.store.study_runs import content_changes, recorded_contents
+from study_app.store.study_versions import save_study
+from study_app.store.workstation import DEFAULTS, save_settings
+from tests.analysis.conftest import Results
+from tests.studies import begun
+
+OLD = "This liquid behaves like honey."
+NEW = "This liquid behaves like warm honey that runs slowly off a spoon."
+"""A statement of rek2024, and another wording."""
+
+
+@pytest.fixture
+def results(tmp_path: Path) -> Path:
+    """Return results of three sessions; a statement was reworded by AK, and the study's file deleted afterwards."""
+    file, folder = tmp_path / "study.toml", tmp_path / "results"
+    text, base = shipped_file("rek2024").read_text(encoding="utf-8"), ""
+    reworded = text.replace(f'"{OLD}"', f'"{NEW}"')
+    assert reworded != text
+    for participant, by, content in (("P001", "BC", text), ("P002", "AK", reworded), ("P003", "BC", reworded)):
+        save_settings(DEFAULTS.model_copy(update={"operator": by}))
+        base = save_study(file, content, base)
+        with begun(folder, participant, file) as store:
+            store.finish("completed")
+    file.unlink()
+    return folder
+
+
+def test_the_first_session_of_each_version_and_who_saved_it_are_read_from_receipts(results: Path) -> None:
+    contents = recorded_contents(results)
+
+    assert [(content.participant, content.saved_by) for content in contents] == [("P001", "BC"), ("P002", "AK")]
+    ((after, sentences),) = content_changes(contents)
+    assert after.participant == "P002"
+    assert len(sentences) == 1
+    assert OLD in sentences[0]
+
+
+def test_the_report_has_every_wording_in_every_language_and_says_what_changed(rek: Results, tmp_path: Path) -> None:
+    rek.add("P001", lambda _condition, _item: 4)
+    later = rek.add("P002", lambda _condition, _item: 4)
+    held = json.loads(later.receipt.read_text(encoding="utf-8"))
+    before = held["protocol"]["questionnaires"]
+    new = json.loads(json.dumps(held["protocol"]).replace(OLD, NEW))
+    new["study"]["version"] = "1.1"
+    facts = {"protocol_hash": "2", "started_at": "2026-01-06T10:00:00.000+01:00", "saved_by": "AK"}
+    receipt.write(later.receipt, held | facts | {"protocol": new})
+
+    page = report(rek.folder, tmp_path / "report")[0].read_text(encoding="utf-8")
+
+    appendix = page[page.index("Questions in full</h2>") :]
+    texts = [text for form in before.values() for item in form["items"] for text in item["text"].values()]
+    assert len(texts) > 20
+    assert [text for text in (*texts, NEW) if str(escape(text)) not in appendix] == []
+    assert "Changed in version 1.1 (first session: P002, 2026-01-06; saved by AK)" in appendix
+    assert "Reworded in version 1.1 (first session: P002, 2026-01-06; saved by AK): liquid.like_honey." in page
+    assert "Changed in version 1.0" not in page
