@@ -156,7 +156,7 @@ class MeasuresController(QObject):
 
     def _show_failure(self, sentence: str) -> None:
         log.info("simulations failed: %s", sentence)
-        self._latest = Simulated(self.warnings, failed=f"{capitalised(sentence)}.")
+        self._latest = Simulated(warnings=self.warnings, failed=f"{capitalised(sentence)}.")
         self._idle.start()
 
     def _set_warnings(self, warnings: tuple[str, ...]) -> None:

@@ -87,6 +87,7 @@ class MeasuresPage(_MeasureCards):
         self.power = PowerCard()
         self.column.addWidget(self.power)
         self.column.addStretch()
+        self.column.setStretchFactor(self.grid, 0)
 
     def show_parts(self, shown: MeasuresView) -> None:
         super().show_parts(shown)

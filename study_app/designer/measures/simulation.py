@@ -18,7 +18,7 @@ from study_app.workers.server import Send, Stop, Stopped
 WAITING: Final = "simulating …"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Simulated:
     """What was simulated of a study.
 

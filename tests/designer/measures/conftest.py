@@ -35,7 +35,7 @@ class Worker:
     def answer(self, waiting: str = "") -> None:
         """Answer the last order, in part if it is still ``waiting``."""
         warnings = ("methods.adaptive.trials: more trials",)
-        self.given.append((len(self.orders), Simulated(warnings, TABLE, waiting)))
+        self.given.append((len(self.orders), Simulated(warnings=warnings, table=TABLE, waiting=waiting)))
 
 
 @pytest.fixture
