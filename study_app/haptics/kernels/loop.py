@@ -72,14 +72,14 @@ class ClockCalls(NamedTuple):
 
 
 class Records(NamedTuple):
-    """Records that loop and device exchange: (1,) arrays of ``layout.READING`` and ``layout.COMMAND``."""
+    """Records exchanged between loop and device: (1,) arrays of ``layout.READING`` and ``layout.COMMAND``."""
 
     reading: Any
     command: Any
 
 
 class Output(NamedTuple):
-    """Where samples go (``haptics.runtime.telemetry``)."""
+    """The destination of samples (``haptics.runtime.telemetry``)."""
 
     ring: Any
     written: Any

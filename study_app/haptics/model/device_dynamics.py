@@ -51,6 +51,6 @@ UNKNOWN: Final = Dynamics(assumed=("count_m", "mass_kg"))
 
 
 def dynamics_from(described: Mapping[str, Any]) -> Dynamics:
-    """Return the dynamics that a receipt records of its device; `UNKNOWN` in receipts of earlier versions."""
+    """Return the device dynamics that a receipt records; `UNKNOWN` for receipts of earlier versions."""
     recorded = described.get("dynamics")
     return UNKNOWN if recorded is None else Dynamics(**{**recorded, "assumed": tuple(recorded.get("assumed", ()))})

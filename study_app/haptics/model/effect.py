@@ -28,10 +28,11 @@ LEAST, MOST = 0.0, 1.0  # of a parameter without a range: then the range in its 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter in the lab: its label and its range, in SI units; shown numbers are ``factor`` times as large.
+    """One parameter in the lab: its label and range, in SI units; displayed numbers are multiplied by ``factor``.
 
-    ``default`` is the default of its model, or else the scene's value. A parameter with ``choices`` (value, words) is
-    one of those, and ``least`` and ``most`` are unused. The displayed number has ``decimals`` decimals.
+    ``default`` is the default of its model or, without one, the scene's value. A parameter with ``choices`` (value,
+    text) has one of these values, and ``least`` and ``most`` are unused. The displayed number has ``decimals``
+    decimals.
     """
 
     name: str
@@ -72,8 +73,8 @@ Extremes: TypeAlias = Any
 class Rows:
     """Rows that an effect owns in arrays of the model: the same rows in each of ``arrays``.
 
-    ``needed`` returns the number that a liquid needs at a rate [Hz]; ``most`` the greatest number that any liquid
-    needs, None if only the caller that packs the scenes knows it. ``noun`` names them in messages.
+    ``needed`` returns the number that a liquid needs at a rate [Hz]; ``most`` is the greatest number that any liquid
+    needs, None if only the caller that packs the scenes knows it. ``noun`` is their name in messages.
     """
 
     noun: str

@@ -55,13 +55,13 @@ class Raw(Frozen):
 
 
 class Given(Frozen):
-    """The velocity comes with the motion: for recorded or programmed motions, never for a device."""
+    """The velocity is given with the motion: for recorded or programmed motions, never for a device."""
 
     kind: Literal["given"] = "given"
 
 
 class Withdrawn(Frozen):
-    """An estimator of earlier versions: sessions that used it are read; it computes no force any more."""
+    """An estimator of earlier versions: sessions that used it can be read, but it no longer computes forces."""
 
     kind: Literal["line", "foaw", "lead"]
     samples: int | None = None
@@ -69,7 +69,7 @@ class Withdrawn(Frozen):
 
     @property
     def refusal(self) -> tuple[str, str]:
-        """Why no force is computed, and what to do."""
+        """The reason why no force is computed, and the remedy."""
         return f'the velocity estimator "{self.kind}" was removed from the program', 'write "ewma", "kalman" or "raw"'
 
 
@@ -180,7 +180,7 @@ def _difference_share(_velocity: Raw, period_s: float, omega_per_s: float) -> fl
 
 
 def _mean_share(velocity: DeviceVelocity, _period_s: float, omega_per_s: float) -> float:
-    """Return the share of a mean over twice the lag."""
+    """Return the gain of a moving average over twice the lag."""
     angle = 2 * omega_per_s * velocity.lag_s
     return math.sin(angle) / angle if angle else 1.0
 

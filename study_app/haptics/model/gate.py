@@ -34,7 +34,7 @@ def bounds(scene: Scene, liquid: Liquid) -> Mapping[Effect, float]:
 
 @dataclass(frozen=True)
 class Extremes:
-    """The extremes of the motion in one liquid of a scene, and the quantities of which effects compute bounds."""
+    """The extremes of the motion in one liquid of a scene, and the quantities from which effects compute bounds."""
 
     scene: Scene
     liquid: Liquid
@@ -144,7 +144,7 @@ class Extremes:
         return submerged(depth_m, self.radius_m)
 
     def doubtful_shares(self) -> tuple[float, float]:
-        """Return the greatest error of frontal area and volume, 0 … 1, if the ball counts as fully in or out."""
+        """Return the greatest errors of frontal area and volume, 0 … 1, if the ball counts as fully in or out."""
         nearest_m = max(self.depth_m[0], -self.depth_m[1], 0.0)
         if nearest_m == 0.0:
             return 1.0, 1.0
@@ -156,7 +156,7 @@ class Extremes:
 
 
 def _flows(liquid: Liquid, *, called_for: bool = False) -> list[Flow]:
-    """Return the flows that the liquid has a table of, or only those selected or left to the gate."""
+    """Return all flows for which the liquid has a table, or only those selected or left to the gate."""
     return [
         effect.flow(getattr(liquid, effect.name))
         for effect in EFFECTS
@@ -205,7 +205,7 @@ def effect_verdicts(scene: Scene) -> tuple[Verdict, ...]:
 
 
 def resolve(scene: Scene) -> Scene:
-    """Return the scene with named effects and a law of drag wherever it says ``"auto"``."""
+    """Return the scene with effects and a drag law selected wherever it says ``"auto"``."""
     if all(liquid.effects != "auto" for liquid in scene.liquids):
         return scene
     liquids = tuple(_resolved(scene, liquid) if liquid.effects == "auto" else liquid for liquid in scene.liquids)

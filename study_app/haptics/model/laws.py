@@ -23,7 +23,7 @@ _CONSTANT_FROM: Final = 4040.0**0.70
 def schiller_naumann(reynolds: float) -> float:
     """Return F/F_Stokes for C_d = max(24/Re (1 + 0.15 Re^0.687), 0.44) (Schiller & Naumann 1933).
 
-    The greater of the two branches, which cross at Re ≈ 990, instead of their switch at 1000: continuous.
+    The maximum of the two branches, which cross at Re ≈ 990, makes the law continuous, unlike a switch at 1000.
     """
     held = min(reynolds, HIGHEST_REYNOLDS)
     ratio = max(1.0 + 0.15 * math.pow(held, 0.687), 0.44 / 24.0 * held)
@@ -53,8 +53,9 @@ def brown_lawler(reynolds: float) -> float:
 def finite_reynolds(reynolds: float) -> float:
     """Return F/F_Stokes for 1 + (3/16) Re/(1 + 0.450 √Re) + (0.486/24) Re/(1 + (4040/Re)^0.70).
 
-    Oseen's term and a constant C_d at great Re, between them fitted to this project's fluid solver: within 1.7 % at
-    Re 1 to 200. Used only by ``unsteady_drag``; below Re = 10⁵ within 2.7 % of the mean of the published laws.
+    It has Oseen's term at low Re and a constant C_d at high Re; in between it was fitted to this project's fluid
+    solver, within 1.7 % at Re 1 to 200. Used only by ``unsteady_drag``; below Re = 10⁵ within 2.7 % of the mean of the
+    published laws.
     """
     grown = math.pow(reynolds, 0.70)
     oseen = 3.0 / 16.0 * reynolds / (1.0 + 0.450 * math.sqrt(reynolds))
@@ -78,7 +79,7 @@ def drag_n(
     diameter_m: float,
     drag_coefficient: float,
 ) -> float:
-    """Return the size of the drag [N] on a sphere at a relative speed, by a law; ``constant`` takes the coefficient."""
+    """Return the drag [N] on a sphere at a relative speed by a law; only ``constant`` uses the coefficient."""
     if law == "constant":
         return 0.5 * density_kg_m3 * drag_coefficient * math.pi / 4 * diameter_m**2 * speed_mps**2
     if viscosity_pa_s is None or law not in LAWS:
@@ -196,7 +197,7 @@ def carreau(speed_mps: float, stokes_nspm: float, time_spm: float, exponent: flo
 def shear_thickening(value: float, slope: float, thickened: float, onset: float, steepest: float) -> float:
     """Return the stress at a shear rate, or the force at a speed: slope · v up to the onset, a ramp, thickened · v.
 
-    The ramp ends at twice the onset, or rises by ``steepest`` where that is less.
+    The ramp ends at twice the onset, or has the slope ``steepest`` if that is smaller.
     """
     rising = max(min((_THICKENED_WITHIN * thickened - slope) / (_THICKENED_WITHIN - 1.0), steepest), slope)
     return min(max(slope * value, slope * onset + rising * (value - onset)), thickened * value)
@@ -222,7 +223,7 @@ def stress_pa(rheology: Any, shear_rate_per_s: float) -> float:
 
 
 def yield_n(rheology: Any, diameter_m: float) -> float:
-    """Return the force [N] that a sphere at rest bears before the liquid flows: 3π D² · 1.157 τ_y."""
+    """Return the yield force [N] of a sphere at rest, below which the liquid does not flow: 3π D² · 1.157 τ_y."""
     return 3 * math.pi * diameter_m**2 * _YIELD * getattr(rheology, "yield_stress_pa", 0.0)
 
 

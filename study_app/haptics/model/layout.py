@@ -40,7 +40,7 @@ LIMITER_SATURATED = 1 << 10  # the device's motors saturated: its force was betw
 
 
 class _Limiter(NamedTuple):
-    """A limiter: its bit, the ending of its column, its name in windows, and what its column counts ticks of.
+    """A limiter: its bit, the suffix of its column, its display name, and the description of its column.
 
     Sessions of the first releases lack the column of a ``later`` one; an ``expected`` one does not concern an operator.
     """
@@ -166,7 +166,7 @@ class SampleField:
     stream: str = ""
 
     def named(self, pattern: str = "") -> list[str]:
-        """Return a name for each component, or one for a number; ``pattern`` "": of the column."""
+        """Return a name for each component, or one for a scalar; with an empty ``pattern`` the column names."""
         return [(pattern or self.column or self.name).replace("*", part) for part in self.parts or ("",)]
 
 

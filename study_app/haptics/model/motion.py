@@ -57,7 +57,7 @@ class Motion:
 
 
 def read_motion(path: Path) -> Motion:
-    """Read ``t_s,x_m,y_m,z_m`` and perhaps ``vx_mps,vy_mps,vz_mps`` (scene frame) from a CSV file.
+    """Read ``t_s,x_m,y_m,z_m`` and, if present, ``vx_mps,vy_mps,vz_mps`` (scene frame) from a CSV file.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def circle(
     revolutions: float = 3.0,
     rest_s: float = 6.0,
 ) -> Motion:
-    """Three circles, then a stop (Rek 2024, Figs 3 and 4)."""
+    """Return three circles, then a stop (Rek 2024, Figs 3 and 4)."""
     moving_s = revolutions * 2 * math.pi * radius_m / speed_mps
     t_s = _times(moving_s + rest_s, rate_hz)
     return _on_circle(t_s, np.minimum(t_s, moving_s) * speed_mps, (t_s < moving_s) * speed_mps, radius_m)
@@ -170,7 +170,7 @@ def reverse(
     against_s: float = 2.0,
     rest_s: float = 6.0,
 ) -> Motion:
-    """Three circles, then 2 s back against the flow, then a stop (Rek 2024, Fig. 5)."""
+    """Return three circles, then 2 s back against the flow, then a stop (Rek 2024, Fig. 5)."""
     turn_s = revolutions * 2 * math.pi * radius_m / speed_mps
     t_s = _times(turn_s + against_s + rest_s, rate_hz)
     forth, back = np.minimum(t_s, turn_s), np.clip(t_s - turn_s, 0.0, against_s)
@@ -179,19 +179,19 @@ def reverse(
 
 
 def line(rate_hz: float, *, speed_mps: float = _SPEED_MPS, moving_s: float = 6.0) -> Motion:
-    """Straight along x, without a stop (Rek 2024, Figs 7 and 8)."""
+    """Return a straight motion along x without a stop (Rek 2024, Figs 7 and 8)."""
     t_s = _times(moving_s, rate_hz)
     return _horizontal(t_s, x=t_s * speed_mps, vx=np.full_like(t_s, speed_mps))
 
 
 def stop(rate_hz: float, *, speed_mps: float = _SPEED_MPS, moving_s: float = 3.0, rest_s: float = 6.0) -> Motion:
-    """Straight along x, then a stop."""
+    """Return a straight motion along x, then a stop."""
     t_s = _times(moving_s + rest_s, rate_hz)
     return _horizontal(t_s, x=np.minimum(t_s, moving_s) * speed_mps, vx=(t_s < moving_s) * speed_mps)
 
 
 def zigzag(rate_hz: float, *, speed_mps: float = _SPEED_MPS, leg_s: float = 0.5, legs: float = 12) -> Motion:
-    """Toward −z in legs that alternate by 90°, 45° to either side (Rek 2024, Fig. 6)."""
+    """Return a motion towards −z in straight legs at ±45°, with 90° turns (Rek 2024, Fig. 6)."""
     t_s = _times(leg_s * legs, rate_hz)
     leg = _count(t_s, leg_s, legs)
     side = np.where(leg % 2 == 0, 1.0, -1.0)
@@ -203,7 +203,7 @@ def zigzag(rate_hz: float, *, speed_mps: float = _SPEED_MPS, leg_s: float = 0.5,
 def reach(
     rate_hz: float, *, distance_m: float = 0.6, reach_s: float = 0.8, dwell_s: float = 0.5, reaches: float = 6
 ) -> Motion:
-    """Minimum-jerk back-and-forth reaches along x, with a rest at each end (Flash & Hogan 1985)."""
+    """Return minimum-jerk back-and-forth reaches along x, with a rest at each end (Flash & Hogan 1985)."""
     t_s = _times((reach_s + dwell_s) * reaches, rate_hz)
     count = _count(t_s, reach_s + dwell_s, reaches)
     phase = np.clip((t_s - count * (reach_s + dwell_s)) / reach_s, 0.0, 1.0)

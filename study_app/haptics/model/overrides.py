@@ -98,7 +98,7 @@ def _tree(scene: Scene) -> dict[str, Any]:
 
 
 def _tables(tree: dict[str, Any]) -> Tables:
-    """Return the tables of a scene by name, in the order in which a plain name is looked for."""
+    """Return the tables of a scene by name, in the search order for plain names."""
     liquids = list(tree["liquids"])
     tables = {"liquid": liquids}
     for name in _OF_A_LIQUID:
@@ -112,7 +112,7 @@ def _tables(tree: dict[str, Any]) -> Tables:
 
 
 def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
-    """Return the (table, field) pairs that ``name`` means."""
+    """Return the (table, field) pairs to which ``name`` refers."""
     place, _, field = name.rpartition(".")
     for table_name, rows in tables.items():
         places = [(row, field) for row in rows if field in row and place in {"", table_name}]
@@ -135,7 +135,7 @@ def _set_field(table: dict[str, Any], field: str, value: object) -> None:
 
 
 def _parse_value(text: str, present: object, field: str) -> object:
-    """Return the value of a text that the field's type alone does not determine."""
+    """Return the value of a text whose type does not follow from the field's type alone."""
     if text.startswith("{"):
         try:
             return tomllib.loads(f"table = {text}")["table"]

@@ -9,13 +9,13 @@ REASON: Final = "reason"
 
 
 class Frozen(BaseModel):
-    """A value: never changed once made, no unknown fields, no infinities."""
+    """An immutable value without unknown fields or infinities."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
 
 def later(default: Any = None, **about: Any) -> Any:
-    """Return a field that format 1 lacks: it is not written at its default, so that older files keep their bytes."""
+    """Return a field that format 1 lacks; its default is not written, so that older files keep their bytes."""
     usual = {} if "default_factory" in about else {"default": default}
     return Field(**usual, **about, exclude_if=lambda value: value == usual.get("default", {}))
 
@@ -23,7 +23,7 @@ def later(default: Any = None, **about: Any) -> Any:
 def within(least: float, most: float, why: str, usual: float | None = None, what: str | None = None) -> Any:
     """Return the annotation of a number from ``least`` to ``most``, both included.
 
-    An editor begins with ``usual``; ``what`` is the meaning of the number.
+    An editor starts with ``usual``; ``what`` describes the number.
     """
     examples = None if usual is None else [usual]
     return Field(ge=least, le=most, description=what, examples=examples, json_schema_extra={REASON: why})

@@ -73,7 +73,7 @@ Region: TypeAlias = Annotated[
 
 
 class _Liquid(Frozen):
-    """The fields that are no effect's table."""
+    """The fields of a liquid that do not belong to an effect."""
 
     id: str = Field(pattern=r"^[A-Za-z][A-Za-z0-9_]*$", max_length=MAX_ID)
     density_kg_m3: DensityKgM3
@@ -247,7 +247,7 @@ class Body(Frozen):
 
 
 class Knee(Frozen):
-    """How speeds above a threshold are lowered before anything is computed from them."""
+    """The reduction of speeds above a threshold, applied before all other computations."""
 
     law: Literal["sqrt", "square", "none"] = Field(
         default="sqrt",
@@ -266,7 +266,7 @@ class Knee(Frozen):
 
 
 class Accuracy(Frozen):
-    """What ``effects = "auto"`` may leave out: up to a share of the force, or a force if that is greater."""
+    """The force that ``effects = "auto"`` may omit: a share of the total or an absolute force, whichever is greater."""
 
     relative: Annotated[
         float,
@@ -278,9 +278,9 @@ class Accuracy(Frozen):
 
 
 class MotionBox(Frozen):
-    """How the ball is expected to move, in the scene.
+    """The expected range of the ball's motion in the scene.
 
-    Defaults follow from a hand that moves 40 mm to every side at up to 0.3 m/s and 3 m/s².
+    The defaults assume a hand that moves 40 mm in every direction at up to 0.3 m/s and 3 m/s².
     """
 
     speed_mps: Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] | None = Field(
@@ -302,12 +302,12 @@ class MotionBox(Frozen):
 
 
 class Scene(Frozen):
-    """Everything the force model needs. Without liquids a scene is rest: zero force.
+    """All inputs of the force model. A scene without liquids has zero force.
 
-    ``scale`` and ``origin_m`` map the hand into the scene; ``rate_hz`` is the nominal rate of ticks; ``force_limit_n``
-    the greatest force that may be sent; ``fade_s`` how long it takes to fade in; ``link`` how late it is sent, which no
-    scene file can say. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``, which means one of the
-    effects that the ``format`` of its file has.
+    ``scale`` and ``origin_m`` map the hand into the scene; ``rate_hz`` is the nominal tick rate; ``force_limit_n`` the
+    greatest permitted force; ``fade_s`` the fade-in time; ``link`` the delay of the force, which scene files cannot
+    set. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``, which selects among the effects of the
+    file's ``format``.
     """
 
     scale: SceneScale = 10.0
@@ -338,7 +338,7 @@ class Scene(Frozen):
         return self
 
     def motion_in(self, liquid: Liquid) -> MotionBox:
-        """Return ``motion`` with what it leaves open filled in; without a top there is no depth."""
+        """Return ``motion`` with its open values filled in; without a top face there is no depth."""
         depth_m = self.motion.depth_m
         if depth_m is None and not isinstance(liquid.region, Everywhere):
             region = liquid.region

@@ -101,7 +101,7 @@ def handle_limits(
 ) -> DampingLimits:
     """Return the limits of `damping_limits` for a handle of this mass, by the rules of a version.
 
-    With "kalman" and "ewma" at 1 kHz, those of inertia follow from the limits of drag (`ForceRules`).
+    With "kalman" and "ewma" at 1 kHz, the inertia limits follow from the drag limits (`ForceRules`).
     """
     lighter = min(mass_kg / _MEASURED_KG, 1.0) ** LIGHTER
     drag_nspm, inertia_nspm = damping_limits(period_s, delay_ticks, velocity)

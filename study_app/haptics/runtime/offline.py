@@ -220,7 +220,7 @@ def new_wake_places(elements: int) -> tuple[Any, Any]:
 
 @part
 def was_lost_at_read(sample: Record) -> bool:
-    """Return whether the servo found the device lost: then it ran no tick, and the force is the device's own."""
+    """Return whether the device was lost in this tick; then no model tick ran, and the device set the force."""
     return bool(
         sample.status == STATUS_DEVICE_LOST
         and sample.fresh == 0
@@ -232,7 +232,7 @@ def was_lost_at_read(sample: Record) -> bool:
 
 @part
 def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> None:
-    """Recompute the tick of a sample from the servo's inputs in it: stop, delay, saturation, the device's force.
+    """Recompute the tick of a sample from its recorded inputs: stop, delay, saturation, the device's force.
 
     If that force was not ``delivered`` for this model's command, only the velocity estimator receives it, since it
     moved the hand.
@@ -270,7 +270,7 @@ def recompute_sample(model: Any, safety: Record, samples: Any, trail: Record, pl
 def recompute_scenes(
     rest: Any, earlier: Any, model: Any, serial_before: int, serial: int, safety: Record, samples: Any, first: int
 ) -> None:
-    """Recompute each of ``samples`` from ``first`` on by the model of its scene, and write the forces into them.
+    """Recompute each of ``samples`` from ``first`` onwards with the model of its scene, and write the forces into them.
 
     ``model`` is that of the scene ``serial``, ``earlier`` that of ``serial_before``, ``rest`` that of all others.
     """
@@ -290,7 +290,7 @@ def recompute_scenes(
 
 @part
 def _note(model: Any, trail: Record, places: Any) -> None:
-    """Store the place of the hand if this tick left an element of the wake there."""
+    """Store the hand's position if this tick added an element to the wake."""
     if model.parameters[0].liquids == 0:
         return
     liquid, local, state = model.liquids[0], model.liquid_states[0], model.state[0]

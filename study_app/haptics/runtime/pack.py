@@ -202,7 +202,7 @@ def adjust_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN, rul
 
 
 def is_built_alike(scene: Scene, other: Scene) -> bool:
-    """Return whether one scene's state is valid in the other: only parameters differ on which no state depends.
+    """Return whether one scene's state is valid in the other: they differ only in parameters that no state depends on.
 
     Rows, effects, laws, kinds and the mapping of the hand into the scene must be equal. The state of some effects
     depends on their parameters, which therefore cannot be adjusted.
@@ -311,9 +311,9 @@ def _fill_constants(
 
 
 def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rules: ForceRules) -> tuple[float, float]:
-    """Return the factor of smoothing rates and the share with which inertial forces are within their limit.
+    """Return the factor of smoothing rates, and the share that keeps inertial forces within their limit.
 
-    They count by their damping of fast motion; see `ForceRules`. [choice]
+    The limit applies to their damping of fast motion; see `ForceRules`. [choice]
     """
 
     def damping_nspm(rate: float) -> float:

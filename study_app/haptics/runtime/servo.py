@@ -30,7 +30,7 @@ _STUCK = "or the computer blocked the servo, without a tick for 75 ms; turn the 
 
 
 class Servo:
-    """One device's servo: start it, load scenes, look at its telemetry, stop it.
+    """One device's servo: start it, load scenes, read its telemetry, and stop it.
 
     As a context manager it starts on entry, on a clock that runs by itself, and stops on exit. On a ``VirtualClock`` it
     runs only within `advance`, in the calling thread, by the same compiled loop.
@@ -170,7 +170,7 @@ class Servo:
 
     @property
     def fault(self) -> str | None:
-        """Why the servo stopped itself, or hangs, in a sentence; None without a fault.
+        """The reason why the servo stopped itself, or hangs, as a sentence; None without a fault.
 
         A device that knows the cause reports it as its ``failure``.
         """

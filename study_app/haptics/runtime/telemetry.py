@@ -45,7 +45,7 @@ class Telemetry:
         return self.ring[newest : newest + 1].copy()[0]
 
     def position_at(self, time_ns: int) -> tuple[np.ndarray[Any, Any], int]:
-        """Return the place of the handle at a time [m, (3,), hand frame], and the time for which it holds [ns].
+        """Return the handle's position at a time [m, (3,), hand frame], and the time to which it belongs [ns].
 
         Between two samples the position is interpolated and the time is ``time_ns``; before the oldest and after the
         newest both are that sample's, without extrapolation. Samples with a position that is not finite or was rejected
@@ -80,7 +80,7 @@ class Reader:
 class Timing:
     """The timing of the servo: all zero with too few samples.
 
-    ``rate_hz`` is the rate achieved, lateness that of the ticks, ``worst_gap_s`` the longest time between two readings
+    ``rate_hz`` is the achieved rate, lateness that of the ticks, ``worst_gap_s`` the longest time between two readings
     of the device, ``overruns`` the number of skipped deadlines.
     """
 
@@ -133,7 +133,7 @@ def _copy(ring: Any, written: Any, wanted: int, out: Any) -> tuple[int, int]:
 
 @kernel
 def _position_at(ring: Any, written: Any, time_ns: int, position: Any) -> Any:
-    """Write the position at ``time_ns`` into ``position`` (3,); return the time for which it holds [ns]."""
+    """Write the position at ``time_ns`` into ``position`` (3,); return the time to which it belongs [ns]."""
     size = ring.shape[0]
     end = written[0]
     fence()

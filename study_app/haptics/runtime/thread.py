@@ -45,7 +45,7 @@ _THAW_S = 0.25  # time for the loop to continue after the whole process stood st
 
 
 class LoopThread:
-    """The data and thread of the loop, separate from the servo, so that a servo without references is collected.
+    """The loop's data and thread, kept apart from the servo so that an unreferenced servo is garbage-collected.
 
     Parameters
     ----------
@@ -104,9 +104,9 @@ class LoopThread:
 
     @property
     def stuck(self) -> bool:
-        """Whether the tick that is due or running is so late that the loop hangs.
+        """Whether the loop hangs: the tick that is due or running is too late.
 
-        After the whole process stood still, the caller may run before the loop: then the loop gets time to continue.
+        If the whole process was paused, the caller may run before the loop; then the loop gets time to continue.
         """
         ticks = int(self.control[0].ticks)
         late_ns = self._late_ns
@@ -140,7 +140,7 @@ class LoopThread:
         return max(now_ns, kept_ns, suspended_ns if suspended_ns > _SUSPENDED_NS else 0)
 
     def start(self) -> None:
-        """Run in a separate thread until `end`; until then Ctrl-Z does not suspend it while it exerts force."""
+        """Run in a separate thread until `end`; meanwhile Ctrl-Z does not suspend the process."""
         self._begin()
         refuse_suspension(self)
         ready = threading.Event()
@@ -155,7 +155,7 @@ class LoopThread:
         return int(self._run(*self._arguments, max(ticks, 0)))
 
     def hand_over(self, scene: Scene, serial: int, *, goes_on: bool = False) -> None:
-        """Pack ``scene`` into the spare slot for the next tick; first wait until the last scene was taken.
+        """Pack ``scene`` into the spare slot for the next tick, after the previous scene was taken.
 
         With ``goes_on`` the tick takes only its parameters.
         """

@@ -71,7 +71,7 @@ def flow(current: Current) -> Flow:
 def _bound_n(extremes: Extremes) -> float | None:
     """Return F(v + u) − F(v) at its greatest speed u, plus the inertial force in its shear s.
 
-    To the ball that moves through it the liquid changes its velocity by up to u, at up to s v.
+    The liquid's velocity at the moving ball changes by up to u, at a rate of up to s v.
     """
     if extremes.liquid.current is None:
         return None

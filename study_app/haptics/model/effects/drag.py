@@ -65,7 +65,7 @@ class Drag(Frozen):
 
 
 def resistance_n(scene: Scene, liquid: Liquid, relative_mps: float, law: Law | None = None) -> float:
-    """Return the size of the drag [N] on the scene's body at a relative speed; by default by the most accurate law.
+    """Return the drag [N] on the scene's body at a relative speed; by default from the most accurate law.
 
     A damper always uses its own law.
     """

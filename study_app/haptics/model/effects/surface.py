@@ -6,7 +6,7 @@ BIT = 1 << 5
 
 
 def _bound_n(extremes: Extremes) -> float | None:
-    """Return the sum of the other effects if the centre can cross the surface: without it the ball is in or out."""
+    """Return the sum of the other effects if the centre can cross the surface, else nothing to bound."""
     if not extremes.has_top:
         return None
     area, volume = extremes.doubtful_shares()

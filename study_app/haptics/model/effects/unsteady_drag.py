@@ -35,7 +35,7 @@ def _bound_n(extremes: Extremes) -> float | None:
 
 
 def _bars(extremes: Extremes) -> tuple[tuple[str, ...], str]:
-    """Bar the effects it replaces if the Reynolds number permits it; else itself, and the history of creeping flow."""
+    """Return the effects that it excludes and why: those that it replaces, or itself at unsuitable Reynolds numbers."""
     reynolds = f"Re is up to {extremes.reynolds:.3g}"
     if extremes.reynolds <= _HIGHEST_REYNOLDS:
         return tuple(
