@@ -77,9 +77,9 @@ _ALIKE: Final = "the numbers do not vary between participants, so a t test is no
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Measured:
-    """A number on the scale of the test, its logarithm where a ratio is tested, and the variance of its estimate.
+    """A participant's number on the scale of the test (log for a ratio), and its estimation variance.
 
-    The variance is 0 where it is not known: participants are then weighted equally.
+    A variance of 0 means unknown; participants then have equal weights.
     """
 
     value: float
@@ -88,9 +88,9 @@ class Measured:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
-    """The ascending numbers of each group, or the differences within participants; and why others are left out.
+    """The sorted numbers of each group, or the differences within participants, and the reasons for exclusions.
 
-    ``shared`` is the variance of an error that all have in common, ``sides`` are the numbers of those compared.
+    ``shared`` is the variance of an error that all participants share, ``sides`` are the numbers of those compared.
     """
 
     samples: tuple[tuple[Measured, ...], ...]
@@ -105,11 +105,11 @@ class Compared:
 
     @property
     def smallest(self) -> int:
-        """How many participants the smaller sample has."""
+        """The number of participants in the smaller sample."""
         return min(map(len, self.samples))
 
     def means(self, alpha: float) -> Means | None:
-        """Return the mean, or the difference of the groups' means; None where a sample has fewer than two numbers."""
+        """Return the mean, or the difference of the groups' means; None if a sample has fewer than two numbers."""
         if self.smallest < 2:
             return None
         compared = []
@@ -124,7 +124,7 @@ class Compared:
 def contrast_results(
     study: Study, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> tuple[ContrastResult, ...]:
-    """Test the contrasts of a study, differences and equivalence by Holm each; none while the key is sealed."""
+    """Test the contrasts of a study, with Holm's correction for differences and for equivalence; none while sealed."""
     alpha = study.decided.alpha
     tests = [_tested(study, contrast, answers, levels, alpha / len(study.contrasts)) for contrast in study.contrasts]
     adjusted = holm([None if test.p is None else max(test.p, test.p_bootstrap or 0.0) for test in tests])
@@ -137,7 +137,6 @@ def contrast_results(
 
 
 def _judged(study: Study, tested: ContrastResult, p: float | None, p_equal: float | None) -> ContrastResult:
-    """Return a contrast with its corrected p and its verdict."""
     alpha = study.decided.alpha
     said: Any = verdict(p, None, alpha, primary=study.decided.binding)
     equivalent = None if tested.contrast.bound is None else p_equal is not None and p_equal <= alpha
@@ -157,7 +156,6 @@ def _judged(study: Study, tested: ContrastResult, p: float | None, p_equal: floa
 def _compared(
     study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> Compared:
-    """Return the numbers that a contrast compares."""
     sides: list[Mapping[str, Measured]] = [
         _values(contrast, block, condition, answers, levels)
         for block, condition in zip(
@@ -205,7 +203,7 @@ def _ascending(sample: Iterable[Measured]) -> tuple[Measured, ...]:
 
 
 def _side(name: str, held: Mapping[str, Measured], *, ratio: bool) -> ContrastSide:
-    """Return the numbers of one side as people read them, with their mean."""
+    """Return the numbers of one side in display units, with their mean."""
     scale = math.exp if ratio else float
     means = Compared(samples=(_ascending(held.values()),), left_out={}).means(0.05)
     low, high = (None, None) if means is None else (scale(float(end[0])) for end in means.interval(0.95))
@@ -224,7 +222,7 @@ def _sd(values: Sequence[float]) -> float | None:
 
 
 class _Standardised(NamedTuple):
-    """The standardised effect, Cliff's delta and the Bayes factor of a hypothesis; None where there is none."""
+    """The standardised effect, Cliff's delta and the Bayes factor of a hypothesis; None if not applicable."""
 
     effect: EffectSize | None
     ordinal: EffectSize | None
@@ -232,7 +230,7 @@ class _Standardised(NamedTuple):
 
 
 def _standardised(compared: Compared, *, is_ordinal: bool) -> _Standardised:
-    """Return the standardised effects of a hypothesis, participants counting equally."""
+    """Return the standardised effects of a hypothesis with equal weights for all participants."""
     first, *others = compared.values
     if others:
         effect, ordinal = hedges_g(first, others[0]), cliffs_delta(first, others[0])
@@ -244,7 +242,7 @@ def _standardised(compared: Compared, *, is_ordinal: bool) -> _Standardised:
 
 
 def _thresholds_of_two(study: Study, contrast: Contrast, per_u: float) -> tuple[list[Mapping[str, Measured]], float]:
-    """Return the thresholds in two blocks, in units of which u has so many, and the variance that widths add."""
+    """Return the thresholds in two blocks, in units of u / ``per_u``, and the variance that common widths add."""
     first, second = (next(level for level in study.levels if level.id == block) for block in contrast.blocks)
     sides, shared = thresholds_compared(first, second, tracks(study)[list(READ)])
     return [
@@ -260,7 +258,7 @@ def _values(
     answers: Sequence[BlockAnswers],
     levels: Sequence[LevelsResult],
 ) -> Mapping[str, Measured]:
-    """Return each participant's number in a block: the mean over standards, or over the conditions of statements."""
+    """Return each participant's number in a block: the mean over standards or, for statements, over conditions."""
     if contrast.measure not in _STATISTICS:
         asked = next(answered for answered in answers if answered.block.id == block)
         codes = [setting.code for setting in asked.block.settings if condition in (None, setting.condition)]
@@ -288,7 +286,7 @@ def _values(
 
 
 def _variance(row: Any, result: LevelsResult, *, ratio: bool) -> float:
-    """Return the variance of an estimate on the scale of the test; 0 where it is not known."""
+    """Return the variance of an estimate on the scale of the test; 0 if it is unknown."""
     if not isinstance(row, ThresholdEstimate) or row.variance is None:
         return 0.0
     per_u = math.log(10) * (1.0 if ratio else row.threshold) if result.spacing == "log" else 1.0
@@ -304,7 +302,7 @@ def _is_ratio(contrast: Contrast, levels: Sequence[LevelsResult]) -> bool:
 def _tested(
     study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult], strictest: float
 ) -> ContrastResult:
-    """Return a contrast before the correction, with resamples for an alpha of ``strictest``."""
+    """Return a contrast before correction, with enough resamples for an alpha of ``strictest``."""
     compared = _compared(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     names = _side_names(study, contrast)
@@ -358,7 +356,7 @@ def _tested(
 
 
 def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
-    """Return the names of what is compared: titles of blocks, unless these are the same."""
+    """Return the names of the two sides: block titles, unless these are the same."""
     titles = {block.id: block.title for block in study.levels} | {block.id: block.title for block in study.blocks}
     first, second = (titles.get(block, block) for block in (*contrast.blocks, *contrast.blocks)[:2])
     if first != second:
@@ -367,12 +365,12 @@ def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
 
 
 def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
-    """Return the bound on the scale of the test, and the largest difference that the scale permits (None: any)."""
+    """Return the bound on the scale of the test, and the largest possible difference (None: unlimited)."""
     return abs(math.log(bound)) if ratio else bound, None if contrast.measure in _STATISTICS else STEPS
 
 
 def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> float | None:
-    """Return the largest share of people that may differ by more than the bound; of groups, that none may belong to."""
+    """Return the upper limit of the share of participants that may differ by more than the bound."""
     if contrast.bound is None or not compared.smallest:
         return None
     if contrast.groups is not None:
@@ -388,7 +386,7 @@ def question(contrast: ContrastResult) -> str:
 
 
 def answer(contrast: ContrastResult) -> str:
-    """Return what is found, in sentences."""
+    """Return the result as sentences."""
     sentences = [f"Not tested: {contrast.note}." if contrast.p_adjusted is None else _difference_words(contrast)]
     if contrast.contrast.bound is not None and _lies_beyond(contrast, contrast.contrast.bound):
         what = "All differences lie" if contrast.interval is None else "The whole interval lies"
@@ -407,7 +405,7 @@ def answer(contrast: ContrastResult) -> str:
 
 
 def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
-    """Return whether the whole 95 % interval, or the difference that all participants have, lies beyond the bound."""
+    """Return whether the whole 95 % interval (or the difference, if all are equal) lies beyond the bound."""
     reach, _ = equality_limits(contrast.contrast, bound, ratio=contrast.ratio)
     if contrast.ratio and contrast.effect is not None:
         ends = contrast.interval
@@ -417,7 +415,6 @@ def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
 
 
 def _difference_words(contrast: ContrastResult) -> str:
-    """Return what was found of a difference that was tested, in sentences."""
     first, second = contrast.compared
     what, expected = number_text.capitalised(contrast.contrast.measure_words), contrast.contrast.expected
     if contrast.verdict in FOUND:
@@ -442,12 +439,10 @@ def _difference_words(contrast: ContrastResult) -> str:
 
 
 def _size_words(size: EffectSize | None) -> str:
-    """Return a standardised effect with its interval; a dash without any."""
     return "–" if size is None else f"{size.name} {number(size.value)} {interval(size)}"
 
 
 def _bayes_words(contrast: ContrastResult) -> str:
-    """Return the Bayes factor of a difference that was not shown, in a sentence after a space; else nothing."""
     if contrast.bayes_factor is None or contrast.verdict in FOUND:
         return ""
     more, less = ("with", "without") if contrast.bayes_factor > 1 else ("without", "with")
@@ -459,7 +454,7 @@ def _bayes_words(contrast: ContrastResult) -> str:
 
 
 def contrast_methods(results: Results) -> Iterator[str]:
-    """Yield the sentences of the methods paragraph about hypotheses; nothing without any."""
+    """Yield the sentences about hypotheses for the methods paragraph."""
     contrasts = results.contrasts
     if not contrasts:
         return
@@ -495,7 +490,6 @@ def contrast_methods(results: Results) -> Iterator[str]:
 
 
 def _left_out_words(contrast: ContrastResult) -> str:
-    """Return who is left out of a contrast and why."""
     by_reason: dict[str, list[str]] = {}
     for person, reason in contrast.left_out.items():
         by_reason.setdefault(reason, []).append(person)
@@ -507,7 +501,7 @@ def _left_out_words(contrast: ContrastResult) -> str:
 
 
 def contrast_section(results: Results) -> Iterator[str]:
-    """Yield the section on the study's hypotheses; nothing without any."""
+    """Yield the report's section on hypotheses; nothing if there are none."""
     if not results.contrasts:
         return
     yield heading(2, "Hypotheses")
@@ -544,7 +538,6 @@ def contrast_section(results: Results) -> Iterator[str]:
 
 
 def _sd_words(contrast: ContrastResult) -> str:
-    """Return the standard deviations between participants."""
     of_sides = listed([number(side.sd) for side in contrast.sides if side.sd is not None])
     return (of_sides or "–") + ("" if contrast.sd is None else f"; {number(contrast.sd)}") + " (ln)" * contrast.ratio
 

@@ -35,11 +35,11 @@ SEED: Final = 1
 
 
 def evaluate(study: Study, *, recordings: bool = True, progress: Progress = silent) -> Results:
-    """Test everything that the answers and, with ``recordings``, the recordings of a study can answer.
+    """Run all tests on the answers and, with ``recordings``, the recordings of a study.
 
-    While the key is sealed only counts and comparisons of codes are there; ``BlockResult.absent`` says what waits, and
-    what so few participants could not show. A part that fails is in ``Results.failures`` and, with the reason, in its
-    block's ``absent``; everything else is there.
+    While the key is sealed there are only counts and comparisons of codes; ``BlockResult.absent`` lists what awaits the
+    key, and what too few participants cannot show. A part that fails is listed in ``Results.failures`` and, with the
+    reason, in its block's ``absent``; all other parts are complete.
 
     Examples
     --------
@@ -89,7 +89,7 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
         return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
 
     def moved() -> Performance | None:
-        """Measure motion and force if asked; None while sealed, since a thick liquid is known by its force."""
+        """Measure motion and force if requested; None while sealed, since the force reveals a thick liquid."""
         if not (study.revealed and recordings):
             return None
         return performance(
@@ -115,9 +115,9 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
 
 
 def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[str], object] = str) -> BlockResult:
-    """Test everything that a block's answers can answer; without a study no measures.
+    """Run all tests on a block's answers; without a study, measures are omitted.
 
-    ``tell`` receives the name of each finding that is begun.
+    ``tell`` is called with the name of each finding before it is computed.
     """
     block, own = answers.block, study is not None and study.own_codes
     result = summarize_block(study, answers)
@@ -138,9 +138,9 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
 
 
 def delivered(study: Study) -> tuple[Delivered, ...]:
-    """Return the check of the manipulation: by setting, or over all settings of a block while they are sealed.
+    """Return the manipulation check by setting or, while sealed, over all settings of a block.
 
-    Errors by code would tell little, and delays nothing may tell before the key is opened.
+    Delays must not be revealed by code before the key is opened.
     """
     counted = study.trials[study.trials["counted"]]
     delivery = []
@@ -174,9 +174,9 @@ def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.D
 
 
 def orders(study: Study) -> dict[str, Evenness]:
-    """Return how even the orders of trials were, as run (block id → counts), excluded trials included.
+    """Return how balanced the orders of trials were as run (block id → counts), including excluded trials.
 
-    Nothing is known of a sealed study where each site or each participant has codes of its own.
+    They are unknown in a sealed study in which each site or each participant has its own codes.
     """
     if study.own_codes or (study.sites and not study.revealed):
         return {}

@@ -23,10 +23,10 @@ def export(
 ) -> tuple[Path, ...]:
     """Write the tables and the codebook of a study into the folder ``to``; return the files.
 
-    Tables: responses, trials, aggregate; of a study with levels also intervals and, once its key is open, tracks and
-    those of the statistics in `analysis.levels`.
+    Tables: responses, trials, aggregate; for a study with levels also intervals and, once its key is open, tracks and
+    the statistics in `analysis.levels`.
 
-    Files that are not as they were recorded are used as they are: ``warn`` receives each, and the codebook names it.
+    Files that differ from their recorded state are used: ``warn`` is called for each, and the codebook lists them.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def export(
 
 
 def _files(study: Study, extras: Collection[Extra]) -> tuple[Mapping[str, bytes | FileCopy], tuple[Failure, ...]]:
-    """Return all files by their names, and the sections of the report to share that failed."""
+    """Return all files by name, and the sections of the shared report that failed."""
     across, cells = wide(study) if extras else (None, {})
     tables = [*deliver(study), *([] if across is None else [across])]
     files = table_files(study, tables, extras, cells)

@@ -51,13 +51,13 @@ _SIZE = re.compile(r'<svg [^>]*?viewBox="0 0 ([0-9.]+) ([0-9.]+)"[^>]*>')
 
 @cache
 def _environment() -> Environment:
-    """Return the templates; everything in those of HTML is escaped, and nothing may be missing."""
+    """Return the template environment; HTML templates are escaped, and undefined values raise an error."""
     loader = PackageLoader("study_app.analysis.report", "templates")
     return Environment(loader=loader, autoescape=select_autoescape(), undefined=StrictUndefined, trim_blocks=True)
 
 
 def render(template: str, **values: Any) -> Markup:
-    """Return a template of this package with its values; what is not markup is escaped."""
+    """Return a template of this package filled with values; anything that is not markup is escaped."""
     return Markup(_environment().get_template(template).render(**values))  # noqa: S704 - the template escapes
 
 
@@ -78,13 +78,13 @@ def paragraph(words: str, kind: str = "") -> Markup:
 def attempted(
     failures: Failures, what: str, title: Markup, make: Callable[[], Iterable[str]], *, block: str | None = None
 ) -> list[str]:
-    """Return a part of the page; where it fails its title and why it is missing, and the failure is kept."""
+    """Return a part of the page or, if it fails, its title and the reason; the failure is recorded."""
     made = failures.attempt(what, lambda: list(make()), block=block)
     return [title, box([paragraph(f"Not there: {made.why}.")], "care")] if isinstance(made, Failure) else made
 
 
 def chunks(parts: Sequence[str]) -> list[list[str]]:
-    """Return the parts of a section with the headings that they follow."""
+    """Return the parts of a section grouped by heading."""
     found: list[list[str]] = []
     for part in parts:
         if not found or part.startswith("<h3"):
@@ -94,16 +94,16 @@ def chunks(parts: Sequence[str]) -> list[list[str]]:
 
 
 def bullets(lines: Iterable[str]) -> Markup:
-    """Return a list, empty where there are no lines."""
+    """Return a bullet list; empty without lines."""
     return _part("bullets", lines)
 
 
 def table(
     head: Sequence[str], rows: Iterable[Sequence[str]], *, words: int = 1, last: int = 0, folded: bool = False
 ) -> Markup:
-    """Return a table whose first ``words`` and ``last`` columns are words and whose others are numbers.
+    """Return a table whose first ``words`` and ``last`` columns are text and whose others are numbers.
 
-    One of many rows is ``folded`` in any case.
+    A table with many rows is always ``folded``.
     """
     kinds = ["" if place < words or place >= len(head) - last else "n" for place in range(len(head))]
     cells = [[(kind or _width(cell), cell) for kind, cell in zip(kinds, row, strict=True)] for row in rows]
@@ -113,26 +113,26 @@ def table(
 def table_of(
     rows: Iterable[T], *columns: tuple[str, Callable[[T], str]] | None, words: int = 1, last: int = 0
 ) -> Markup:
-    """Return a table of ``rows``; a column is its heading and what makes a cell of a row, None one that is left out."""
+    """Return a table of ``rows``; a column is a heading and a function from row to cell, or None to omit it."""
     shown = [column for column in columns if column is not None]
     cells = [[cell(row) for _, cell in shown] for row in rows]
     return table([head for head, _ in shown], cells, words=words, last=last)
 
 
 def _width(words: str) -> str:
-    """Return the class of a cell of words; only sentences are broken into lines."""
+    """Return the CSS class of a text cell; only sentences are wrapped."""
     return "long" if len(words) > LONG else "words" if len(words) > _SHORT else ""
 
 
 def box(parts: Iterable[Markup], kind: str = "box") -> Markup:
-    """Return parts that belong together."""
+    """Return related parts in one box."""
     return _part("box", parts, kind)
 
 
 def picture(one: Picture, *, beside: bool = False) -> Markup:
-    """Return a figure with its caption; its drawing is part of the page, in the page's colours and font.
+    """Return a figure with its caption, inlined with the page's colours and font.
 
-    The caption of one that stands ``beside`` an answer is not part of it.
+    The caption of a figure ``beside`` an answer is omitted.
     """
     if "svg" not in one.files:
         width, png = round(0.4 * int.from_bytes(one.files["png"][16:20])), one.files["png"]
@@ -143,7 +143,7 @@ def picture(one: Picture, *, beside: bool = False) -> Markup:
 
 
 def _inline_svg(svg: str, words: str) -> Markup:
-    """Return the drawing of an SVG, whose colours are those of the page; white letters and their ground stay."""
+    """Return an SVG's drawing with the page's colours; white text and its background are kept."""
     parts = _LETTERS.split(HEAD.sub("", svg))
     parts[::2] = [_COLOUR.sub(lambda match: f"var(--{_VARIABLES[match[0].lower()]})", part) for part in parts[::2]]
     parts[1::2] = [
@@ -160,12 +160,12 @@ def _inline_svg(svg: str, words: str) -> Markup:
 
 @cache
 def font_face(weight: str) -> str:
-    """Return Inter in a weight of the page (Regular, Bold), as a data URI; empty where it is not installed."""
+    """Return a weight of Inter (Regular, Bold) as a data URI, or "" if it is not installed."""
     file = style.FONT_FOLDER / f"Inter-{weight}.ttf"
     return base64.b64encode(file.read_bytes()).decode("ascii") if file.is_file() else ""
 
 
 def drawn(pictures: Mapping[str, Picture], name: str) -> Iterator[Markup]:
-    """Yield the figure of this name, where there is one."""
+    """Yield the figure with this name, if it exists."""
     if name in pictures:
         yield picture(pictures[name])

@@ -31,7 +31,7 @@ Style: TypeAlias = dict[str, Any]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """What must not be overlooked, written next to a figure's title: words, their colour and the ground under them."""
+    """A prominent label next to a figure's title: text, text colour and background colour."""
 
     words: str
     ink: str
@@ -39,7 +39,7 @@ class Mark:
 
 
 class Sheet:
-    """A figure of ``width_pt`` x ``height_pt``; each letter comes from the first of ``fonts`` that has it."""
+    """A figure of ``width_pt`` x ``height_pt``; each character uses the first of ``fonts`` that contains it."""
 
     def __init__(self, width_pt: float, height_pt: float, fonts: Sequence[str]) -> None:
         self.width_pt = width_pt
@@ -53,13 +53,13 @@ class Sheet:
         return FontProperties(family=self._fonts, size=size, weight=weight)
 
     def text_width(self, words: str, size: float, weight: str = "regular") -> float:
-        """Return the advance of one line of text [pt]."""
+        """Return the width of one line of text [pt]."""
         renderer = self._canvas.get_renderer()  # type: ignore[no-untyped-call]  # matplotlib leaves it untyped
         width, _, _ = renderer.get_text_width_height_descent(words, self.font(size, weight), ismath=False)
         return float(width) * 72 / self.figure.dpi
 
     def wrap(self, words: str, width_pt: float, size: float, weight: str = "regular") -> list[str]:
-        """Break a text into lines no wider than ``width_pt`` where its spaces allow."""
+        """Wrap a text at spaces into lines no wider than ``width_pt`` if possible."""
         lines: list[str] = []
         for word in words.split():
             longer = f"{lines[-1]} {word}" if lines else word
@@ -80,7 +80,7 @@ class Sheet:
         colour: str = style.TEXT,
         **place: Any,
     ) -> Text:
-        """Write ``words`` with their baseline at ``y``; ``ha`` and ``va`` as matplotlib's."""
+        """Draw ``words`` with their baseline at ``y``; ``ha`` and ``va`` are matplotlib's."""
         return self.figure.text(
             x / self.width_pt,
             1 - y / self.height_pt,
@@ -92,7 +92,7 @@ class Sheet:
         )
 
     def lines(self, x: float, middle: float, lines: Sequence[str], line_pt: float, **look: Any) -> None:
-        """Write ``lines`` below each other, around a baseline at ``middle``."""
+        """Draw ``lines`` below each other, centred on a baseline at ``middle``."""
         for number, line in enumerate(lines):
             self.text(x, middle + line_pt * (number - (len(lines) - 1) / 2), line, **look)
 
@@ -118,7 +118,7 @@ class Sheet:
         size: float = 6.5,
         lines: bool = False,
     ) -> None:
-        """Mark places of an axis by words, by default the numbers, empty: by none; and with lines across the plot."""
+        """Label positions of an axis, by default with the numbers (empty: no labels); ``lines`` adds grid lines."""
         shown = [f"{place:g}" for place in places] if words is None else [str(word) for word in words]
         if shown:
             (axes.set_xticks if side == "x" else axes.set_yticks)(places, shown, fontproperties=self.font(size))
@@ -146,7 +146,7 @@ class Sheet:
         self.figure.add_artist(line)
 
     def heading(self, title: str, marks: Sequence[Mark], counts: Sequence[str]) -> None:
-        """Write the title, the marks next to it and, at the right, the first of ``counts`` that fits the line."""
+        """Draw the title, the marks next to it and, at the right, the first of ``counts`` that fits."""
         baseline, x = 15.0, MARGIN_PT
         self.text(x, baseline, title, size=10, weight="bold")
         x += self.text_width(title, 10, "bold") + 8
@@ -163,7 +163,7 @@ class Sheet:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What every figure has: title, marks, what it says about n (the longest wording first), and fonts."""
+    """The common elements of every figure: title, marks, texts on n (longest first), and fonts."""
 
     title: str
     marks: Sequence[Mark]
@@ -178,7 +178,7 @@ class Look:
 
 
 def study_marks(study: Study) -> list[Mark]:
-    """Return what must not be overlooked in a figure of a study."""
+    """Return the marks for a study's figures."""
     marks = (
         (study.simulated, Mark(words="SIMULATED participants", ink=style.WARN, ground=style.WARN_GROUND)),
         (study.pilot, Mark(words="PILOT", ink=style.WARN, ground=style.WARN_GROUND)),
@@ -189,9 +189,9 @@ def study_marks(study: Study) -> list[Mark]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Picture:
-    """One figure: the block it is of, its name as a file, its title and caption, and its bytes by form (png, svg, pdf).
+    """One figure: its block, file name, title and caption, and its content by format (png, svg, pdf).
 
-    ``numbers`` are what it shows, as lines of cells with tabs between; empty where they are not known.
+    ``numbers`` are its data as tab-separated lines; empty if they are unknown.
     """
 
     block: str
@@ -205,7 +205,7 @@ class Picture:
 def attempted(
     pictures: Iterable[tuple[str, str, Callable[[], Picture | None]]], failures: Failures | None
 ) -> Iterator[Picture]:
-    """Yield figures from block, name and what draws it; one that fails is kept in ``failures`` instead."""
+    """Yield figures from block, name and drawing function; a failure is added to ``failures`` instead."""
     held = Failures() if failures is None else failures
     for block, name, draw in pictures:
         drawn = held.attempt(f"figure {name}", draw, block=block)
@@ -224,7 +224,7 @@ def picture_of(
     counts: Sequence[str] | None = None,
     numbers: str = "",
 ) -> Picture:
-    """Return the figure that ``draw`` draws in each form; ``counts`` say how many took part if not all of the study."""
+    """Return the figure that ``draw`` draws in each format; ``counts`` give n if it differs from the study's."""
     people = (counted(study.n, "participant"),) if counts is None else counts
     drawn = draw(Look(title, study_marks(study), people, style.fonts())).figure
     files = {form: style.file_bytes(drawn, form, f"{study.name}: {title}") for form in forms}
@@ -232,13 +232,13 @@ def picture_of(
 
 
 def sample_words(study: Study, n: int) -> str:
-    """Return what a caption ends with: who took part."""
+    """Return the last sentence of a caption: who took part."""
     return f"{'SIMULATED participants, not people; ' if study.simulated else ''}{counted(n, 'participant')}."
 
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """What a figure of a block is drawn from, its name as a file, and its forms."""
+    """The data of a figure of a block, its file name, and its formats."""
 
     study: Study
     block: Block
@@ -249,11 +249,11 @@ class Drawing:
 
     @property
     def simulated(self) -> str:
-        """What a caption says of simulated participants."""
+        """The caption's sentence on simulated participants, if any."""
         return "SIMULATED participants, not people; " if self.study.simulated else ""
 
     def picture(
         self, title: str, caption: str, draw: Callable[[Look], Sheet], counts: Sequence[str] = ("",), numbers: str = ""
     ) -> Picture:
-        """Return the figure that ``draw`` draws in each form."""
+        """Return the figure that ``draw`` draws in each format."""
         return picture_of(self.study, self.block.id, self.name, title, caption, draw, self.forms, counts, numbers)

@@ -22,7 +22,7 @@ SESSION: Final = ["participant", "session"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proposal:
-    """A session that meets a rule, why, and what a person decided; ``by`` is "" while nobody has."""
+    """A session that meets a rule, the reason, and a person's decision; ``by`` is "" before the decision."""
 
     participant: str
     session: int
@@ -47,7 +47,7 @@ class PlannedExclusions:
 
 
 def planned_exclusions(study: Study, results: Results) -> PlannedExclusions | None:
-    """Return the sessions that meet a rule and the conclusions both ways; None if no session does."""
+    """Return the sessions that meet a rule and the conclusions with and without them; None if no session does."""
     proposed = proposals(study, results)
     if not proposed:
         return None
@@ -61,7 +61,7 @@ def planned_exclusions(study: Study, results: Results) -> PlannedExclusions | No
 
 
 def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
-    """Return the sessions that meet a rule of the study, or answer below chance, with what was decided about each.
+    """Return the sessions that meet a rule or answer below chance, each with the decision about it.
 
     Without ``results`` no threshold is known.
     """
@@ -143,7 +143,7 @@ def _fast(study: Study, limit: float | None) -> _Rows:
 
 
 def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:
-    """Return the exclusions that are proposed and wait for a person; they have no time yet."""
+    """Return the proposed exclusions that await a decision; they have no time yet."""
     return tuple(
         Exclusion(
             participant=proposal.participant,

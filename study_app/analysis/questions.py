@@ -22,8 +22,9 @@ Numbers: TypeAlias = Mapping[str, Any]
 class Measure:
     """A measure.
 
-    ``of`` returns the numbers of a group of answers, by name: rows with ``response``, ``value`` and ``cannot_judge``.
-    ``cells`` returns the cells of a table's row by their headings; a measure without any lists its ``texts``.
+    ``of`` returns the numbers of a group of answers by name, from rows with ``response``, ``value`` and
+    ``cannot_judge``. ``cells`` returns the cells of a table row by heading; a measure without cells lists its
+    ``texts``.
     """
 
     id: str
@@ -32,12 +33,12 @@ class Measure:
 
 
 def given(answers: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers that were given, without those off the scale."""
+    """Return the answers without missing ones and those off the scale."""
     return answers[answers["response"].notna()]
 
 
 def counts_of_missing(answers: pd.DataFrame) -> dict[str, Any]:
-    """Return how many answers and participants there are, and how many answers are missing or off the scale."""
+    """Return the numbers of answers, participants, missing answers, and answers off the scale."""
     valid = given(answers)
     cannot_judge = int(answers["cannot_judge"].sum())
     return {
@@ -141,12 +142,12 @@ _ONE: Final = ["participant", "session", "trial"]
 
 
 def question_results(study: Study) -> tuple[QuestionResult, ...]:
-    """Return the numbers of every question, in the order of the session."""
+    """Return the numbers of every question in session order."""
     return tuple(_question_result(study, asked) for asked in study.others.questions)
 
 
 def score_results(study: Study) -> tuple[ScoreResult, ...]:
-    """Return every score, in the order of the session."""
+    """Return every score in session order."""
     return tuple(_score(study, asked) for asked in study.others.scores)
 
 
@@ -170,7 +171,7 @@ def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
 
 
 def _groups(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str | None, str, pd.DataFrame]]:
-    """Yield the answers about each setting with code and name; all, of a form that is asked once."""
+    """Yield the answers about each setting with code and name, or all answers in a form that is asked once."""
     if not where.settings:
         yield None, "All", answers
     for setting in where.settings:
@@ -178,7 +179,7 @@ def _groups(where: QuestionPlace, answers: pd.DataFrame) -> Iterator[tuple[str |
 
 
 def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
-    """Return a row for every time that a questionnaire was answered: ``participant``, ``code`` and ``score``."""
+    """Return one row per completed questionnaire: ``participant``, ``code`` and ``score``."""
     rows = pd.concat([study.answers_to(question) for question in asked.questions])
     bounds = {question.id: question.bounds for question in asked.questions}
     scores: list[dict[str, Any]] = []

@@ -23,7 +23,7 @@ from study_app.protocol.orders.balance import Evenness
 
 @dataclass(frozen=True, slots=True)
 class NotTested:
-    """What is not there, and why: while the key is sealed, or for good."""
+    """A missing result and the reason: only while the key is sealed, or permanently."""
 
     what: str
     why: str
@@ -31,9 +31,9 @@ class NotTested:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Delivered:
-    """How far what was shown under one setting differed from what was asked for; ms, over trials.
+    """The differences between delivered and requested delays in one setting, in ms over trials.
 
-    Of ``judged`` trials it is known whether they kept to the protocol's limits of timing; ``valid`` ones did.
+    For ``judged`` trials it is known whether they met the protocol's timing limits; ``valid`` ones did.
     """
 
     block: str
@@ -55,12 +55,12 @@ Progress: TypeAlias = Callable[[str, float], object]
 
 
 def silent(_what: str, _share: float) -> None:
-    """Report nothing."""
+    """Report nothing; the default progress function."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Failure:
-    """A part (``what``, of a block or of none) that could not be computed: the error, and where the program met it."""
+    """A part (``what``, of a block or of none) that could not be computed: the error and its location."""
 
     what: str
     error: str
@@ -69,7 +69,7 @@ class Failure:
 
     @property
     def why(self) -> str:
-        """What a report says in the place of the part."""
+        """The text that replaces the part in a report."""
         if not self.where:
             return f"its computation failed: {self.error}"
         return f"its computation failed ({self.error}; {self.where}); this is a fault of the program, please report it"
@@ -79,7 +79,7 @@ class Failure:
 
 
 class Ended(BaseException):
-    """The evaluation is to end: what a progress function raised is no failure of the part that called it."""
+    """The evaluation is ended: an exception of the progress function, which is no failure of the calling part."""
 
     def __init__(self, error: BaseException) -> None:
         super().__init__(str(error))
@@ -87,13 +87,13 @@ class Ended(BaseException):
 
 
 class Failures:
-    """Collects the failures of one report."""
+    """The failures of one report."""
 
     def __init__(self, found: Iterable[Failure] = ()) -> None:
         self.found = list(found)
 
     def attempt(self, what: str, compute: Callable[[], T], *, block: str | None = None) -> T | Failure:
-        """Return what ``compute`` returns, or the failure, which is kept."""
+        """Return the result of ``compute``, or the failure, which is recorded."""
         try:
             return compute()
         except Exception as error:  # noqa: BLE001 - one part must not take the report with it
@@ -106,7 +106,7 @@ class Failures:
             return failure
 
     def value(self, what: str, compute: Callable[[], T], empty: U) -> T | U:
-        """Return what ``compute`` returns, or ``empty`` where it fails."""
+        """Return the result of ``compute``, or ``empty`` if it fails."""
         computed = self.attempt(what, compute)
         return empty if isinstance(computed, Failure) else computed
 
@@ -132,13 +132,13 @@ class Tested:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockResult:
-    """What was found in one block.
+    """The results of one block.
 
-    ``settings`` are in their order, ``delays_ms`` theirs once known where the block compares delays. ``measures`` has a
-    row a setting and statement. ``findings`` are the values of what was tested, by the keys of the descriptors in
-    ``analysis.findings``. ``presentations`` are the fewest and the most single answers that one participant gave to a
-    statement on one setting; ``replicated_ms`` the delays that several conditions present; ``sessions`` the numbers of
-    the sessions; ``incomplete`` has of each statement the participants who miss an answer to it, if there are any.
+    ``settings`` are in order, ``delays_ms`` are their delays if the block compares delays and they are known.
+    ``measures`` has one row per setting and statement. ``findings`` are the tested values by the keys of the
+    descriptors in ``analysis.findings``. ``presentations`` are the least and greatest number of answers by one
+    participant to a statement in one setting; ``replicated_ms`` are delays that several conditions present;
+    ``sessions`` are session numbers; ``incomplete`` maps statements to participants with missing answers.
     """
 
     id: str
@@ -160,7 +160,7 @@ class BlockResult:
 
     @property
     def delays_ms(self) -> tuple[float, ...]:
-        """The delays asked for, in order, each once; empty while they are not known or where liquids are compared."""
+        """The requested delays in order without duplicates; empty if they are unknown or liquids are compared."""
         if self.kind != "delays" or not self.revealed:
             return ()
         return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
@@ -168,7 +168,7 @@ class BlockResult:
 
 @dataclass(frozen=True, slots=True)
 class GroupAnswers:
-    """The numbers of the answers about one setting, or of all where ``code`` is None."""
+    """The numbers of the answers about one setting, or (``code`` None) of all."""
 
     code: str | None
     name: str
@@ -177,9 +177,9 @@ class GroupAnswers:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionResult:
-    """A question asked after the trials of a block, or in a form: ``where`` is its id, ``title`` what people read.
+    """A question after the trials of a block or in a form: ``where`` is the place's id, ``title`` its display name.
 
-    ``measure`` and ``figure`` are the ids of what computes and draws its numbers.
+    ``measure`` and ``figure`` are the ids of the functions that compute and draw its numbers.
     """
 
     where: str
@@ -195,13 +195,13 @@ class QuestionResult:
 
     @property
     def n(self) -> int:
-        """How many answers there are."""
+        """The number of answers."""
         return sum(int(group.numbers["n"]) for group in self.groups)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScoreResult:
-    """A score of a questionnaire: number, mean, standard deviation and range over its answers, by setting."""
+    """A score of a questionnaire: number, mean, standard deviation and range of its values, by setting."""
 
     where: str
     title: str
@@ -216,15 +216,15 @@ Summary: TypeAlias = Literal["share", "mean", "geometric mean", "settings"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelsResult:
-    """A block of levels.
+    """The result of a block of levels.
 
-    ``summary`` says how the answers at a level are summarised, ``counts`` what a share is of ("correct"); ``vary`` is
-    the varied number, ``quantity`` its name in words, ``unit`` its unit, ``level_kind`` what a level is (weber,
-    difference, value), all None where conditions are compared; ``guess_rate`` is the share at chance, ``bounds`` are
-    the ends of a scale; ``own_units``: each participant chose the unit of the numbers named, which group intervals
-    leave out; ``statistics`` are the rows of each statistic in `analysis.levels` by its key; ``family`` is the
-    psychometric function of the thresholds; ``adaptive``: answers chose the levels; ``device`` are the device's own
-    dynamics, None where they were not measured. Without the key only ``times`` are known.
+    ``summary`` is the kind of summary of the answers at a level, ``counts`` the counted answers of a share ("correct");
+    ``vary`` is the varied number, ``quantity`` its display name, ``unit`` its unit, ``level_kind`` the kind of level
+    (weber, difference, value), all None if conditions are compared; ``guess_rate`` is the share at chance, ``bounds``
+    are the ends of a scale; with ``own_units`` each participant chose the unit of the estimates, which group intervals
+    leave out; ``statistics`` are the rows of each statistic in `analysis.levels` by its key; ``family`` is the family
+    of psychometric functions; ``adaptive`` means that answers chose the levels; ``device`` are the device's own
+    dynamics, None if they were not measured. Without the key only ``times`` are known.
     """
 
     block: str
@@ -251,10 +251,10 @@ class LevelsResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContrastSide:
-    """One of the two that a hypothesis compares: the number of each participant, and their mean with its interval.
+    """One side of a hypothesis: the number of each participant, and their mean with its interval.
 
-    The mean is that of the test: of logarithms where a ratio is tested, with the weights of the group means. ``sd`` is
-    the standard deviation between participants, of logarithms where a ratio is tested.
+    The mean is that of the test: of logarithms for a ratio, with the weights of the group means. ``sd`` is the standard
+    deviation between participants, of logarithms for a ratio.
     """
 
     name: str
@@ -267,15 +267,15 @@ class ContrastSide:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContrastResult(Outcome):
-    """The test of what is ``compared``; ``ratio``: the effect is first ÷ second, otherwise first − second.
+    """The test of the ``compared`` quantity; the effect is first ÷ second with ``ratio``, otherwise first − second.
 
-    ``n`` participants are compared; ``left_out`` are the others with the reasons. ``higher`` is how many of those
-    compared have a higher number in the first; None between groups. ``equivalent`` says whether the effect is shown to
-    stay within the study's bound, by a ``p_equivalent`` that is corrected over the hypotheses with one; None where it
-    has none. ``not_excluded`` is then the largest share of people that may differ by more, by its 95 % interval.
-    ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the differences within
-    participants; ``standardised`` is d_z or g, ``ordinal`` Cliff's delta of answers to a statement, and
-    ``bayes_factor`` how much likelier the numbers are under a difference than under none.
+    ``n`` participants are compared; ``left_out`` are the others with the reasons. ``higher`` is the number of
+    participants with a higher number in the first; None between groups. ``equivalent`` tells whether the effect is
+    shown to lie within the study's bound, by ``p_equivalent``, which is corrected over the hypotheses with a bound;
+    None without a bound. ``not_excluded`` is then the upper limit of the 95 % interval of the share of participants
+    that differ by more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the
+    differences within participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a
+    statement, and ``bayes_factor`` the ratio of the likelihoods with and without a difference.
     """
 
     contrast: Contrast
@@ -299,10 +299,10 @@ class ContrastResult(Outcome):
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """All that was found in a study; ``failures`` are the parts that could not be computed.
+    """All results of a study; ``failures`` are the parts that could not be computed.
 
     ``questions`` and ``scores`` are the answers to questions other than statements, ``levels`` the blocks of levels,
-    ``contrasts`` the study's hypotheses; JSON omits them where there are none.
+    ``contrasts`` the study's hypotheses; JSON omits them if they are empty.
     """
 
     decided: Decided
@@ -332,7 +332,7 @@ VERDICTS_MEAN: Final = (
 
 
 def beyond(tested: Equivalence) -> str:
-    """Return how many participants differ by more than the bound, and the interval of their share."""
+    """Return the number of participants who differ by more than the bound, with the interval of their share."""
     if tested.beyond is None:
         return "–"
     ends = tested.beyond.interval
@@ -340,17 +340,17 @@ def beyond(tested: Equivalence) -> str:
 
 
 def settings_noun(found: BlockResult | Block) -> str:
-    """Return what the settings of a block are called."""
+    """Return the noun for a block's settings."""
     return found.kind.removesuffix("s") if found.revealed else "setting"
 
 
 def short(result: BlockResult, item: str) -> str:
-    """Return the few words for a statement."""
+    """Return the short text of a statement."""
     return next(one.short for one in result.items if one.id == item)
 
 
 def name(result: BlockResult, code: str) -> str:
-    """Return what a setting is called: a delay by its milliseconds alone, since its block has one liquid."""
+    """Return the name of a setting; only the delay in ms in a block of delays, which has one liquid."""
     for setting, text in zip(result.settings, result.names, strict=True):
         if setting.code == code:
             return ms(setting.delay_ms or 0.0) if result.delays_ms else text
@@ -358,7 +358,7 @@ def name(result: BlockResult, code: str) -> str:
 
 
 def lead(result: BlockResult) -> str:
-    """Return how sentences about a block begin."""
+    """Return the introductory phrase of sentences about a block."""
     return f"{result.title} ({settings_noun(result)}s)" if result.revealed else result.title
 
 
@@ -369,7 +369,7 @@ def statistic(outcome: Outcome) -> str:
 
 
 def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
-    """Return how many presentations an answer stands for, and what became of sessions; empty for one of each."""
+    """Return sentences on repeated presentations and sessions; empty if there is one of each."""
     fewest, most = result.presentations
     lines = []
     if result.replicated_ms:
@@ -393,12 +393,12 @@ def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
 
 
 def least(alpha: float, bound: float) -> str:
-    """Return how many participants equivalence of statements needs at least."""
+    """Return the minimum number of participants for equivalence of statements."""
     return f"at least {fewest(alpha, bound)} participants"
 
 
 def enough(alpha: float, bound: float) -> str:
-    """Return how many participants equivalence of statements needs at least, and why."""
+    """Return a sentence on the minimum number of participants for equivalence of statements, and its reason."""
     share = minority(bound, STEPS)
     return (
         f"{least(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
@@ -408,7 +408,7 @@ def enough(alpha: float, bound: float) -> str:
 
 
 def test_name(outcome: Outcome) -> str:
-    """Return a test as a sentence names it."""
+    """Return the name of a test within a sentence."""
     return {
         "Friedman": "Friedman's test",
         "Wilcoxon signed ranks": "Wilcoxon's signed-rank test",
@@ -418,7 +418,7 @@ def test_name(outcome: Outcome) -> str:
 
 
 def incomplete_words(result: BlockResult) -> str:
-    """Return which participants tests over all settings leave out, in a sentence."""
+    """Return a sentence on participants excluded from tests over all settings."""
     statements: dict[str, list[str]] = {}
     for item, people in result.incomplete.items():
         for person in people:
@@ -432,7 +432,7 @@ def incomplete_words(result: BlockResult) -> str:
 
 
 def missing(result: BlockResult) -> tuple[str, ...]:
-    """Return what was not computed, and why, a sentence for each reason."""
+    """Return what was not computed, one sentence per reason."""
     reasons: dict[str, list[str]] = {}
     for not_tested in result.absent:
         reasons.setdefault(not_tested.why, []).append(not_tested.what)

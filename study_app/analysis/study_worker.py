@@ -51,7 +51,7 @@ _EVALUATION: Final = 0.7
 
 
 def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
-    """Carry out an order; ``stop`` is asked again and again whether to give up."""
+    """Carry out an order; ``stop`` is polled to see whether to cancel."""
     match order:
         case FindStudies():
             send(StudiesFound(tuple(_studies(order.results))))
@@ -73,7 +73,7 @@ def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
 
 
 def _studies(results: Path) -> Iterator[StudyAt]:
-    """Yield the studies' folders under ``results``, which need not exist."""
+    """Yield the study folders under ``results``, which need not exist."""
     try:
         folders = list(study_folders(results))
     except FileNotFoundError:
@@ -97,7 +97,7 @@ def _studies(results: Path) -> Iterator[StudyAt]:
 
 
 def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
-    """Tell of the sessions, then of the study, then draw; once the key is open, evaluate and draw the rest."""
+    """Report the sessions and the study, then draw; once the key is open, evaluate and draw the rest."""
     send(Progress("reading sessions", 0.0))
     opened = reveals_of(folder) if has_opened_keys(folder) else ()
     send(SessionsFound(folder, tuple(participants_of(folder)), all_exclusions(folder), opened[-1] if opened else None))
@@ -129,7 +129,7 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
 
 def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> Iterator[Picture]:
-    """Draw the figures of questions that no block of statements holds, and yield them."""
+    """Draw and yield the figures of questions outside blocks of statements."""
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
     from study_app.analysis.questions import question_results  # noqa: PLC0415
 
@@ -191,7 +191,7 @@ def _study_found(study: Study) -> StudyFound:
 
 
 def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[], bool]) -> None:
-    """Test everything, then draw again what that adds to, and what only then can be drawn: the first page on top.
+    """Run all tests, then redraw the figures that depend on them, the first page first.
 
     ``drawn`` are the figures of questions.
     """

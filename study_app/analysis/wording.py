@@ -42,7 +42,7 @@ def all_of(number: int, noun: str) -> str:
 
 
 def number(value: float | None, decimals: int = 2) -> str:
-    """Return a number with so many decimals, fewer beyond `_DIGITS` digits, and a real minus sign; a dash for None."""
+    """Return a number with ``decimals`` decimals (at most `_DIGITS` digits) and a minus sign; a dash for None."""
     if value is None:
         return "–"
     whole = len(f"{abs(value):.0f}") if abs(value) >= 1 else 0
@@ -56,7 +56,7 @@ def significant(value: float) -> str:
 
 
 def p_value(p: float | None) -> str:
-    """Return a p as journals print it: .023, < .001, > .999; a dash where there is none."""
+    """Return a p value as journals print it: .023, < .001, > .999; a dash for None."""
     if p is None:
         return "–"
     if p < 0.001:
@@ -71,7 +71,7 @@ def p_equals(p: float) -> str:
 
 
 def interval(ends: Ends | None, decimals: int = 2) -> str:
-    """Return an interval in brackets; a dash where there is none."""
+    """Return an interval in brackets; a dash for None."""
     return "–" if ends is None else f"[{number(ends.low, decimals)}, {number(ends.high, decimals)}]"
 
 
@@ -83,7 +83,7 @@ def percent(share: float) -> str:
 
 
 def listed(words: Sequence[str]) -> str:
-    """Return "a, b and c"."""
+    """Join words: "a, b and c"."""
     return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 

@@ -28,7 +28,7 @@ class ReadStudy:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeaveOut:
-    """Leave a session or a trial out (see ``store.exclusions.exclude``)."""
+    """Exclude a session or a trial (see ``store.exclusions.exclude``)."""
 
     folder: Path
     participant: str
@@ -40,7 +40,7 @@ class LeaveOut:
 
 @dataclass(frozen=True, slots=True)
 class TakeBack(LeaveOut):
-    """Take back that a session or a trial is left out, or keep a session that meets a ``rule``."""
+    """Reverse the exclusion of a session or a trial, or keep a session that meets a ``rule``."""
 
     rule: str = ""
 
@@ -76,7 +76,7 @@ Order: TypeAlias = FindStudies | ReadStudy | LeaveOut | TakeBack | OpenKey | Wri
 
 @dataclass(frozen=True, slots=True)
 class StudyAt:
-    """A study's folder, what its first session is, and when the last one was begun [s since the epoch]."""
+    """A study's folder, the type of its first session, and the start of the last one [s since the epoch]."""
 
     folder: Path
     simulated: bool
@@ -86,14 +86,14 @@ class StudyAt:
 
 @dataclass(frozen=True, slots=True)
 class StudiesFound:
-    """The studies under a results folder, in the order of their names."""
+    """The studies in a results folder, sorted by name."""
 
     studies: tuple[StudyAt, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class SessionsFound:
-    """The sessions of a study as rows of ``store.tables.study_files``, exclusions, and how the key was last opened."""
+    """The sessions of a study as rows of ``store.tables.study_files``, exclusions, and the last opening of the key."""
 
     folder: Path
     rows: tuple[dict[str, Any], ...]
@@ -105,8 +105,8 @@ class SessionsFound:
 class StudyFound:
     """A study that could be read.
 
-    ``trials`` are the main trials of each session (participant, number): number and the words for it, by code while
-    the key is sealed. ``doubts`` are files not as recorded. ``colours`` are those of figures by what they are for.
+    ``trials`` are the main trials of each session (participant, number): number and description, by code while the key
+    is sealed. ``doubts`` are files that differ from their recorded state. ``colours`` are those of figures by purpose.
     """
 
     name: str
@@ -121,17 +121,17 @@ class StudyFound:
 
 @dataclass(frozen=True, slots=True)
 class Proposed:
-    """The exclusions that rules propose and nobody has decided; they have no time yet."""
+    """The exclusions that rules propose and that await a decision; they have no time yet."""
 
     exclusions: tuple[Exclusion, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureDrawn:
-    """A figure as SVG; one of an earlier ``name`` gives way. Without ``svg``, ``caption`` says why there is none.
+    """A figure as SVG, which replaces an earlier one of the same ``name``.
 
-    ``numbers`` are what it shows, as lines with tabs. One of the first page has the ``question`` that it answers, the
-    ``verdict`` and the ``answer`` in sentences.
+    Without ``svg``, ``caption`` gives the reason. ``numbers`` are its data as tab-separated lines. A figure of the
+    first page has the ``question`` that it answers, the ``verdict`` and the ``answer`` as sentences.
     """
 
     name: str
@@ -146,14 +146,14 @@ class FigureDrawn:
 
 @dataclass(frozen=True, slots=True)
 class FirstPage:
-    """The names of the figures of the first page, in its order."""
+    """The names of the figures of the first page in order."""
 
     names: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """What is being done, and which share of all is done (0 to 1)."""
+    """The current activity, and the share of all work that is done (0 to 1)."""
 
     what: str
     share: float
@@ -161,7 +161,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """An order was carried out: the files written, and what to be warned of."""
+    """A completed order: the written files, and warnings."""
 
     files: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -34,7 +34,7 @@ _DELAY_PREFIX: Final = "D"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Item:
-    """One statement: its id, its words, and a few words for figures."""
+    """One statement: its id, its text, and a short text for figures."""
 
     id: str
     text: str
@@ -43,11 +43,11 @@ class Item:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """What was presented under a code; all but the code is None until the key is opened.
+    """The condition presented under a code; all other fields are None until the key is opened.
 
-    ``label`` is the item that names what was felt, where one does, ``link`` how its force was sent if not promptly,
-    ``view`` what was seen, empty for the drawn tank. A track ("8/1") has neither liquid nor delay, but the condition
-    ``of`` which it varies a number.
+    ``label`` is the item that names the liquid, if there is one, ``link`` describes a delayed force, ``view`` the
+    displayed view (empty for the drawn tank). A track ("8/1") has neither liquid nor delay, but the condition ``of``
+    whose number it varies.
     """
 
     code: str
@@ -61,17 +61,17 @@ class Setting:
 
     @property
     def standard(self) -> str | None:
-        """What a track's comparisons are compared with; None of a condition, and of a track without a standard."""
+        """The standard of a track's comparisons; None for a condition and for a track without a standard."""
         standard, is_track, _ = (self.condition or "").partition("/")
         return standard or None if is_track else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """A main block with a questionnaire: ``settings`` in code order, once known in the order of the conditions.
+    """A main block with a questionnaire; ``settings`` are in code order or, once known, in condition order.
 
-    ``kind`` is what the block compares, as its receipt says. ``labels`` name the seven levels, lowest first;
-    ``cannot_judge`` is the answer off the scale, or None.
+    ``kind`` is the kind of comparison recorded in the receipt. ``labels`` are the names of the seven points, lowest
+    first; ``cannot_judge`` is the answer off the scale, or None.
     """
 
     id: str
@@ -84,24 +84,24 @@ class Block:
 
     @property
     def codes(self) -> tuple[str, ...]:
-        """The codes of the settings, in their order."""
+        """The codes of the settings in order."""
         return tuple(setting.code for setting in self.settings)
 
     @property
     def columns(self) -> dict[str, int]:
-        """The column of each code in tables of answers: conditions of one delay are replicates of it, in one column."""
+        """The column of each code in tables of answers; conditions with the same delay are replicates in one column."""
         if self.kind == "delays" and self.revealed:
             return {setting.code: self.delays_ms.index(setting.delay_ms or 0.0) for setting in self.settings}
         return {code: place for place, code in enumerate(self.codes)}
 
     @property
     def delays_ms(self) -> tuple[float, ...]:
-        """The delays of the settings, each once, shortest first; 0 while they are not known."""
+        """The unique delays of the settings in ascending order; (0,) while they are unknown."""
         return tuple(sorted({setting.delay_ms or 0.0 for setting in self.settings}))
 
     @property
     def codes_as_dealt(self) -> tuple[str, ...]:
-        """The codes of the settings in the order of the codes."""
+        """The codes in ascending order, independent of conditions."""
         return tuple(sorted(self.codes, key=lambda code: (len(code), code)))
 
     @property
@@ -110,12 +110,12 @@ class Block:
         return all(setting.condition is not None for setting in self.settings)
 
     def name(self, setting: Setting) -> str:
-        """Return what a figure calls a setting."""
+        """Return the name of a setting in figures."""
         return setting_name(setting, self.settings)
 
 
 def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
-    """Return what the opened key says of every code: (block id, code) → setting."""
+    """Return the settings that the opened key defines: (block id, code) → setting."""
     return {
         (block, code): _setting(key, block, code, presented)
         for block, codes in key.codes.items()
@@ -124,7 +124,7 @@ def settings_of(key: Key) -> dict[tuple[str, str], Setting]:
 
 
 def _setting(key: Key, block: str, code: str, presented: str) -> Setting:
-    """Return what a code stands for: a condition, or a track of a design such as "8/1", with its standard."""
+    """Return the setting of a code: a condition, or a track of a design such as "8/1", with its standard."""
     conditions = key.tables["conditions"]
     if presented in conditions:
         return _of_condition(conditions[presented], code, presented)
@@ -151,7 +151,7 @@ def _of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting
 
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
-    """Read the main blocks that ask something, in the order of the session, from a protocol as a receipt holds it."""
+    """Return the main blocks with questions, in session order, from the protocol in a receipt."""
     asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
     return tuple(
         _block(protocol, block, spoken(protocol), key)
@@ -161,12 +161,12 @@ def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ..
 
 
 def _statements(protocol: Mapping[str, Any], block: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """Return the statements of a block's questionnaire, which have no kind."""
+    """Return the statements of a block's questionnaire, which are the items without a kind."""
     return [item for item in protocol["questionnaires"][block["questionnaire"]]["items"] if "kind" not in item]
 
 
 def spoken(protocol: Mapping[str, Any]) -> str:
-    """Return the language of figures and tables: English where the study has it, otherwise its first."""
+    """Return the language of figures and tables: English if the study has it, otherwise its first language."""
     languages = list(protocol["study"]["languages"])
     return "en" if "en" in languages else str(languages[0])
 
@@ -194,7 +194,7 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
 
 
 def _settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tuple[Setting, ...]:
-    """Return the settings of a block: in code order, once known in the order of the conditions."""
+    """Return the settings of a block in code order or, once known, in condition order."""
     table = protocol["blocks"][block]
     if key is None:
         return tuple(Setting(code=code) for code in table["codes"])
@@ -202,7 +202,7 @@ def _settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tu
 
 
 def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
-    """Return what a figure calls a setting: its code, or its liquid and, where they differ, its view and delay."""
+    """Return the name of a setting in figures: its code, or its liquid with view and delay where these differ."""
     if setting.liquid is None or setting.delay_ms is None:
         return setting.code if setting.standard is None else f"Standard {setting.standard}"
     liquid = setting.liquid.replace("_", " ")
@@ -213,9 +213,9 @@ def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
 
 
 def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tuple[tuple[Setting, ...], Kind]:
-    """Return the settings by name: delays ascending, others in the order of the protocol's conditions.
+    """Return the settings by name: delays in ascending order, others in the protocol's order.
 
-    Without ``kind``, in receipts of earlier versions, one liquid under several delays is a block of delays.
+    Without ``kind``, as in receipts of earlier versions, one liquid with several delays is a block of delays.
     """
     known = settings_of(key)
     settings = [known[block, code] for code in codes]
@@ -233,7 +233,7 @@ def _opened(key: Key, block: str, codes: Sequence[str], kind: Kind | None) -> tu
 
 
 def published_words(published: Published) -> str:
-    """Return a published value with what is known of it."""
+    """Return a published value with its conditions as text."""
     known = [
         *([] if published.standard is None else [f"standard {published.standard:g}"]),
         *([] if published.low is None or published.high is None else [f"{published.low:g} to {published.high:g}"]),
@@ -245,16 +245,16 @@ def published_words(published: Published) -> str:
 
 
 def compared_percent(published: Iterable[Published]) -> float | None:
-    """Return the percentage of successes at which published thresholds were measured; None: unknown, or several."""
+    """Return the percentage correct at which published thresholds were measured; None if unknown or not unique."""
     percents = {one.percent for one in published if one.measure in {"weber", "threshold"}}
     return percents.pop() if len(percents) == 1 else None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnDynamics:
-    """The device's own damping [N·s/m], friction [N] and mass [kg], as ``devices bench`` measured them.
+    """The device's own damping [N·s/m], friction [N] and mass [kg], as measured by ``devices bench``.
 
-    Means over axes, and over those ``sessions`` of all ``of`` whose receipts record them.
+    They are means over axes and over the ``sessions`` (out of ``of``) whose receipts record them.
     """
 
     damping_nspm: float
@@ -268,9 +268,9 @@ class OwnDynamics:
 class LevelBlock:
     """A block with a design.
 
-    ``stimulus`` is what it varies, ``method`` how its levels were chosen: None where it compares conditions, and while
-    the key is sealed; ``published`` are the values of other studies that the protocol compares it with;
-    ``wrong_most`` is the share of incorrect answers to catch trials that is permitted, None without catch trials.
+    ``stimulus`` is the varied quantity, ``method`` the rule for choosing levels: None for a comparison of conditions
+    and while the key is sealed. ``published`` are values from other studies for comparison; ``wrong_most`` is the
+    permitted share of incorrect catch trials, None without catch trials.
     """
 
     id: str
@@ -290,18 +290,18 @@ class LevelBlock:
 
     @property
     def counts(self) -> str:
-        """What the share of answers at a level is of."""
+        """The name of the answers that are counted at a level, for example "correct"."""
         return success_name(self.design, self.stimulus)
 
     @property
     def standards_rove(self) -> bool:
-        """Whether trials of several standards alternate."""
+        """Whether trials of several standards are interleaved."""
         standards = {setting.standard for setting in self.settings}
         return len(standards) > 1 and self.method is not None and self.method.order == "interleaved"
 
     @property
     def assumed(self) -> Assumed | None:
-        """What is assumed about its psychometric function; None where no answer enters one, or the key is sealed."""
+        """The assumptions about its psychometric function; None if there is none, or the key is sealed."""
         if self.stimulus is None or not rises(self.stimulus, self.design):
             return None
         if self.method is None:
@@ -310,12 +310,12 @@ class LevelBlock:
 
 
 def contrasts_of(key: Key) -> tuple[Contrast, ...]:
-    """Return the contrasts that the opened key holds."""
+    """Return the contrasts in the opened key."""
     return tuple(Contrast.model_validate(one) for one in key.tables.get("analysis", {}).get("contrasts", ()))
 
 
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
-    """Return the blocks with a design of the protocol in a receipt, in the order of the session; ``key`` is open."""
+    """Return the blocks with a design from a receipt's protocol, in session order; the key must be open."""
     steps = [step for step in every_step_of(protocol) if "slots" in protocol["blocks"].get(step, {})]
     whole = complete_protocol(protocol, key) if key is not None and steps else None
     return tuple(_level_block(protocol, step, key, whole) for step in steps)
@@ -350,12 +350,11 @@ Spending: TypeAlias = Literal["obrien-fleming", "pocock"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decided:
-    """The protocol's table ``analysis``.
+    """The ``analysis`` table of the protocol.
 
-    ``made`` is False where there was none; ``changed`` where sessions were run under different ones, of which this is
-    the first: in both cases everything found is exploratory. Where ``looks`` are planned, ``alpha`` is that of the
-    number ``look`` of them (0: before the first one, where everything is exploratory, too), and ``planned_alpha`` that
-    of all.
+    ``made`` is False without such a table; ``changed`` is True if sessions were run with different ones, of which this
+    is the first: in both cases all findings are exploratory. With planned ``looks``, ``alpha`` is that of look number
+    ``look`` (0: before the first one, where findings are also exploratory), and ``planned_alpha`` the overall one.
     """
 
     made: bool
@@ -375,33 +374,33 @@ class Decided:
 
     @property
     def binding(self) -> bool:
-        """Whether it was decided before the first session, and kept to."""
+        """Whether it was fixed before the first session and not changed."""
         return self.made and not self.changed and self.look != 0
 
     @property
     def alphas(self) -> tuple[float, ...]:
-        """The significant p at each planned look."""
+        """The significance level at each planned look."""
         from study_app.analysis.statistics.outcome import alpha_of_looks  # noqa: PLC0415 - loads scipy
 
         alpha = self.planned_alpha or self.alpha
         return alpha_of_looks(self.looks, alpha, self.spending) if self.looks else (alpha,)
 
     def at(self, n: int) -> Self:
-        """Return what holds with so many participants: at the last planned look that they reach."""
+        """Return the decisions that apply at this sample size: those of the last planned look that it reaches."""
         look = sum(planned <= n for planned in self.looks)
         alpha = self.alphas[max(look, 1) - 1]
         return replace(self, alpha=alpha, look=look, planned_alpha=self.alpha) if self.looks else self
 
     def alpha_words(self) -> str:
-        """Return the planned alpha, and what is left of it at a look."""
+        """Return the planned alpha and the alpha that applies at the current look."""
         if self.planned_alpha is None:
             return f"{self.alpha:g}"
         return f"{self.planned_alpha:g} over all looks, {significant(self.alpha)} at this one"
 
     def look_words(self, n: int) -> str:
-        """Return which planned look a study of ``n`` participants is at, in sentences; nothing where none is planned.
+        """Return sentences on the planned look at ``n`` participants; empty if no looks are planned.
 
-        A number that is not planned is called unplanned, with the error rate of testing at every number.
+        An unplanned look is called unplanned, with the error rate of testing after every participant.
         """
         if self.look is None:
             return ""
@@ -425,11 +424,11 @@ class Decided:
         )
 
     def is_primary(self, item: str) -> bool:
-        """Whether a statement is one that the study is about."""
+        """Whether a statement is a primary outcome of the study."""
         return self.binding and (not self.primary or item in self.primary)
 
     def direction(self, item: str) -> _Direction | None:
-        """Return where answers to a statement were expected to go as delay grows; None: nothing was expected."""
+        """Return the expected direction of answers to a statement with increasing delay; None if none is stated."""
         return "increasing" if item in self.rising else "decreasing" if item in self.falling else None
 
 
@@ -454,12 +453,12 @@ NOTHING_DECIDED: Final = Decided(
 
 
 def decisions(protocol: Protocol) -> Decided:
-    """Return what a protocol decides, the defaults where it has no table."""
+    """Return the analysis decisions of a protocol, with defaults if it has no table."""
     return read_decided([(protocol.analysis or Analysis()).model_dump(mode="json")])
 
 
 def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
-    """Return what the sessions' receipts say was decided."""
+    """Return the analysis decisions recorded in the sessions' receipts."""
     first = tables[0]
     changed = any(table != first for table in tables)
     if first is None:
@@ -493,9 +492,9 @@ START: Final = "0"
 
 @dataclass(frozen=True, slots=True)
 class QuestionPlace:
-    """Where questions were asked: after the trials of a block, with its ``settings``, or in a form.
+    """The place of questions: after the trials of a block, with its ``settings``, or in a form.
 
-    A form that sessions have several times has a setting for each block that it comes after, others have none.
+    A form that is repeated within a session has one setting for each block that it follows; other forms have none.
     """
 
     id: str
@@ -504,13 +503,13 @@ class QuestionPlace:
     settings: tuple[Setting, ...]
 
     def name(self, setting: Setting) -> str:
-        """Return what tables and figures call a setting."""
+        """Return the name of a setting in tables and figures."""
         return setting.label or "" if self.is_form else setting_name(setting, self.settings)
 
 
 @dataclass(frozen=True, slots=True)
 class PlacedQuestion:
-    """A question, and where it was asked."""
+    """A question and the place where it is asked."""
 
     where: QuestionPlace
     question: Question
@@ -523,22 +522,22 @@ class PlacedQuestion:
 
     @property
     def text(self) -> str:
-        """Its words."""
+        """Its full text."""
         return self.context.text(self.question.text)
 
     @property
     def short(self) -> str:
-        """A few words for it."""
+        """Its short text."""
         return self.context.text(self.question.short)
 
     @property
     def levels(self) -> dict[str, str]:
-        """All answers with their words, where these are few."""
+        """All possible answers with their texts, if they are few."""
         return self.question.levels(self.context)
 
     @property
     def bounds(self) -> tuple[float, float] | None:
-        """The smallest and the largest number it can be answered with."""
+        """The smallest and the largest possible answer."""
         return self.question.bounds(self.context)
 
     @property
@@ -549,7 +548,7 @@ class PlacedQuestion:
 
 @dataclass(frozen=True, slots=True)
 class PlacedScore:
-    """A score of a questionnaire, with the questions that it is computed of."""
+    """A score of a questionnaire with its questions."""
 
     where: QuestionPlace
     name: str
@@ -560,7 +559,7 @@ class PlacedScore:
 
 @dataclass(frozen=True, slots=True)
 class OtherQuestions:
-    """What a study asked besides statements after trials."""
+    """The questions of a study other than statements after trials."""
 
     questions: tuple[PlacedQuestion, ...] = ()
     scores: tuple[PlacedScore, ...] = ()
@@ -570,7 +569,7 @@ NO_QUESTIONS: Final = OtherQuestions()
 
 
 def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuestions:
-    """Read them from a protocol as a receipt holds it, in the order of the session."""
+    """Return the other questions of the protocol in a receipt, in session order."""
     if protocol.get("format", 1) < 2:
         return NO_QUESTIONS
     questions: list[PlacedQuestion] = []

@@ -33,11 +33,11 @@ def aggregate(
     items: Sequence[str],
     excluded: Mapping[str, int] = MappingProxyType({}),
 ) -> pd.DataFrame:
-    """Summarise answers that count by setting and statement, in the order of ``codes`` and within it of ``items``.
+    """Summarise the valid answers by setting and statement, in the order of ``codes`` and then of ``items``.
 
     ``answers`` have ``participant``, ``code``, ``item``, ``response`` (1 to 7 or missing) and ``cannot_judge``;
-    ``presented`` is how often each setting was presented and its questionnaire due, ``excluded`` how often besides, in
-    trials that are left out. Returns ``COLUMNS``: numbers of no answer are NaN.
+    ``presented`` is how often each setting was presented with its questionnaire, ``excluded`` how often in excluded
+    trials. Returns ``COLUMNS``; statistics without answers are NaN.
     """
     groups = answers.groupby(["code", "item"], sort=False).indices
     filled = answers["response"].astype("Float64").to_numpy(na_value=np.nan)
@@ -85,7 +85,7 @@ class QuartilesOrNone(NamedTuple):
 
 
 def quartiles(values: Array) -> Quartiles:
-    """Return the quartiles of ``values`` (n,), leaving out NaN; NaN without any."""
+    """Return the quartiles of ``values`` (n,) without NaN; NaN if there are none."""
     valid = values[~np.isnan(values)]
     if not len(valid):
         return Quartiles(median=math.nan, q1=math.nan, q3=math.nan)
@@ -94,7 +94,7 @@ def quartiles(values: Array) -> Quartiles:
 
 
 def quartiles_or_none(values: Array) -> QuartilesOrNone:
-    """Return what `quartiles` does, with None in the place of NaN."""
+    """Return the result of `quartiles` with None instead of NaN."""
     found = quartiles(values)
     if math.isnan(found.median):
         return QuartilesOrNone(median=None, q1=None, q3=None)
@@ -102,17 +102,17 @@ def quartiles_or_none(values: Array) -> QuartilesOrNone:
 
 
 def number_or_none(value: Any) -> float | None:
-    """Return a cell of a table as a number, None where it is missing."""
+    """Return a table cell as a number, None if it is missing."""
     return None if pd.isna(value) else float(value)
 
 
 def presentations(
     answers: pd.DataFrame, participants: Sequence[str], columns: Mapping[str, int], item: str
 ) -> tuple[Array, Array]:
-    """Return every single answer to a statement (participants, settings, presentations), and its session alike.
+    """Return all answers to a statement (participants, settings, presentations), and their sessions (same shape).
 
-    ``columns`` maps codes to settings; codes of one column are presentations of one setting. In the order of sessions
-    and trials, NaN where there is none.
+    ``columns`` maps codes to columns; codes with the same column are presentations of one setting. They are ordered by
+    session and trial; missing answers are NaN.
     """
     chosen = answers[(answers["item"] == item) & answers["response"].notna()]
     order = [name for name in ("session", "trial") if name in chosen]
@@ -130,7 +130,7 @@ def presentations(
 
 
 def medians(values: Array) -> Array:
-    """Return the medians (participants, settings) of (participants, settings, presentations), NaN where none is."""
+    """Return the medians (participants, settings) of (participants, settings, presentations), NaN without answers."""
     if values.shape[2] == 1:
         return values[..., 0]
     there = ~np.isnan(values)
@@ -143,6 +143,6 @@ def medians(values: Array) -> Array:
 def by_participant(answers: pd.DataFrame, participants: Sequence[str], columns: Mapping[str, int], item: str) -> Array:
     """Return one value per participant and setting (participants, settings) for a statement: see `presentations`.
 
-    It is the median over repeated presentations, NaN where a participant gave no valid answer.
+    It is the median over repeated presentations, NaN if a participant gave no valid answer.
     """
     return medians(presentations(answers, participants, columns, item)[0])

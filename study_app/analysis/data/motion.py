@@ -45,7 +45,7 @@ REACH_DEFINITIONS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Targets:
-    """A task of reaching: ``centres_m`` (targets, 3) in the hand's frame, their radius and how long to stay."""
+    """The targets of a reaching task: ``centres_m`` (targets, 3) in the hand frame, radius and dwell time."""
 
     centres_m: Array
     radius_m: float
@@ -54,7 +54,7 @@ class Targets:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reach:
-    """One reach: its ``target``, when it was lit and when it was reached [s, from the trial's first sample]."""
+    """One reach: its ``target``, when the target was lit and when it was reached [s, from the trial's first sample]."""
 
     target: int
     lit_s: float
@@ -66,7 +66,7 @@ class Reach:
 
 
 def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> tuple[Reach, ...]:
-    """Return the completed reaches of a trial from times (n,) and places of the hand (n, 3), first sample to last."""
+    """Return the completed reaches of a trial from times (n,) and hand positions (n, 3)."""
     seconds = (times_ns - times_ns[0]) / 1e9 if len(times_ns) else np.zeros(0)
     movements = []
     for number, held in enumerate(_held(times_ns, positions_m, targets)):
@@ -88,7 +88,7 @@ def reaches(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -
 
 
 class _Held(NamedTuple):
-    """The samples at which a target was lit, entered for good, and reached."""
+    """The samples at which a target was lit, entered for the last time, and reached."""
 
     lit: int
     entered: int
@@ -96,7 +96,7 @@ class _Held(NamedTuple):
 
 
 def _held(times_ns: NDArray[np.int64], positions_m: Array, targets: Targets) -> Iterator[_Held]:
-    """Yield the samples of each target that was reached, in order."""
+    """Yield those samples for each target that was reached, in order."""
     dwell_ns = round(targets.dwell_s * 1e9)
     lit = number = 0
     while lit < len(times_ns):
@@ -120,7 +120,7 @@ def path_length_m(positions_m: Array) -> float:
 
 
 def submovements(seconds: Array, positions_m: Array) -> int:
-    """Return how many peaks the speed along a path (n, 3) at ``seconds`` (n,) has; at least 1."""
+    """Return the number of speed peaks along a path (n, 3) at ``seconds`` (n,); at least 1."""
     if len(seconds) < _SHORTEST:
         return 1
     rate_hz = (len(seconds) - 1) / (seconds[-1] - seconds[0])
@@ -133,7 +133,7 @@ def submovements(seconds: Array, positions_m: Array) -> int:
 
 
 def _overshoot_m(way: Array, targets: Targets, target: int) -> float:
-    """Return how far a path went beyond the far edge of its target, seen from the target before."""
+    """Return how far a path went beyond the far edge of its target, as seen from the previous target."""
     line = targets.centres_m[target] - targets.centres_m[target - 1]
     length = float(np.linalg.norm(line))
     if length == 0.0:
@@ -155,7 +155,7 @@ TRIAL_DEFINITIONS: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Moved:
-    """One measure under one setting: over ``n`` participants, each of whom counts by his or her median."""
+    """One measure in one condition: quartiles over ``n`` participants' medians."""
 
     block: str
     code: str
@@ -168,7 +168,7 @@ class Moved:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reached:
-    """The reaches of one counted trial, the first left out."""
+    """The reaches of one valid trial, without the first."""
 
     participant: str
     session: int
@@ -181,12 +181,11 @@ class Reached:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Performance:
-    """All measures. ``reaching`` are the blocks whose task is one of reaching: only there are there reaches.
+    """All movement measures; ``reaching`` are the blocks with a reaching task, the only ones with reaches.
 
-    ``trials`` of reaching count, of which ``recorded`` have a recording that was read.
-
-    ``unread`` says of the others why, a line each kind. Of ``judged`` trials it is known whether they kept to the
-    protocol's limits of timing; ``invalid`` ones did not, and are in the measures all the same.
+    Of the valid ``trials`` with reaching, ``recorded`` have a readable recording; ``unread`` gives the reasons for the
+    others, one line each. For ``judged`` trials it is known whether they met the protocol's timing limits; ``invalid``
+    ones did not but are included in the measures.
     """
 
     moved: tuple[Moved, ...]
@@ -199,17 +198,17 @@ class Performance:
     unread: tuple[str, ...]
 
     def medians(self, block: str) -> pd.DataFrame:
-        """Return each participant's median of every measure of reaches, by (code, participant)."""
+        """Return each participant's median of every reaching measure, by (code, participant)."""
         rows = [{**asdict(trial), **asdict(reach)} for trial in self.reached for reach in trial.found]
         return _medians(pd.DataFrame(rows, columns=["participant", "block", "code", *OF_REACHES]), block, OF_REACHES)
 
     def recorded_in(self, block: str) -> bool:
-        """Return whether there is any reach of a block."""
+        """Return whether a block has any reaches."""
         return any(trial.block == block for trial in self.reached)
 
 
 def performance(study: Study, each: Callable[[int, int], object] = lambda _done, _of: None) -> Performance:
-    """Measure the trials that count; ``each`` receives how many recordings of how many were read."""
+    """Measure the valid trials; ``each`` is called with the number of recordings read and the total."""
     rows = study.trials[study.trials["counted"]]
     tasks = {block.id: _targets(study.protocol, block) for block in study.blocks}
     where = tuple(name for name, targets in tasks.items() if targets is not None)
@@ -253,7 +252,7 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
 
 
 def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
-    """Return the targets of a block's task, None where it has none."""
+    """Return the targets of a block's task, None if it has none."""
     named = protocol.get("blocks", {}).get(block.id, {}).get("task")
     task = protocol.get("tasks", {}).get(named, {})
     if task.get("kind") != "reach":
@@ -262,7 +261,7 @@ def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
 
 
 def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached | str:
-    """Return the reaches of a trial, or why they are not known."""
+    """Return the reaches of a trial, or why they are unknown."""
     if reason := _why_not(folder, row):
         return reason
     try:
@@ -304,7 +303,7 @@ def _medians(rows: pd.DataFrame, block: str, measures: Sequence[str]) -> pd.Data
 
 
 def _quartiles(block: Block, rows: pd.DataFrame, measures: Sequence[str]) -> Iterator[Moved]:
-    """Yield the quartiles over participants of each one's median, by measure and setting; ``rows`` are of any block."""
+    """Yield the quartiles over participants of each one's median, by measure and setting."""
     medians = _medians(rows, block.id, measures)
     for measure in measures:
         for code in block.codes:

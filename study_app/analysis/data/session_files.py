@@ -46,9 +46,9 @@ _Whole: TypeAlias = NDArray[np.int64]
 
 
 def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, _Whole]:
-    """Read one table of many sessions, typed by the dictionary, ``n/a`` as missing; and how many rows each file has.
+    """Read one table of many sessions, typed by the dictionary, and the number of rows of each file.
 
-    Columns that the version which wrote a file did not have yet, or that are sealed, are missing.
+    Columns that are sealed, or that the program version of a file did not have, are missing, as are cells with ``n/a``.
     """
     values: dict[str, list[Any]] = {column.name: [] for column in columns}
     known: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
@@ -64,7 +64,7 @@ def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataF
 
 
 def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequence[str]], int]:
-    """Return the cells of a file by column, and how many rows it has."""
+    """Return the cells of a file by column, and its number of rows."""
     try:
         names, *rows = read_cells(read_regular(path))
     except OSError as error:
@@ -81,7 +81,7 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
 
 
 def _values(column: Column, texts: Sequence[str], known: dict[str, Any], path: Path) -> list[Any]:
-    """Return the values of a column in a file; ``known`` keeps the value of each text of all files."""
+    """Return the values of a column in a file; ``known`` caches the value of each text over all files."""
     for text in dict.fromkeys(texts):
         try:
             if text not in known:
@@ -117,7 +117,7 @@ def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy
 
 
 class Bench(NamedTuple):
-    """Damping, friction and mass in a receipt's bench, each the mean over its axes."""
+    """Damping, friction and mass from a receipt's bench measurement, each the mean over axes."""
 
     damping_nspm: float
     friction_n: float
@@ -126,10 +126,10 @@ class Bench(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Session:
-    """What was asked, what was answered, and the facts of the visit (``visit``: one row of ``Study.participants``).
+    """The questions, answers and facts of one session (``visit``: one row of ``Study.participants``).
 
-    ``own_dynamics`` are the device's own damping [N·s/m], friction [N] and mass [kg], means over axes; None where they
-    were not measured. ``device_velocity`` is whether the device measured its velocity, in place of the estimator.
+    ``own_dynamics`` are the device's own damping [N·s/m], friction [N] and mass [kg], means over axes; None if they
+    were not measured. ``device_velocity`` tells whether the device measured its velocity.
     """
 
     folder: SessionFolder
@@ -146,7 +146,7 @@ class Session:
 
     @property
     def questionnaire(self) -> tuple[tuple[str, tuple[str, ...], tuple[str, ...]], ...]:
-        """Block, codes and items, and forms with their items: what must be alike in sessions that are pooled."""
+        """Blocks with codes and items, and forms with items; these must be equal in pooled sessions."""
         blocks = ((block.id, block.codes_as_dealt, tuple(item.id for item in block.items)) for block in self.blocks)
         others = (
             (question.where.id, (question.id,), (question.question.kind_id,)) for question in self.others.questions
@@ -160,9 +160,9 @@ class Session:
 
 
 def read_session(folder: SessionFolder, key: Key | None, like: Session | None = None) -> Session:
-    """Read a session's receipt; ``key`` is the study's once it was opened.
+    """Read a session's receipt; ``key`` is the study's opened key, if any.
 
-    ``like`` is another session of the study: of what is the same in both one copy is kept.
+    ``like`` is another session of the study, with which equal values are shared to save memory.
     """
     receipt = document(folder.receipt)
     try:
@@ -213,9 +213,9 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
 
 
 def _missing(folder: SessionFolder) -> MissingTrials | None:
-    """Return the trials that were not delivered in a session with trials of intervals; None if its journal is damaged.
+    """Return the undelivered trials of a session with interval trials; None if its journal is damaged.
 
-    The tables may be sound although the journal is not; `doubts` reports it.
+    The tables may be valid although the journal is damaged; `doubts` reports it.
     """
     with contextlib.suppress(StoreError):
         return progress_of(journal.read(folder.journal)).missing_trials
@@ -237,7 +237,7 @@ def estimators_of(records: Sequence[Session]) -> str | None:
 
 
 def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
-    """Return the mean of what sessions know of the device's own dynamics; None where none knows them."""
+    """Return the mean of the device dynamics over sessions; None if no session recorded them."""
     known = [record.own_dynamics for record in records if record.own_dynamics is not None]
     if not known:
         return None
@@ -246,7 +246,7 @@ def mean_dynamics(records: Sequence[Session]) -> OwnDynamics | None:
 
 
 def _masking(answer: Mapping[str, Any] | None) -> str | None:
-    """Return how motors were masked in words, None where that was not asked."""
+    """Return the answer about masking of motor noise as text, None if it was not asked."""
     if answer is None:
         return None
     level = answer.get("noise_db")
@@ -254,9 +254,9 @@ def _masking(answer: Mapping[str, Any] | None) -> str | None:
 
 
 def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
-    """Read table ``name`` of sessions that were asked alike; rows in their order.
+    """Read table ``name`` of sessions with the same questionnaire, with rows in session order.
 
-    ``session_status`` and ``trials_missing`` of the row's session are added.
+    The columns ``session_status`` and ``trials_missing`` are added.
     """
     paths = [session.folder.table(session.study, name) for session in sessions]
     table, lengths = tables(paths, tables_of(sessions[0].protocol_format)[name])
@@ -272,7 +272,7 @@ def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
 
 
 def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Whole) -> None:
-    """Refuse rows that are not of the session whose file they stand in."""
+    """Raise an error if a row does not belong to the session of its file."""
     own: dict[str, list[Any]] = {
         "study": [session.study for session in sessions],
         "participant": [session.folder.participant for session in sessions],
@@ -291,7 +291,7 @@ def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.Dat
 
 
 def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd.DataFrame, lengths: _Whole) -> None:
-    """Refuse answers to what was not asked, and answers given twice."""
+    """Raise an error if an answer has no question, or was given twice."""
     blocks = sessions[0].blocks
     asked = {(block.id, code, item.id) for block in blocks for code in block.codes for item in block.items}
     asked |= {
@@ -324,16 +324,16 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
 
 
 def _place(lengths: _Whole, index: int) -> tuple[int, int]:
-    """Return the session of the row at ``index``, and the row's number in its file, the header's being 1."""
+    """Return the session of the row at ``index``, and the row's line number in its file."""
     ends = np.cumsum(lengths)
     which = int(np.searchsorted(ends, index, side="right"))
     return which, int(index - ends[which] + lengths[which]) + 2
 
 
 def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFrame:
-    """Return a table of sessions, or of trials, with ``excluded`` and ``exclusion_reason`` added.
+    """Return a table of sessions or trials with ``excluded`` and ``exclusion_reason`` added.
 
-    A session is left out with all its trials, a trial with all its attempts.
+    A session is excluded with all its trials, a trial with all its attempts.
     """
     if not listed:
         return table.assign(excluded=False, exclusion_reason=pd.Series(pd.NA, index=table.index, dtype="string"))
@@ -357,7 +357,7 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
 
 
 def check_there(study: StudyFolder, trials: pd.DataFrame, listed: Sequence[Exclusion]) -> None:
-    """Refuse a list that leaves out what is not there, such as a mistyped id: what was meant would count."""
+    """Raise an error if an excluded session or trial does not exist, for example because of a typing error."""
     sessions = {(session.participant, session.number) for session in study.sessions()}
     presented = set(zip(trials["participant"], trials["session"], trials["trial"], strict=True))
     for exclusion in listed:

@@ -80,12 +80,12 @@ def renamed(site: str, setting: Setting) -> Setting:
 
 
 def _all(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
-    """Return the settings of all sites, each once, in the order of the first site that has it."""
+    """Return the settings of all sites without duplicates, in order of first occurrence."""
     return tuple(dict.fromkeys(renamed(site, setting) for site, settings in each.items() for setting in settings))
 
 
 def _pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
-    """Return the blocks, which all sites have, with the settings of all sites."""
+    """Return the blocks, which are common to all sites, with the settings of all sites."""
     first = next(iter(sites.values()))
     return tuple(
         replace(block, settings=_all({site: blocks[place].settings for site, blocks in sites.items()}))
@@ -94,7 +94,7 @@ def _pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, .
 
 
 def _pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
-    """Return the other questions, which all sites were asked, with the settings of all sites."""
+    """Return the other questions, which are common to all sites, with the settings of all sites."""
 
     def where(wheres: Mapping[str, QuestionPlace]) -> QuestionPlace:
         settings = _all({site: where.settings for site, where in wheres.items()})
@@ -118,7 +118,7 @@ def _pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
 
 
 def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame:
-    """Return a table of a site, with the site in the participants' IDs and the merged study's codes."""
+    """Return a table of a site with the site in the participant IDs and the merged study's codes."""
     if "participant" not in table:
         return table
     table = table.assign(participant=f"{site}{DASH}" + table["participant"])
@@ -132,7 +132,6 @@ def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame
 
 
 def _pooled_dynamics(sites: Iterable[OwnDynamics | None], sessions: int) -> OwnDynamics | None:
-    """Return the mean of what the sessions of all sites know of their devices' own dynamics; None of nothing."""
     known = [site for site in sites if site is not None]
     if not known:
         return None
@@ -154,22 +153,19 @@ class Study:
     """All sessions of one study.
 
     ``responses`` and ``trials`` have the columns of ``store.columns``, with ``session_status``, ``excluded``,
-    ``exclusion_reason`` and ``counted`` added; ``participants`` has a row a session, with the last three
-    and its `MissingTrials`. ``blocks``
-    are the main blocks that ask something; ``settings`` says what every (block, code) stands for, and is empty while
-    the key is sealed; ``exclusions`` is what was decided to leave out, ``late`` what of it a person decided or
-    reversed after the key was opened; ``doubts`` are files that are not as they were
-    recorded, and are used as they are; ``kept`` is what a person decided not to leave out.
-    ``decided`` is what the protocol decided about the analysis, ``protocol`` the
-    first session's, as its receipt holds it. ``levels`` are the blocks with a design, ``intervals`` the
-    intervals of their trials; ``others`` are the questions that no block of statements holds;
-    ``answered`` has the rows of all questions as they were recorded, of which ``responses`` are those of statements;
-    ``own_dynamics`` are the device's, where receipts record a measurement; ``estimator`` names that of the velocity,
-    "device" where the device measured it; None where receipts do not say it. ``withdrawn`` is how many participants
-    withdrew, so that their data were erased. ``contrasts`` are the study's hypotheses and ``liquids`` its liquids'
-    tables, once the key is open. ``sites``
-    are the names of the sites of a merged study, whose participants are SITE-ID. ``with_below_chance``: answers below
-    chance are analysed, although no person has decided so.
+    ``exclusion_reason`` and ``counted`` added; ``participants`` has one row per session, with the last three and its
+    `MissingTrials`. ``blocks`` are the main blocks with questions; ``settings`` maps every (block, code) to its
+    condition, and is empty while the key is sealed; ``exclusions`` are all exclusions, ``late`` those that a person
+    decided or reversed after the key was opened; ``kept`` are sessions that a person decided to keep; ``doubts`` are
+    files that differ from their recorded state but are used. ``decided`` is the protocol's analysis plan, ``protocol``
+    the first session's, from its receipt. ``levels`` are the blocks with a design, ``intervals`` the intervals of their
+    trials; ``others`` are the questions outside blocks of statements; ``answered`` has the recorded answers to all
+    questions, of which ``responses`` are those to statements; ``own_dynamics`` are the device's, if receipts record a
+    measurement; ``estimator`` is the velocity estimator, "device" if the device measured the velocity, None if receipts
+    do not record it. ``withdrawn`` is the number of participants who withdrew and whose data were erased. ``contrasts``
+    are the study's hypotheses and ``liquids`` its liquids' tables, once the key is open. ``sites`` are the names of the
+    sites of a merged study, whose participants are SITE-ID. ``with_below_chance`` includes answers below chance even
+    though no person has decided about them.
     """
 
     folder: Path
@@ -201,42 +197,42 @@ class Study:
 
     @property
     def people(self) -> tuple[str, ...]:
-        """The participants of sessions that count, in the order of their ids."""
+        """The participants of included sessions, in order of their IDs."""
         return tuple(sorted(self.participants.loc[self.participants["counted"], "participant"].unique()))
 
     def site_of(self, participant: str) -> str:
-        """Return the site of a participant of a merged study; otherwise nothing."""
+        """Return the site of a participant of a merged study, otherwise ""."""
         return participant.partition(DASH)[0] if self.sites else ""
 
     @property
     def n(self) -> int:
-        """How many participants are in the measures."""
+        """The number of participants in the analysis."""
         return len(self.people)
 
     @property
     def left_out(self) -> int:
-        """How many sessions are not, since they were not completed."""
+        """The number of sessions that were not completed."""
         return int((~self.participants["counted"] & ~self.participants["excluded"]).sum())
 
     @property
     def excluded_sessions(self) -> pd.DataFrame:
-        """The rows of ``participants`` that were decided to be left out, completed or not."""
+        """The rows of ``participants`` for excluded sessions, completed or not."""
         return self.participants[self.participants["excluded"]]
 
     @property
     def versions(self) -> tuple[str, ...]:
-        """The versions of the protocol under which the sessions that count were run; of none, the first session's."""
+        """The protocol versions of the included sessions; without any, that of the first session."""
         counted = self.participants.loc[self.participants["counted"], "protocol_version"]
         return tuple(sorted(set(map(str, counted)))) or (self.version,)
 
     @property
     def contents(self) -> int:
-        """How many different study files these sessions were run with."""
+        """The number of different study files used by these sessions."""
         return int(self.participants.loc[self.participants["counted"], "protocol_hash"].nunique())
 
     @property
     def programs(self) -> tuple[str, ...]:
-        """The versions of the program that ran the sessions that count."""
+        """The program versions of the included sessions."""
         counted = self.participants.loc[self.participants["counted"], "version"]
         return tuple(sorted(set(map(str, counted.dropna()))))
 
@@ -257,11 +253,11 @@ class Study:
 
     @property
     def own_codes(self) -> bool:
-        """Whether a code means another setting for each participant, since the key is sealed."""
+        """Whether codes differ between participants, as is the case while the key is sealed."""
         return not self.revealed and self.protocol.get("study", {}).get("codes") == "participant"
 
     def tell_doubts(self, warn: Callable[[str], object] | None) -> None:
-        """Warn, in one line per file, of every file that differs from its recorded state."""
+        """Issue one warning per file that differs from its recorded state."""
         if warn is None:
             return
         for doubt in self.doubts:
@@ -272,16 +268,16 @@ class Study:
         return tuple(block for block in self.blocks if block.kind == kind)
 
     def answers(self, block: Block) -> pd.DataFrame:
-        """Return the rows of ``responses`` that count, of one block."""
+        """Return the valid rows of ``responses`` for one block."""
         return self.responses[self.responses["counted"] & (self.responses["block"] == block.id)]
 
     def answers_to(self, asked: PlacedQuestion) -> pd.DataFrame:
-        """Return the rows of ``answered`` that count, of a question that no block of statements holds."""
+        """Return the valid rows of ``answered`` for a question outside blocks of statements."""
         rows = self.rows_of(asked)
         return rows[rows["counted"]]
 
     def rows_of(self, asked: PlacedQuestion) -> pd.DataFrame:
-        """Return all rows of ``answered`` of a question that no block of statements holds."""
+        """Return all rows of ``answered`` for a question outside blocks of statements."""
         place = self.answered["form" if asked.where.is_form else "block"] == asked.where.id
         rows = self.answered[place.fillna(False) & (self.answered["item"] == asked.id)]
         by_block = asked.where.is_form and asked.where.settings
@@ -293,12 +289,12 @@ class Study:
         return int(self.protocol.get("format", 1))
 
     def presented(self, block: Block) -> dict[str, int]:
-        """Return how often each setting of a block was presented in trials that count."""
+        """Return how often each setting of a block was presented in valid trials."""
         rows = self.trials[self.trials["counted"] & (self.trials["block"] == block.id)]
         return {code: int((rows["code"] == code).sum()) for code in block.codes}
 
     def excluded_trials(self, block: Block) -> pd.DataFrame:
-        """Return the trials of a block that are left out one by one: last attempts, in sessions that count."""
+        """Return the individually excluded trials of a block: last attempts in included sessions."""
         rows = self.trials[self.trials["excluded"] & (self.trials["block"] == block.id)]
         here = self.participants.loc[self.participants["counted"], ["participant", "session"]]
         return (
@@ -313,9 +309,9 @@ class Study:
 
 
 def load_study(folder: Path, *, planned: bool = True) -> Study:
-    """Read the results of a study; without ``planned``, as if no planned rule had excluded a session.
+    """Read the results of a study; with ``planned`` False, ignore exclusions by planned rules.
 
-    A merged study (see `store.merged`) is sealed until the key of every site was opened.
+    A merged study (see `store.merged`) is sealed until the key of every site is open.
 
     Raises
     ------
@@ -342,7 +338,6 @@ def load_study(folder: Path, *, planned: bool = True) -> Study:
 
 
 def _load_sites(merged: Merged, *, planned: bool) -> Study:
-    """Read a merged study; a site from which all participants withdrew has nothing to read."""
     places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
     if missing := [place.path for place in places.values() if not place.path.is_dir()]:
         raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a copy")
@@ -355,7 +350,7 @@ def _load_sites(merged: Merged, *, planned: bool) -> Study:
 
 
 def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
-    """Return a merged study from those of its sites, by their names; all of them are revealed, or none."""
+    """Return a merged study from the studies of its sites by name; either all or none are unblinded."""
     studies = list(sites.values())
     estimators = [study.estimator.split(" or ") for study in studies if study.estimator is not None]
 
@@ -399,7 +394,7 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
 
 
 def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
-    """Read the results in a folder that is not merged; ``sealed``: as if its key was not opened."""
+    """Read the results in a folder that is not merged; with ``sealed``, ignore an opened key."""
     place = StudyFolder(folder)
     sessions = [session for session in place.sessions() if not is_never_begun(session.path)]
     if not sessions:
@@ -455,7 +450,7 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
 
 
 def _undecided(place: StudyFolder, records: Sequence[Session], listed: Sequence[Exclusion]) -> Iterator[Exclusion]:
-    """Yield the exclusion of each incomplete session that the list lacks: the program ended before it wrote it."""
+    """Yield the missing exclusion of each incomplete session whose program ended before writing it."""
     decided = {exclusion.what for exclusion in (*listed, *reversals(place.path))}
     for record in records:
         what = (record.folder.participant, record.folder.number, None)
@@ -473,7 +468,7 @@ def _undecided(place: StudyFolder, records: Sequence[Session], listed: Sequence[
 def _intervals(
     records: Sequence[Session], listed: Sequence[Exclusion], last: pd.Series[int], *, opened: bool
 ) -> pd.DataFrame:
-    """Return the intervals of all sessions; an empty table in a study without designs."""
+    """Return the intervals of all sessions; an empty table for a study without designs."""
     if not has_intervals(records[0].protocol):
         return pd.DataFrame()
     table = read_tables(records, "intervals")
@@ -482,12 +477,11 @@ def _intervals(
 
 
 def _without(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
-    """Return a table in which these columns are empty."""
     return table.assign(**{name: table[name].mask(table[name].notna()) for name in columns & {*table.columns}})
 
 
 def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
-    """Return the opened key; a session of another study is named as such, and not as one under another key."""
+    """Return the opened key; raise a specific error if a session belongs to another study."""
     try:
         return blinding.revealed_key(place.path)
     except StoreError:
@@ -524,7 +518,7 @@ def _other_study(other: Session, first: Session) -> str:
 
 
 def _check_alike(first: Session, other: Session) -> None:
-    """Refuse to pool what was not asked alike, or not under one key."""
+    """Raise an error if sessions with different questions or keys would be pooled."""
     if other.study != first.study:
         raise AnalysisError(_other_study(other, first))
     if other.visit["key_hash"] != first.visit["key_hash"]:
@@ -540,7 +534,7 @@ def _check_alike(first: Session, other: Session) -> None:
 
 
 def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
-    """Add what counts: main trials of completed sessions, of each trial the last attempt, unless it is excluded."""
+    """Add ``counted``: the last attempt at each main trial of completed sessions, unless excluded."""
     joined = table.join(last, on=_TRIAL)
     counted = (
         (joined["phase"] == "main")
@@ -552,7 +546,7 @@ def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
 
 
 def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers to statements as points of their scale."""
+    """Return the answers to statements as scale points."""
     if "kind" not in table:
         return table
     statements = table[table["kind"] == STATEMENT]
@@ -563,23 +557,23 @@ By: TypeAlias = Literal["group", "site"]
 
 
 def group_members(study: Study) -> dict[str, str]:
-    """Return the group of every participant who counts; none without groups.
+    """Return the group of every included participant; empty without groups.
 
-    Randomised groups are not known while the key is sealed.
+    Randomised groups are unknown while the key is sealed.
     """
     members = _members(study, "group")
     return dict(zip(map(str, members["participant"]), map(str, members["group"]), strict=True))
 
 
 def group_assignment(study: Study) -> str | None:
-    """Return how participants came into groups, "randomised" or "pre-existing"; None in a study without groups."""
+    """Return how participants were assigned to groups, "randomised" or "pre-existing"; None without groups."""
     if not study.protocol.get("groups"):
         return None
     return str(study.protocol["study"].get("group_assignment", "randomised"))
 
 
 def group_counts(study: Study, by: By = "group") -> dict[str, int]:
-    """Return how many participants that count each group, or site, has, by name."""
+    """Return the number of included participants in each group, or at each site."""
     counts = _members(study, by)[by].value_counts()
     return {str(group): int(counts[group]) for group in sorted(counts.index)}
 
@@ -587,8 +581,8 @@ def group_counts(study: Study, by: By = "group") -> dict[str, int]:
 def group_means(study: Study, by: By = "group") -> list[Any]:
     """Return rows of the answers to each statement, by group or site, in the order of blocks, items and settings.
 
-    They have ``block``, ``item``, ``code``, ``group``, ``n`` participants, each with his or her mean, and their
-    ``mean`` and ``sd`` in points of the scale, NaN of one participant.
+    They have ``block``, ``item``, ``code``, ``group``, the number ``n`` of participants, and the ``mean`` and ``sd``
+    over participants' means in scale points, NaN for the SD of one participant.
     """
     members = _members(study, by)
     if members.empty:
@@ -607,7 +601,7 @@ def group_means(study: Study, by: By = "group") -> list[Any]:
 
 
 def _members(study: Study, by: By) -> pd.DataFrame:
-    """Return participant and group, or site, of everybody who counts."""
+    """Return all included participants with their group or site."""
     if by == "site":
         people = study.people if study.sites and study.revealed else ()
         return pd.DataFrame(

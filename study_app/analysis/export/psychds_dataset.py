@@ -31,7 +31,7 @@ from study_app.store.output_files import FileCopy
 
 
 class Materials(NamedTuple):
-    """The files that this machine has, by name, and those that it has not, in words; footage is not read."""
+    """The study materials on this machine by name, and descriptions of missing ones; footage is not read."""
 
     files: dict[str, bytes | FileCopy]
     missing: tuple[str, ...]
@@ -76,7 +76,7 @@ def _footage(study: Study) -> dict[str, str]:
 
 
 def _study_file(study: str, hashes: set[str], footage: dict[str, str]) -> tuple[Path, bytes, dict[str, str]] | None:
-    """Return where the study's file is, it, and the texts of its liquid files; whether its footage is there or not."""
+    """Return the path and content of the study's file and the texts of its liquid files, if it is on this machine."""
     for name in known_protocols():
         try:
             file = protocol_file(name)
@@ -92,13 +92,13 @@ def _study_file(study: str, hashes: set[str], footage: dict[str, str]) -> tuple[
 
 
 def _is_inside(name: str) -> bool:
-    """Return whether a file that a study names is in the study's folder."""
+    """Return whether a referenced file is inside the study's folder."""
     path = PurePosixPath(name)
     return ".." not in path.parts and not path.is_absolute()
 
 
 def _is_of(study: str, file: Path) -> bool:
-    """Return whether a protocol file is of the study of that name."""
+    """Return whether a protocol file belongs to the study of that name."""
     try:
         head = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode()).get("study")
     except (OSError, ValueError, RecursionError):
@@ -107,7 +107,7 @@ def _is_of(study: str, file: Path) -> bool:
 
 
 def _why_missing(path: Path | None) -> str:
-    """Return why footage is not shared; ``path`` is None where it lies outside the study's folder."""
+    """Return why footage is not shared; ``path`` is None if it lies outside the study's folder."""
     if path is None:
         return "outside the study's folder"
     try:
@@ -128,10 +128,10 @@ _VARIABLES: Final = "variableMeasured"
 def dataset_files(
     study: Study, tables: Mapping[str, bytes], columns: Mapping[str, tuple[Column, ...]], report: Mapping[str, bytes]
 ) -> dict[str, bytes | FileCopy]:
-    """Return the folder's files by their paths.
+    """Return the dataset's files by path.
 
-    ``tables`` and ``columns`` go by the names of the tables' files; ``report`` has the files of the report, its own
-    copies of the tables among them.
+    ``tables`` and ``columns`` are by file name; ``report`` has the files of the report, including its own copies of
+    tables.
     """
     shown = {name: content for name, content in report.items() if name not in tables and name != _SCRIPT}
     description = _description(study, columns)
@@ -155,23 +155,23 @@ def dataset_files(
 
 
 def _sidecar(study: Study, name: str, columns: tuple[Column, ...]) -> bytes:
-    """Return what describes the columns of one table alone, with authors and licence."""
+    """Return the JSON sidecar that describes one table's columns, with authors and licence."""
     head = {"@context": _CONTEXT, "@type": "Dataset", "name": PurePosixPath(name).stem}
     return _json({**head, _VARIABLES: [column.variable for column in columns], **stated_credits(study)})
 
 
 def _settings(study: Study) -> bytes:
-    """Return the settings of the analysis, defaults where the study's file has none, and the study that they are of."""
+    """Return the analysis settings (defaults if the study's file has none) and their study."""
     head = {"name": study.name, "version": study.version, **stated_credits(study)}
     decided = {name: value for name, value in asdict(study.decided).items() if name not in ("made", "changed")}
     return _json({**head, "analysis": decided | (study.protocol.get("analysis") or {})})
 
 
 def variables(columns: Mapping[str, tuple[Column, ...]]) -> list[dict[str, Any]]:
-    """Return every column of some tables once; ``columns`` go by the names of the tables' files.
+    """Return every column of the tables once; ``columns`` are by file name.
 
-    Where tables describe a column of one name differently, its description is that of each table, and its unit and
-    range are those that hold in all of them.
+    If tables describe a column of the same name differently, all descriptions are joined, and unit and range are those
+    common to all tables.
     """
     found: dict[str, dict[str, dict[str, Any]]] = {}
     for file, of_table in columns.items():

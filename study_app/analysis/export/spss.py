@@ -35,7 +35,7 @@ _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", 
 
 
 def long_sav(study: Study, table: Delivered) -> bytes:
-    """Return the long table of responses as a .sav file."""
+    """Return the long table of responses as an SPSS file."""
     frame = table.frame
     if study.protocol_format > 1:  # the answers of all kinds in one column are texts, without levels
         return sav(study, table, {})
@@ -49,7 +49,7 @@ def long_sav(study: Study, table: Delivered) -> bytes:
 
 
 def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | QuestionCells]) -> bytes:
-    """Return the wide table as a .sav file."""
+    """Return the wide table as an SPSS file."""
     answers = study.responses
     by_cell = dict(iter(answers.groupby(["block", "code", "item"])))
     frame = table.frame.copy()
@@ -75,7 +75,7 @@ def _names_options(asked: PlacedQuestion | PlacedScore) -> bool:
 def _question(
     study: Study, cells: QuestionCells, values: pd.Series[Any], people: pd.Series[Any]
 ) -> tuple[pd.Series[Any], dict[int, str]]:
-    """Return the cells of another question and its levels: options are numbered from 1; others have no levels."""
+    """Return the cells of another question and its value labels: options are numbered from 1; others have none."""
     asked = cells.asked
     if isinstance(asked, PlacedScore) or not asked.levels:
         return values, {}
@@ -93,7 +93,7 @@ def _question(
 
 
 def _with_codes(values: pd.Series[Any], people: pd.Series[Any], rows: pd.DataFrame) -> pd.Series[Any]:
-    """Return a cell for each participant, with the code of why there is no answer; ``rows`` are all that were given."""
+    """Return one cell per participant, with a code for the reason of a missing answer; ``rows`` are all answers."""
     counted = rows[rows["counted"]]
     judged = set(counted.loc[counted["cannot_judge"].fillna(False), "participant"])
     excluded = set(rows.loc[rows["excluded"], "participant"]) - set(counted["participant"])
@@ -108,9 +108,9 @@ def _levels(levels: Mapping[int, str], cannot_judge: str) -> dict[int, str]:
 
 
 def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], options: Collection[str] = ()) -> bytes:
-    """Return the table as a .sav file.
+    """Return the table as an SPSS file.
 
-    ``coded`` has the levels of columns whose missing answers have codes; those of ``options`` have no order.
+    ``coded`` has the value labels of columns whose missing answers have codes; the columns in ``options`` are nominal.
     """
     names = _names_of([column.name for column in table.columns])
     columns = {names[column.name]: column for column in table.columns}
@@ -144,7 +144,7 @@ def sav(study: Study, table: Delivered, coded: Mapping[str, dict[int, str]], opt
 
 
 def _names_of(names: list[str]) -> dict[str, str]:
-    """Return names that SPSS takes: letters first, at most 64 bytes, no reserved word, different in any case."""
+    """Return valid SPSS names: starting with a letter, at most 64 bytes, not reserved, unique regardless of case."""
     found: dict[str, str] = {}
     taken: set[str] = set()
     for name in names:
@@ -161,7 +161,7 @@ def _names_of(names: list[str]) -> dict[str, str]:
 
 
 def _plain(column: Column, values: pd.Series[Any]) -> pd.Series[Any]:
-    """Return values as the library takes them: floats with NaN, or texts, empty where there is none."""
+    """Return values in the library's types: floats with NaN, or texts with "" for missing ones."""
     if column.kind in {"text", "time"}:
         texts = ["" if value is pd.NA else _cut(str(value), _TEXT_BYTES) for value in values.tolist()]
         return pd.Series(texts, dtype=object)
@@ -178,7 +178,7 @@ def _measure(column: Column) -> str:
 
 
 def _format(column: Column, values: pd.Series[Any]) -> str | None:
-    """Return how numbers are shown: whole ones without a point."""
+    """Return the display format of numbers; integers have no decimal point."""
     if column.kind == "flag":
         return "F1.0"
     whole = column.kind == "integer"
@@ -186,6 +186,6 @@ def _format(column: Column, values: pd.Series[Any]) -> str | None:
 
 
 def _cut(text: str, most: int) -> str:
-    """Return as much of a text as fits into ``most`` bytes, never half a letter."""
+    """Return a text truncated to ``most`` bytes without splitting a character."""
     content = text.encode("utf-8", "replace")
     return text if len(content) <= most else content[: most - 3].decode("utf-8", "ignore") + "…"

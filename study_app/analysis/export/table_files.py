@@ -31,9 +31,9 @@ def table_files(
     extras: Collection[Extra] = NOTHING_ELSE,
     cells: Mapping[str, Cells | QuestionCells] = MappingProxyType({}),
 ) -> dict[str, bytes]:
-    """Return tables of a study and their codebook, in the formats of ``extras``, too, by the names of their files.
+    """Return tables of a study and their codebook, also in the formats of ``extras``, by file name.
 
-    With ``extras`` the wide table is the last of ``tables``, and ``cells`` says what its columns hold.
+    With ``extras`` the wide table is the last of ``tables``, and ``cells`` describes its columns.
     """
     written = tables if "wide" in extras or not extras else tables[:-1]
     files = {file_name(study, table, "csv"): table_bytes(table) for table in written}
@@ -52,7 +52,7 @@ def table_files(
 
 
 def codebook_bytes(study: Study, files: Mapping[str, Iterable[Column]]) -> bytes:
-    """Return the codebook as JSON; ``files`` maps names to their columns."""
+    """Return the codebook as JSON; ``files`` maps file names to their columns."""
     described = {name: [_described(column) for column in columns] for name, columns in files.items()}
     text = json.dumps(_codebook(study, described), indent=2, ensure_ascii=False)
     return f"{text}\n".encode("utf-8", "backslashreplace")
@@ -109,7 +109,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def study_head(study: Study) -> dict[str, Any]:
-    """Return what study it is, its authors, licence and citation, and how many took part."""
+    """Return the study's title, authors, licence, citation, and number of participants."""
     return {
         "name": study.name,
         "title": study.title,
@@ -126,13 +126,13 @@ def study_head(study: Study) -> dict[str, Any]:
 
 
 def stated_credits(study: Study) -> dict[str, Any]:
-    """Return what the study states, as properties of schema.org."""
+    """Return the credits that the study states, as properties of schema.org."""
     stated = study.protocol.get("study", {}).get("credits") or {}
     return {name: stated[key] for key, name in _CREDITS.items() if stated.get(key)}
 
 
 def _presentations(study: Study, block: Block) -> dict[str, Any]:
-    """Return how many answers a participant gave to a statement on one setting, and in which sessions."""
+    """Return the number of answers per participant, statement and setting, and their sessions."""
     answers = study.answers(block)
     given = answers[answers["response"].notna()]
     given = given.assign(column=given["code"].map(block.columns))
@@ -149,7 +149,7 @@ def _presentations(study: Study, block: Block) -> dict[str, Any]:
 
 
 def _questions(study: Study) -> list[dict[str, Any]]:
-    """Return the questions that no block of statements holds."""
+    """Return the questions outside blocks of statements."""
     return [
         {
             "form" if question.where.is_form else "block": question.where.id,
@@ -179,7 +179,7 @@ def _scores(study: Study) -> list[dict[str, Any]]:
 
 
 def _levels_entry(block: LevelBlock) -> dict[str, Any]:
-    """Return how a block of levels is built and, once the key is open, what it varies."""
+    """Return the structure of a block of levels and, once the key is open, its varied quantity."""
     stimulus = block.stimulus
     return {
         "block": block.id,
@@ -223,7 +223,7 @@ def table_bytes(table: Delivered) -> bytes:
 
 
 def _parquet_bytes(table: Delivered) -> bytes:
-    """Return a table as Parquet; every column with its description and unit, points of a scale as Int8."""
+    """Return a table as Parquet, with description and unit of every column; scale points are Int8."""
     import pyarrow as pa  # type: ignore[import-untyped]  # noqa: PLC0415 - takes long to load
     from pyarrow import parquet  # noqa: PLC0415
 
@@ -245,7 +245,7 @@ def _parquet_bytes(table: Delivered) -> bytes:
 
 
 def credit_lines(study: Study) -> tuple[str, str, str]:
-    """Return authors, licence and citation in a line each, which says so where the study does not state it."""
+    """Return authors, licence and citation, one line each, also if the study does not state them."""
     stated = stated_credits(study)
     lines = (
         f"Authors: {', '.join(stated.get('author', [])) or 'not stated'}.",

@@ -26,7 +26,7 @@ from study_app.store.csv_files import Column, Kind, header, optional, unsealed_c
 
 @dataclass(frozen=True, eq=False)
 class Delivered:
-    """A table: its name, its columns in their order, and a frame that has them."""
+    """A table: its name, its columns in order, and a data frame with them."""
 
     name: str
     columns: tuple[Column, ...]
@@ -37,7 +37,7 @@ SITE: Final = Column("site", "text", "The participant's site: the part of the ID
 
 
 def _with_site(study: Study, table: Delivered) -> Delivered:
-    """Return a table of a merged study with the column ``site`` after that of participants; any other as it is."""
+    """Return a table of a merged study with the column ``site`` after the participants; other tables unchanged."""
     if not study.sites or "participant" not in header(table.columns):
         return table
     place = header(table.columns).index("participant") + 1
@@ -62,7 +62,7 @@ _TRACKS: Final = (*(_LEVEL_COLUMNS[name] for name in (*_OF_TRIAL, *_OF_BLOCK)), 
 
 
 def _level_tables(study: Study) -> Iterator[Delivered]:
-    """Yield the tables of a study with levels; none of any other."""
+    """Yield the tables of a study with levels; none for other studies."""
     if not study.levels:
         return
     intervals = tables_of(study.protocol_format)["intervals"]
@@ -92,7 +92,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
 
 
 def _of_intervals(study: Study) -> tuple[Column, ...]:
-    """Return the columns of force and speed, one for each interval that a trial has at most."""
+    """Return the force and speed columns, for the largest number of intervals per trial."""
     most = max(block.design.intervals for block in study.levels)
     return tuple(
         replace(column, name=f"{name}_{number}", description=f"{column.description} In interval {number}.")
@@ -103,7 +103,7 @@ def _of_intervals(study: Study) -> tuple[Column, ...]:
 
 
 def names_of_sealed(study: Study) -> set[str]:
-    """Return the columns of intervals that no table has before the key is opened."""
+    """Return the interval columns that are not exported before the key is opened."""
     return {column.name for column in INTERVALS if column.sealed} if study.levels else set()
 
 
@@ -143,7 +143,7 @@ _MEASURED: Final = (
 
 
 def _may_miss(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return columns about a trial's setting where some rows have none: those of forms, and of tracks."""
+    """Return columns about a trial's setting that are empty for some rows: those of forms and of tracks."""
     return tuple(replace(column, may_miss=True) for column in columns)
 
 
@@ -170,7 +170,7 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
 
 
 def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
-    """Add what each code stood for: nothing of an answer in a form, and while the key is sealed."""
+    """Add the condition of each code; empty for answers in forms and while the key is sealed."""
     pairs = zip(table["block"], table["code"], strict=True)
     settings = [setting.of or setting for setting in (study.settings.get(pair, _OF_A_FORM) for pair in pairs)]
     delay_ms = np.array([np.nan if setting.delay_ms is None else setting.delay_ms for setting in settings], np.float64)
@@ -185,7 +185,7 @@ def _named(study: Study, table: pd.DataFrame) -> pd.DataFrame:
 
 
 def _with_delay_error(study: Study) -> pd.DataFrame:
-    """Return the responses with the delay error of the trial each followed."""
+    """Return the responses with the delay error of the preceding trial."""
     if not study.revealed:
         return study.answered
     trial = ["participant", "session", "trial", "attempt"]
@@ -211,7 +211,7 @@ def _aggregate(study: Study) -> pd.DataFrame:
 
 @dataclass(frozen=True, slots=True)
 class Cells:
-    """What a column of the wide table holds: answers to an item about a setting of a block."""
+    """The content of a wide-table column: answers to an item about a setting of a block."""
 
     block: Block
     setting: Setting
@@ -220,19 +220,18 @@ class Cells:
 
 @dataclass(frozen=True, slots=True)
 class QuestionCells:
-    """What a column holds of another question: answers about a setting, or in a form; or a score of a questionnaire."""
+    """The content of a wide-table column for another question or a questionnaire score."""
 
     asked: PlacedQuestion | PlacedScore
     setting: Setting | None
 
 
 def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
-    """Return the wide table of all answers that count, and what each of its columns holds.
+    """Return the wide table of all valid answers, and the content of each of its columns.
 
-    Columns are ``item__condition``, or ``item__code`` until the key was opened; where blocks or a form would give the
-    same name, ``block__item__condition``. A repeated setting gives the median, as in the analysis, of options and texts
-    the last one. Questions of forms are ``form__item``, scores ``form__score``, of forms that are
-    asked several times ``form__item__block``.
+    Columns are ``item__condition``, or ``item__code`` until the key is opened; if names would clash,
+    ``block__item__condition``. Repeated settings have the median, as in the analysis; options and texts have the last
+    answer. Questions of forms are ``form__item``, scores ``form__score``, and for repeated forms ``form__item__block``.
     """
     people, cells = list(study.people), _wide_cells(study)
     simulated = dict(zip(study.participants["participant"], study.participants["simulated"], strict=True))
@@ -250,7 +249,7 @@ def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
 
 
 def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
-    """Return what each column of the wide table holds, by name: statements, then other questions and scores."""
+    """Return the content of each column of the wide table by name: statements, then other questions and scores."""
     statements = [
         (f"{item.id}__{setting.condition or setting.code}", Cells(block, setting, item))
         for block in study.blocks
@@ -301,7 +300,7 @@ def _question(study: Study, cells: QuestionCells, people: list[str]) -> Answers:
 
 
 def _medians(answers: pd.DataFrame, column: str, people: list[str]) -> pd.api.extensions.ExtensionArray:
-    """Return the median of each participant's numbers; missing ones without any, whole ones where all are."""
+    """Return each participant's median; missing without numbers, integers if all are."""
     numbers = answers[column].dropna().astype(float).groupby(answers["participant"]).median()
     values = numbers.reindex(people).to_numpy()
     missing = np.isnan(values)

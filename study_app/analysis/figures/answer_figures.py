@@ -59,10 +59,10 @@ def draw_answers(
     *,
     own_scales: bool = False,
 ) -> Sheet:
-    """Draw statements over delay on a true scale: a thin line per participant (of many: of some), band, thick median.
+    """Draw answers against delay to scale: thin lines for participants (a selection of many), band, thick median.
 
-    ``plots`` are short texts and answers (participants, delays), ``lowest_ms`` the lowest delays at which a trend
-    shows. With ``own_scales`` they are measures, each on a scale of its own.
+    ``plots`` are short texts and answers (participants, delays), ``lowest_ms`` the lowest delays with a trend. With
+    ``own_scales`` they are measures, each on its own scale.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     columns = min(len(plots), _PLOTS_A_ROW)
@@ -100,7 +100,7 @@ def draw_answers(
 
 
 def _scale_to(sheet: Sheet, axes: Axes, values: Array) -> None:
-    """Give axes a scale over all values; NaN is a value that is missing."""
+    """Set the axis limits to the range of all values without NaN."""
     low, high = (float(np.nanmin(values)), float(np.nanmax(values))) if not np.isnan(values).all() else (0.0, 0.0)
     room = 0.08 * (high - low) or 0.5
     axes.set_ylim(low - room, high + room)
@@ -110,7 +110,7 @@ def _scale_to(sheet: Sheet, axes: Axes, values: Array) -> None:
 
 
 def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread: float) -> None:
-    """Draw (participants, delays) values: thin lines at most ``spread`` apart, band and thick median of all."""
+    """Draw (participants, delays) values: thin lines at most ``spread`` apart, and band and thick median of all."""
     low, high = float(delays_ms.min()), float(delays_ms.max())
     reach = (high - low) or 1.0
     axes.set_xlim(low - 0.06 * reach, high + 0.06 * reach)
@@ -137,21 +137,21 @@ def over_delay(sheet: Sheet, axes: Axes, values: Array, delays_ms: Array, spread
 
 
 def _lines_of(participants: int) -> list[int]:
-    """Return the places of the participants who are drawn as lines: all of few, of many an even choice."""
+    """Return the indices of the participants drawn as lines: all if they are few, otherwise an even selection."""
     if participants <= MOST_LINES:
         return list(range(participants))
     return [int(place) for place in np.linspace(0, participants - 1, MOST_LINES).round()]
 
 
 def line_words(participants: int) -> str:
-    """Return whom the thin lines are, for a caption."""
+    """Return the caption's description of the thin lines."""
     if participants <= MOST_LINES:
         return "participants"
     return f"{MOST_LINES} of the {participants} participants, evenly chosen in the order of their IDs"
 
 
 def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
-    """Mark the lowest delay at which a trend shows: dashed, with its number on the side that has more room."""
+    """Mark the lowest delay with a trend by a dashed line, with its value on the side that has more room."""
     if lowest_ms is None:
         return
     dashed: Style = {"linewidth": 0.9, "linestyle": (0, (3, 2)), "zorder": 3, "gid": f"{axes.get_label()}-lowest"}
@@ -162,7 +162,7 @@ def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float)
 
 
 def legend(sheet: Sheet) -> None:
-    """Write at the right, under the heading, what median, band and single lines are."""
+    """Draw the legend of median, band and single lines at the right, below the heading."""
     words = ("median", "middle half (IQR)", "one participant")
     y, x = 30.0, sheet.width_pt - MARGIN_PT + 12 - sum(sheet.text_width(word, SMALL) + 30 for word in words)
     for word in words:
@@ -190,7 +190,7 @@ _RIGHT_PT: Final = 26.0
 def draw_threshold(
     threshold: Threshold, shares_of: Mapping[str, Mapping[float, float]], lowest_ms: float | None, look: Look
 ) -> Sheet:
-    """Draw shares as circles, the curve, its threshold with the interval, and dashed the lowest delay with a trend.
+    """Draw shares, the fitted curve, its threshold with interval, and (dashed) the lowest delay with a trend.
 
     ``shares_of`` are each participant's shares by delay, drawn as small points.
     """
@@ -247,14 +247,14 @@ _FILES: Final = 3
 
 
 def title(block: Block) -> str:
-    """Return the heading of a block's figure."""
+    """Return the title of a block's figure."""
     if block.kind == "delays":
         return "Answers against added delay" if block.revealed else "Answers by delay setting"
     return f"Agreement for each {_noun(block)}"
 
 
 def counts(study: Study, block: Block) -> list[str]:
-    """Return what the figure of a block says about n and missing ratings, the longest wording first."""
+    """Return texts on n and missing ratings for a block's figure, longest first."""
     people = set(people_a_setting(study, block).values())
     n = len(set(study.answers(block)["participant"]))
     table = study.aggregate(block)
@@ -273,13 +273,12 @@ def _listed(values: set[int]) -> str:
 
 
 def people_a_setting(study: Study, block: Block) -> dict[str, int]:
-    """Return how many participants were presented each setting of a block."""
+    """Return the number of participants to whom each setting of a block was presented."""
     rows = _counted_trials(study, block)
     return {code: int(rows.loc[rows["code"] == code, "participant"].nunique()) for code in block.codes}
 
 
 def _caption(study: Study, block: Block) -> str:
-    """Return the caption of a block's figure."""
     return " ".join(_sentences(study, block))
 
 
@@ -360,7 +359,7 @@ _AGREEMENT: Final = (5, 6, 7)
 
 @style.own_settings()
 def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
-    """Draw a panel for each setting over one axis of statements; one answer is as wide everywhere."""
+    """Draw one panel per setting with a common statement axis; one answer has the same width everywhere."""
     table = study.aggregate(block)
     panels = [(setting, table[table["code"] == setting.code].reset_index(drop=True)) for setting in block.settings]
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
@@ -392,7 +391,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Widths:
-    """Of every panel alike [pt]: one answer, the sides of the line, the neutral column and the column of n."""
+    """Common widths of all panels [pt]: one answer, both sides of the centre line, neutral column, and n column."""
 
     answer: float
     left: float
@@ -406,7 +405,7 @@ class _Widths:
 
 
 def _widths(tables: Sequence[pd.DataFrame], room: float) -> _Widths:
-    """Give one answer the same width everywhere, the widest that fits, and words above and below their room."""
+    """Return the largest common width per answer that fits, and the room for labels."""
     most = [
         max(int(table[[f"count_{level}" for level in levels]].sum(axis=1).max()) for table in tables)
         for levels in (_DISAGREEMENT, _AGREEMENT, (NEUTRAL,))
@@ -422,12 +421,12 @@ def _widths(tables: Sequence[pd.DataFrame], room: float) -> _Widths:
 
 
 def _lacks_answers(counts: pd.DataFrame) -> pd.Series[bool]:
-    """Return for each row whether an answer is missing, the trial's having been left out included."""
+    """Return for each row whether an answer is missing, including those of excluded trials."""
     return counts["n"] < counts["presented"] + counts["presented_excluded"]
 
 
 def _legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
-    """Name the levels in their order; the neutral one, which stands apart in the panels, stands apart here."""
+    """Draw the legend of the levels in order, with the neutral one apart as in the panels."""
     short = _legend_labels(labels)
     order = [*_DISAGREEMENT[::-1], *_AGREEMENT, NEUTRAL]
     size, swatch, gap = SMALL, 7.0, 9.0
@@ -442,7 +441,7 @@ def _legend(sheet: Sheet, labels: Sequence[str], x: float) -> None:
 
 
 def _legend_labels(labels: Sequence[str]) -> list[str]:
-    """Shorten the middle levels by the ending they share with the outer level of their side.
+    """Shorten the middle labels by the ending that they share with the outermost label on their side.
 
     "Completely disagree, Mostly disagree" becomes "Completely disagree, Mostly".
     """
@@ -461,7 +460,7 @@ def _legend_labels(labels: Sequence[str]) -> list[str]:
 def _agreement_panel(
     sheet: Sheet, name: str, title: str, counts: pd.DataFrame, widths: _Widths, x: float, top: float
 ) -> None:
-    """Draw one panel; the axes' unit is one answer, and shapes carry ``name`` in the file."""
+    """Draw one panel; the unit of the axes is one answer, and SVG elements are named ``name``."""
     plot_pt = len(counts) * _ROW_PT
     zero = x + widths.left
     base = zero + widths.right + _NEUTRAL_GAP_PT
@@ -494,7 +493,7 @@ def _agreement_panel(
 
 
 def _segment(sheet: Sheet, axes: Axes, left: float, y: int, level: int, count: int, answer_pt: float) -> None:
-    """Draw ``count`` answers of one level from ``left``, with the number inside where it fits."""
+    """Draw ``count`` answers of one level from ``left``, with the number inside if it fits."""
     if count == 0:
         return
     look: Style = {
@@ -517,10 +516,10 @@ def answers_picture(
     forms: Sequence[str] = style.FORMATS,
     lowest: Mapping[str, float] = MappingProxyType({}),
 ) -> Picture:
-    """Draw the answers of a block: diverging bars, a panel per setting; of delays, a plot per statement over delay.
+    """Draw a block's answers: diverging bars per setting or, for delays, a plot per statement against delay.
 
-    ``lowest`` maps items to the lowest delay at which a trend shows [ms], which is marked. Raises AnalysisError where
-    no session was completed.
+    ``lowest`` maps items to the lowest delay with a trend [ms], which is marked. Raises AnalysisError if no session was
+    completed.
     """
     if not len(study.answers(block)):
         columns = ["participant", "session", "status", "excluded"]
@@ -544,7 +543,7 @@ def answers_picture(
 
 
 def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Look) -> Sheet:
-    """Draw the answers of a block; a participant's repeated answers are drawn over delay as their median."""
+    """Draw the answers of a block; against delay, a participant's repeated answers are drawn as their median."""
     if block.kind != "delays" or not block.revealed:
         return draw_agreement(study, block, look)
     answers = study.answers(block)
@@ -572,9 +571,9 @@ def draw_recognition(
     right: Sequence[int | None],
     look: Look,
 ) -> Sheet:
-    """Draw a row a setting and a column a name: counts (settings, labels + 2); ``right`` are the right columns.
+    """Draw the confusion matrix: counts (settings, labels + 2), one row per setting, one column per name.
 
-    The last two columns are undecided and unanswered.
+    ``right`` are the columns of the correct names. The last two columns are undecided and unanswered.
     """
     names = [*labels, "undecided", "unanswered"]
     kept = [place for place in range(len(names)) if place <= len(labels) or any(row[place] for row in table)]
@@ -604,7 +603,6 @@ def draw_recognition(
 
 
 def _cell(sheet: Sheet, axes: Axes, row: int, count: int, total: int, *, right: bool) -> None:
-    """Draw how many gave a setting one name."""
     share = count / total if total else 0.0
     ground = (*_GROUND, _DARKEST * share) if count else style.GROUND
     edge, width = (style.TEXT, 1.6) if right else (style.BORDER, 0.5)

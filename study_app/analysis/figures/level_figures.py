@@ -57,10 +57,10 @@ def panels(
     keys: Sequence[tuple[str, str]] = (),
     foot_pt: float = 28.0,
 ) -> Sheet:
-    """Draw a panel under each name and the words after it.
+    """Draw one panel below each name, with the text ``below`` it.
 
-    ``above`` and ``below`` say what the axes show, ``keys`` are words and their colours. ``draw`` takes the axes, the
-    panel's place, and whether it is the first of its row.
+    ``above`` and ``below`` are axis titles, ``keys`` are legend texts with their colours. ``draw`` is called with the
+    axes, the panel's index, and whether it is the first of its row.
     """
     rows = math.ceil(len(names) / COLUMNS)
     sheet = look.sheet(_HEAD_PT + rows * _PANEL_PT + (rows - 1) * _ROW_GAP_PT + foot_pt + 14)
@@ -89,9 +89,9 @@ def panels(
 def _ends(
     result: LevelsResult, levels: Iterable[float], share: float, least: float, linear: float
 ) -> tuple[float, float]:
-    """Return the ends of an axis of levels: with a margin of a share of the span, in decades where these are spaced so.
+    """Return the limits of a level axis with a margin of ``share`` of the span, in decades if levels are so spaced.
 
-    ``least`` is the smallest factor of a margin in decades, ``linear`` the share of any other.
+    ``least`` is the smallest margin factor on a logarithmic axis, ``linear`` the margin share on a linear one.
     """
     known = [level for level in levels if level > 0 or result.spacing != "log"]
     low, high = float(min(known)), float(max(known))
@@ -103,7 +103,7 @@ def _ends(
 
 
 def _over_trials(axes: Axes, result: LevelsResult, trials: int, ends: tuple[float, float], *, first: bool) -> None:
-    """Give axes ticks for trials from 1 and, between ``ends``, for levels."""
+    """Set the ticks for trials from 1 and, between ``ends``, for levels."""
     axes.set_xticks([1, *(place for place in (round(trials / 2), trials) if place > 1)])
     if result.spacing == "log":
         axes.set_yscale("log")
@@ -115,7 +115,7 @@ def _over_trials(axes: Axes, result: LevelsResult, trials: int, ends: tuple[floa
 
 
 def _level_ticks(result: LevelsResult, ends: tuple[float, float]) -> list[float]:
-    """Return round levels between the ends of an axis: from 1, 2 and 5, in decades where levels are spaced so."""
+    """Return round levels (1, 2, 5 per decade, or linear) between the ends of an axis."""
     low, high = ends
     if result.spacing == "linear":
         step = 10.0 ** math.floor(math.log10(high - low))
@@ -142,7 +142,7 @@ _COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#
 
 
 def _level_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
-    """Draw the answers over levels of a block."""
+    """Draw the answers of a block against level."""
     bands = _bands(study, result, tracked)
     own = len(people(result)) - _MOST_PEOPLE
     left_out = f" {counted(own, 'more participant')} only in the table." if own > 0 else ""
@@ -155,7 +155,7 @@ def _level_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
 
 
 def _bands(study: Study, result: LevelsResult, tracked: _Tracked) -> Mapping[str, Array]:
-    """Return the bands of the participants' functions, where there is one in each panel."""
+    """Return the bands of the participants' functions, if every panel has one."""
     if not Thresholds.own(result) or len(_standards(result)) > 1:
         return {}
     block = next(block for block in study.levels if block.id == result.block)
@@ -238,7 +238,7 @@ def _levels_panel(axes: Axes, result: LevelsResult, person: str | None, *, first
 def _line(
     axes: Axes, shown: Sequence[LevelAnswers], person: str, places: Mapping[Any, float], result: LevelsResult
 ) -> None:
-    """Draw a participant's answers; numbers without the unit that the participant chose."""
+    """Draw a participant's answers; numbers are divided by the participant's own unit."""
     points = [answers for answers in shown if answers.participant == person]
     heights = np.array([_height(result, point.value) for point in points])
     if result.own_units and points:
@@ -250,7 +250,6 @@ def _line(
 
 
 def _curve(axes: Axes, result: LevelsResult, estimate: ThresholdEstimate, colour: str) -> None:
-    """Draw a participant's psychometric function."""
     low, high = axes.get_xlim()
     u = np.linspace(low, high, 120)
     middle = _coordinate(result, estimate.threshold)
@@ -262,7 +261,7 @@ def _curve(axes: Axes, result: LevelsResult, estimate: ThresholdEstimate, colour
 def _threshold_interval(
     axes: Axes, result: LevelsResult, estimate: ThresholdEstimate, colour: str, number: int
 ) -> None:
-    """Draw the interval of a threshold at the height of the function there, each standard's below the one before."""
+    """Draw the interval of a threshold at the height of the function there, with an offset for each standard."""
     if estimate.low is None or estimate.high is None:
         return
     guess = estimate.guess or 0.0
@@ -299,7 +298,7 @@ def _height(result: LevelsResult, value: float) -> float:
 
 
 def _places(result: LevelsResult) -> dict[Any, float]:
-    """Return the place of each level on the horizontal axis: its logarithm where levels are spaced so."""
+    """Return the horizontal position of each level, logarithmic if levels are so spaced."""
     levels = list(dict.fromkeys(_where(answer) for answer in Answers.of(result) if answer.participant is None))
     if result.vary is None:
         return {level: float(place) for place, level in enumerate(levels)}
@@ -311,7 +310,7 @@ def _places(result: LevelsResult) -> dict[Any, float]:
 
 
 def _levels_frame(axes: Axes, result: LevelsResult, places: Mapping[Any, float], *, first: bool) -> None:
-    """Draw the axes: levels below, shares, points or numbers at the left."""
+    """Draw the axes: levels below, and shares, points or numbers at the left."""
     axes.set_xlim(*_limits(result, places))
     shown = _shown_levels(result, places)
     axes.set_xticks(
@@ -327,14 +326,13 @@ def _levels_frame(axes: Axes, result: LevelsResult, places: Mapping[Any, float],
 
 
 def _limits(result: LevelsResult, places: Mapping[Any, float]) -> tuple[float, float]:
-    """Return the ends of the horizontal axis."""
     low, high = min(places.values()), max(places.values())
     margin = 0.5 if result.vary is None else 0.06 * ((high - low) or 1.0)
     return low - margin, high + margin
 
 
 def _shown_levels(result: LevelsResult, places: Mapping[Any, float]) -> Mapping[Any, float]:
-    """Return the levels that are named below the axis, with their places: of many on log spacing, round ones."""
+    """Return the levels labelled on the axis with their positions; for many logarithmic levels, round ones."""
     named = sorted(places, key=lambda level: places[level])
     if result.vary is None or len(named) <= _MOST_TICKS:
         return {level: places[level] for level in named}
@@ -371,7 +369,7 @@ _CROSS_PT2: Final = 11.0
 
 
 def _track_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:
-    """Draw the tracks of a block whose levels answers chose, once the key is open."""
+    """Draw the adaptive tracks of a block, once the key is open."""
     block = next(block for block in study.levels if block.id == result.block)
     shown = list(courses(block, tracked(), _MOST_PANELS))
     rest = len(Thresholds.own(result)) - len(shown)
@@ -415,7 +413,7 @@ def _draw_tracks(result: LevelsResult, shown: Sequence[TrackCourse], look: Look)
 
 
 def _track_panel(axes: Axes, course: TrackCourse) -> None:
-    """Draw the interval, a line for each track, and a mark for each answer; levels of zero lie on the lower edge."""
+    """Draw the interval, a line per track, and a marker per answer; levels of zero lie on the lower edge."""
     trials = np.arange(1.0, len(course.levels) + 1)
     low, high = axes.get_ylim()
     axes.fill_between(
@@ -440,7 +438,7 @@ def _track_panel(axes: Axes, course: TrackCourse) -> None:
 def _marks(
     axes: Axes, trials: Array, levels: Array, which: Flags, face: str, edge: str, size: float = _MARK_PT2
 ) -> None:
-    """Draw circles; those at an edge are not cut off."""
+    """Draw circles that are not clipped at the edges."""
     axes.scatter(
         trials[which], levels[which], s=size, facecolors=face, edgecolors=edge, linewidths=0.6, zorder=4, clip_on=False
     )
@@ -449,7 +447,7 @@ def _marks(
 def _settings_picture(
     study: Study, result: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked
 ) -> Picture:
-    """Draw the settings of a block whose levels participants set, once the key is open."""
+    """Draw the settings of an adjustment block, once the key is open."""
     rest = len(Settings.own(result)) - _MOST_PANELS
     left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
     compared = any(setting.constant_error is not None for setting in Settings.own(result))
@@ -492,7 +490,7 @@ def _draw_settings(result: LevelsResult, look: Look) -> Sheet:
 
 
 def _compared(estimate: SettingEstimate) -> float | None:
-    """Return the standard as a level that can be drawn among the settings; None where none was presented."""
+    """Return the standard as a level to draw among the settings; None if none was presented."""
     return estimate.standard if estimate.constant_error is not None else None
 
 
@@ -520,10 +518,10 @@ Point = tuple[float, float, float | None, float | None]
 
 
 def _weber_fractions(result: LevelsResult, participant: str | None) -> list[Point]:
-    """Return the Weber fractions of a participant or, of None, of the group, by standard.
+    """Return the Weber fractions by standard of a participant, or of the group if None.
 
     A threshold that is a difference is divided by its standard; standards of zero and levels that are values have none.
-    Where the percentage of the published values is known, the level at it is in the threshold's place.
+    If the percentage correct of the published values is known, the level at that percentage replaces the threshold.
     """
     if result.level_kind not in {"weber", "difference"}:
         return []
@@ -546,7 +544,7 @@ def _weber_fractions(result: LevelsResult, participant: str | None) -> list[Poin
 
 
 def _at(result: LevelsResult) -> str:
-    """Return at which percentage Weber fractions are shown."""
+    """Return the phrase for the percentage correct at which Weber fractions are shown."""
     percent = percent_compared(result)
     if percent is None and result.guess_rate is not None:
         percent = 50 * (1 + result.guess_rate)
@@ -554,7 +552,7 @@ def _at(result: LevelsResult) -> str:
 
 
 def _weber_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked) -> Picture:
-    """Draw the Weber fractions of a block with thresholds at two standards or more."""
+    """Draw the Weber fractions of a block with thresholds at two or more standards."""
     listed = "; ".join(published_words(published) for published in result.published)
     published = f" Open circles and dotted lines: published values, {listed}." if _published_fractions(result) else ""
     caption = (
@@ -607,7 +605,7 @@ def _draw_fractions(result: LevelsResult, look: Look) -> Sheet:
 
 
 def _published_fractions(result: LevelsResult) -> list[tuple[float | None, float]]:
-    """Return standard and Weber fraction of the published values that are one; a standard of None: of all."""
+    """Return standard and value of published Weber fractions; a standard of None means all."""
     points = []
     for published in result.published:
         if published.measure == "weber":
@@ -618,7 +616,7 @@ def _published_fractions(result: LevelsResult) -> list[tuple[float | None, float
 
 
 def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: Sheet) -> None:
-    """Draw published values: a circle at a standard, a dotted line over all, which is named above the axes."""
+    """Draw published values: a circle at its standard, or a labelled dotted line across all."""
     over_all = [f"{fraction:g}" for standard, fraction in points if standard is None]
     if over_all:
         words = f"dotted: published {', '.join(over_all)}"
@@ -634,7 +632,7 @@ def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: 
 def _fractions_frame(
     axes: Axes, group: Sequence[Point], own: Sequence[Sequence[Point]], published: Sequence[tuple[float | None, float]]
 ) -> None:
-    """Draw logarithmic axes: the standards below, round fractions at the left."""
+    """Draw logarithmic axes with the standards below and round fractions at the left."""
     values = [value for points in own for _, value, _, _ in points]
     values += [value for point in group for value in point[1:] if value is not None]
     values += [value for _, value in published]
@@ -667,9 +665,9 @@ _FIGURES: Final[tuple[tuple[str, Callable[[LevelsResult], object], _Draw], ...]]
 def level_pictures(
     study: Study, levels: Sequence[LevelsResult], forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
 ) -> Iterator[Picture]:
-    """Draw every figure of every block that has one, in each of ``forms``.
+    """Draw all figures of all blocks of levels in each of ``forms``.
 
-    A figure that fails is left out, and kept in ``failures``.
+    A figure that fails is omitted and added to ``failures``.
     """
     tracked = cache(partial(tracks, study))
     yield from attempted(

@@ -47,7 +47,7 @@ _LEAST_TICKS: Final = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mean:
-    """A mean and the ends of its interval."""
+    """A mean and its interval."""
 
     value: float
     low: float | None = None
@@ -56,7 +56,7 @@ class Mean:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Column:
-    """What is above one name: participants' numbers, in the same order of participants everywhere, and their mean.
+    """The numbers of all participants, in the same order in every column, above one name, and their mean.
 
     ``ends`` are the ends of each participant's own interval.
     """
@@ -69,7 +69,7 @@ class Column:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """Columns on one scale.
+    """Columns with a common scale.
 
     Parameters
     ----------
@@ -94,12 +94,12 @@ class Panel:
 
     @property
     def xs(self) -> Sequence[float]:
-        """The places of the columns."""
+        """The horizontal positions of the columns."""
         return self.places or tuple(map(float, range(len(self.columns))))
 
     @property
     def numbers(self) -> list[float]:
-        """All numbers that the scale must hold."""
+        """All numbers that the scale must include."""
         means = [column.mean for column in self.columns if column.mean is not None]
         of_means = [end for mean in means for end in (mean.value, mean.low, mean.high) if end is not None]
         own = [end for column in self.columns for ends in (column.ends or {}).values() for end in ends]
@@ -108,7 +108,7 @@ class Panel:
 
 
 def numbers_of_panels(panels: Sequence[Panel]) -> str:
-    """Return the numbers of panels as lines with tabs: a row for each participant, then means and their intervals."""
+    """Return the numbers of panels as tab-separated lines: one per participant, then means with intervals."""
     columns = [(f"{panel.title} {column.name}".strip(), column) for panel in panels for column in panel.columns]
     people = sorted({person for _, column in columns for person in column.values})
     rows = [["participant", *(name for name, _ in columns)]]
@@ -124,7 +124,7 @@ def _cell(value: float | None) -> str:
 
 
 def mean_of(values: Iterable[float]) -> Mean | None:
-    """Return the mean of numbers with Student's 95 % interval; None of none."""
+    """Return the mean with Student's 95 % interval; None without numbers."""
     array = np.array([*values], dtype=float)
     if not len(array):
         return None
@@ -204,13 +204,13 @@ def _widths(row: Sequence[Panel], inside: float, *, shared: bool) -> list[float]
 
 
 def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
-    """Return the names of columns, broken into lines."""
+    """Return the names of columns, wrapped into lines."""
     room = width / (len(panel.columns) or 1) - 3
     return [ruler.wrap(column.name, room, SMALL) for column in panel.columns]
 
 
 def _legend(sheet: Sheet, groups: Sequence[str]) -> None:
-    """Write at the right what points and diamonds are, and the groups below it."""
+    """Draw the legend of points, diamonds and groups at the right."""
     x = sheet.width_pt - MARGIN_PT
     for words, marker, size in (("mean, 95 % interval", "D", 3.6), ("participant", "o", 2.6)):
         x -= sheet.text_width(words, SMALL)
@@ -229,7 +229,7 @@ def _legend(sheet: Sheet, groups: Sequence[str]) -> None:
 
 
 def _scale(sheet: Sheet, axes: Axes, panel: Panel, of: Sequence[Panel], *, words: bool) -> tuple[float, float]:
-    """Draw the scale of a panel; return its ends."""
+    """Draw the scale of a panel; return its limits."""
     ends = panel.ends
     if ends is None:
         numbers = [number for one in of for number in one.numbers if number > 0 or not panel.log]
@@ -249,7 +249,7 @@ def _scale(sheet: Sheet, axes: Axes, panel: Panel, of: Sequence[Panel], *, words
 
 
 def scale_ticks(low: float, high: float, *, log: bool) -> list[float]:
-    """Return round numbers between the ends of a scale: from 1, 2 and 5, in decades on a logarithmic one."""
+    """Return round numbers (1, 2, 5 per decade, or linear) between the ends of a scale."""
     if not log:
         ticks = MaxNLocator(nbins=5, steps=[1, 2, 5, 10]).tick_values(low, high)
         return [float(f"{tick:.12g}") for tick in ticks if low <= tick <= high]
@@ -305,7 +305,7 @@ def _draw_panel(
 
 
 def _offsets(panel: Panel, people: Sequence[str], *, apart: bool) -> np.ndarray:
-    """Return how far each participant's points are beside their column, so that equal numbers stay visible."""
+    """Return the horizontal offset of each participant's points, so that equal numbers remain visible."""
     if len(people) < 2:
         return np.zeros(len(people))
     order = np.argsort(np.argsort([panel.columns[0].values.get(person, 0.0) for person in people], kind="stable"))

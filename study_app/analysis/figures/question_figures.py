@@ -38,7 +38,7 @@ _Draw: TypeAlias = Callable[[PlacedQuestion, QuestionResult, Look], Sheet]
 
 @dataclass(frozen=True, slots=True)
 class _QuestionFigure:
-    """A figure by its id: what draws it, and the sentence of its caption."""
+    """A kind of figure: its drawing function and the sentence of its caption."""
 
     id: str
     draw: _Draw
@@ -46,7 +46,7 @@ class _QuestionFigure:
 
 
 def rows(names: Sequence[str], ns: Sequence[int], look: Look, *, row_pt: float) -> tuple[Sheet, Axes]:
-    """Return a sheet and its axes, in which row k lies around y = k, the first at the top."""
+    """Return a sheet and axes with one row per name; row k is at y = k, the first at the top."""
     sheet = look.sheet(_TOP_PT + row_pt * len(names) + _FOOT_PT)
     axes = sheet.axes(_LEFT_PT, _TOP_PT, sheet.width_pt - _LEFT_PT - _RIGHT_PT, row_pt * len(names))
     axes.set_ylim(len(names) - 0.5, -0.5)
@@ -69,7 +69,7 @@ def _rows_of_groups(result: QuestionResult, look: Look, row_pt: float) -> tuple[
 
 
 def _ends(sheet: Sheet, y: float, low: str, high: str) -> None:
-    """Write what the ends of the axis mean."""
+    """Label the ends of the axis."""
     sheet.text(_LEFT_PT, y, low, size=SMALL, colour=style.TEXT_SOFT)
     sheet.text(sheet.width_pt - _RIGHT_PT, y, high, size=SMALL, colour=style.TEXT_SOFT, ha="right")
 
@@ -81,7 +81,7 @@ _PILE: Final = 0.07  # from one of equal answers to the next
 
 @style.own_settings()
 def draw_distribution(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
-    """Draw the answers."""
+    """Draw the distribution of the answers."""
     groups = result.groups
     sheet, axes = _rows_of_groups(result, look, _ROW_PT)
     values = [value for group in groups for value in group.numbers["values"]]
@@ -114,7 +114,7 @@ _OPTION_PT: Final = 20.0
 
 @style.own_settings()
 def draw_options(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
-    """Draw the counts of all options."""
+    """Draw the count of each option."""
     several = len(result.groups) > 1
     bars = [
         (f"{group.name}: {words}" if several else words, int(group.numbers["counts"][option]), int(group.numbers["n"]))
@@ -143,7 +143,7 @@ _NARROW: Final = 0.03  # share of a bar in which the value is not printed
 
 
 def colours(points: int) -> list[str]:
-    """Return a colour for each point, from the palette of agreement."""
+    """Return a colour for each point, from the palette for agreement."""
     palette = LinearSegmentedColormap.from_list("points", style.LEVEL_COLOURS)
     return [to_hex(palette(place / (points - 1))) for place in range(points)]
 
@@ -155,7 +155,7 @@ def _ink(colour: str) -> str:
 
 @style.own_settings()
 def draw_ratings(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
-    """Draw the counts of all points."""
+    """Draw the count of each point."""
     groups = result.groups
     sheet, axes = _rows_of_groups(result, look, _RATING_PT)
     axes.set_xlim(0, 1)
@@ -175,7 +175,7 @@ def draw_ratings(asked: PlacedQuestion, result: QuestionResult, look: Look) -> S
 
 
 def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
-    """Write the ends of the scale, and between them the points in their colours."""
+    """Draw the labels of the scale's ends, and between them the points in their colours."""
     y = sheet.height_pt - 12
     _ends(sheet, y, names[0], names[-1])
     x = (_LEFT_PT + sheet.width_pt - _RIGHT_PT - _SWATCH_PT * len(inks)) / 2
@@ -200,10 +200,10 @@ def question_pictures(
     forms: Sequence[str] = style.FORMATS,
     failures: Failures | None = None,
 ) -> Iterator[Picture]:
-    """Draw the figure of every question that was answered and has one, in each of ``forms``.
+    """Draw the figure of every answered question that has one, in each of ``forms``.
 
-    A figure that fails is left out, and kept in ``failures``; blocks of levels have figures of their own once the key
-    is open.
+    A figure that fails is omitted and added to ``failures``; blocks of levels have their own figures once the key is
+    open.
     """
     of_levels = {block.id for block in study.levels if block.design.adjusts or study.revealed}
     yield from attempted(

@@ -32,7 +32,7 @@ MOST_PANELS: Final = 9
 
 
 class Estimates(NamedTuple):
-    """What a block of levels measures: the rows of the group, those of participants, and the attribute in words."""
+    """The main estimates of a block of levels: rows of the group and of participants, and the name of the measure."""
 
     group: list[Any]
     own: list[Any]
@@ -41,7 +41,7 @@ class Estimates(NamedTuple):
 
 
 def estimates_of(result: LevelsResult) -> Estimates | None:
-    """Return the estimates that answer the question of a block of levels; None without any."""
+    """Return the estimates that answer a block's question; None if there are none."""
     for statistic, attribute, words in _MEASURES:
         rows = [one for one in statistic.of(result) if getattr(one, attribute) is not None]
         if own := [row for row in rows if row.participant is not None]:
@@ -53,7 +53,7 @@ def estimates_of(result: LevelsResult) -> Estimates | None:
 
 
 def place_of(one: Any) -> float | str | None:
-    """Return where an estimate is: its comparison, level or standard."""
+    """Return the comparison, level or standard of an estimate."""
     places = (getattr(one, name, None) for name in ("comparison", "level", "standard"))
     return next((place for place in places if place is not None), None)
 
@@ -61,7 +61,7 @@ def place_of(one: Any) -> float | str | None:
 def summary_pictures(
     study: Study, results: Results, forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
 ) -> Iterator[Picture]:
-    """Draw a figure of every hypothesis, of what blocks of levels measure, and of scores."""
+    """Draw the figures of every hypothesis, of the estimates of blocks of levels, and of scores."""
     yield from attempted(_pictures(study, results, forms), failures)
 
 
@@ -141,7 +141,7 @@ def _differences(contrast: ContrastResult) -> dict[str, float]:
 
 
 def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
-    """Return what the scale of a hypothesis shows."""
+    """Return the title of a hypothesis' scale."""
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:
         return level_words(result)
     return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points of the scale")
@@ -189,7 +189,7 @@ def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: s
 class Numbers(NamedTuple):
     """A score or a question: each participant's number by the name of each setting.
 
-    ``bounds`` are the ends of the scale on which it was answered.
+    ``bounds`` are the ends of its answer scale.
     """
 
     title: str
@@ -199,14 +199,14 @@ class Numbers(NamedTuple):
 
 
 def numbers_of(study: Study) -> dict[str, list[Numbers]]:
-    """Return the scores and the answers that are numbers, by where they were asked; none of blocks of levels."""
+    """Return scores and numeric answers by the place where they were asked, except in blocks of levels."""
     levels = {block.id for block in study.levels}
     places = dict.fromkeys(question.where.id for question in study.others.questions if question.where.id not in levels)
     return {where: found for where in places if (found := _numbers_at(study, where))}
 
 
 def _numbers_at(study: Study, where: str) -> list[Numbers]:
-    """Return the scores of a questionnaire or, where it has none, the answers to its questions that are numbers."""
+    """Return the scores of a questionnaire or, if it has none, the numeric answers to its questions."""
     scores = [score for score in study.others.scores if score.where.id == where]
     tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
     if scores:

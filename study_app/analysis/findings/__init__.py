@@ -18,5 +18,5 @@ FINDINGS: Final = Registry[type[Finding[Any]]]("finding", {one.key: one for one 
 
 
 def all_findings() -> tuple[type[Finding[Any]], ...]:
-    """Return every finding, in the order of their places."""
+    """Return all kinds of findings, ordered by their places."""
     return tuple(sorted(FINDINGS.values(), key=lambda finding: finding.place))

@@ -35,7 +35,7 @@ from study_app.analysis.wording import all_of, counted, interval, listed, ms, nu
 
 @dataclass(frozen=True, slots=True)
 class ContrastWithControl:
-    """One delay compared with the shortest in one statement: whether the answers are equivalent."""
+    """The equivalence test of one delay against the shortest, for one statement."""
 
     item: str
     delay_ms: float
@@ -44,14 +44,15 @@ class ContrastWithControl:
 
     @property
     def verdict(self) -> Nearness:
-        """What may be said: "equivalent" where every test shows it."""
+        """The verdict: "equivalent" only if every test shows it."""
         return self.found.verdict
 
 
 def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, float | None]:
-    """Return the longest delay up to which all are equivalent, by statement: a fixed order, so nothing is corrected.
+    """Return the longest delay, by statement, up to which all delays are equivalent.
 
-    Equivalent is only what every test shows.
+    The delays are tested in a fixed order, so no correction is needed. A delay counts as equivalent only if every test
+    shows it.
     """
     longest: dict[str, float | None] = {}
     stopped = set()
@@ -65,7 +66,7 @@ def equivalent_up_to(against: tuple[ContrastWithControl, ...]) -> dict[str, floa
 
 
 def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
-    """Yield how the comparisons with the shortest delay were made, and what they could not show."""
+    """Yield sentences on how the comparisons with the shortest delay were made, and on their limits."""
     first = against[0].found
     yield (
         f"Two one-sided t tests with an equivalence bound of {_points(first.bound)}, and "
@@ -86,7 +87,7 @@ _VERDICTS: Final = ("equivalent", "not equivalent", "inconclusive", "out of reac
 
 
 def by_delay(result: BlockResult) -> list[list[str]]:
-    """Return a row a delay: in which statements it has each verdict, and what may be said of it in one sentence."""
+    """Return one table row per delay: the statements with each verdict, and a concluding sentence."""
     rows = []
     for delay_ms in dict.fromkeys(tested.delay_ms for tested in ContrastsWithControl.of(result)):
         here = [tested for tested in ContrastsWithControl.of(result) if tested.delay_ms == delay_ms]
@@ -109,10 +110,10 @@ def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithCo
 
 
 def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
-    """Return what shows that delays up to this one change answers.
+    """Return the evidence that delays up to this one change answers.
 
-    That is a trend up to this delay or a shorter one, with the error rate held over all statements, or an interval
-    beyond the bound.
+    This is a trend up to this delay or a shorter one, with the error rate controlled over all statements, or an
+    interval beyond the bound.
     """
     exploratory = {trend.item for trend in DelayTrend.of(result) if not trend.primary}
     trends = (
@@ -133,7 +134,7 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
 
 
 def common_ms(result: BlockResult) -> float | None:
-    """Return the longest delay up to which every statement is equivalent at every delay."""
+    """Return the longest delay up to which all statements are equivalent at all delays."""
     delays = list(equivalent_up_to(ContrastsWithControl.of(result)).values())
     known = [delay for delay in delays if delay is not None]
     return min(known) if known and len(known) == len(delays) else None
@@ -152,7 +153,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[ContrastWithControl, ...], Absent]:
-        """Compare every delay with the shortest one, by the bound that was decided."""
+        """Compare every delay with the shortest one, using the planned bound."""
         bound, delays_ms = answers.decided.equivalence_bound, answers.block.delays_ms
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
@@ -242,10 +243,10 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class Lowest:
-    """The lowest delay at which a trend shows in one statement, stepping down.
+    """The lowest delay with a trend in one statement, found by stepping down.
 
-    The error rate of ``steps`` holds within the statement; that of ``over_all_ms``, the lowest delay whose steps all
-    have p ≤ alpha / ``members``, over all statements of the family.
+    The error rate of ``steps`` is controlled within the statement; that of ``over_all_ms``, the lowest delay whose
+    steps all have p ≤ alpha / ``members``, over all statements of the family.
     """
 
     item: str
@@ -254,7 +255,7 @@ class Lowest:
 
     @property
     def over_all_ms(self) -> float | None:
-        """The lowest delay that shows with the error rate held over all statements; None without any."""
+        """The lowest delay with the error rate controlled over all statements; None if there is none."""
         lowest = None
         for step in self.steps.steps:
             if step.trend.p is None or step.trend.p > self.steps.alpha / self.members:
@@ -264,7 +265,7 @@ class Lowest:
 
 
 class LowestDelay(Finding[tuple[Lowest, ...]]):
-    """The lowest delay at which a trend shows, stepping down from the longest."""
+    """The lowest delay with a trend, stepping down from the longest."""
 
     key = "lowest"
     place = 6
@@ -276,7 +277,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Lowest, ...], Absent]:
-        """Step down in the statements whose trend is there at all."""
+        """Step down in the statements that show a trend over all delays."""
         trends, lowest = DelayTrend.of(result), []
         showing = [trend for trend in trends if trend.verdict in FOUND]
         for test in showing:
@@ -328,7 +329,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
 
 
 class DetectionThreshold(Finding[Threshold | None]):
-    """The detection threshold of a delay: a psychometric function fitted to the answers to one statement."""
+    """The detection threshold for a delay: a psychometric function fitted to the answers to one statement."""
 
     key = "threshold"
     place = 8
@@ -401,7 +402,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",))
 
     def _shares(self, drawing: Drawing) -> dict[str, dict[float, float]]:
-        """Return of each participant the share of answers that agree, by delay."""
+        """Return, for each participant, the share of answers that agree, by delay."""
         answers = drawing.study.answers(drawing.block)
         rows = answers[(answers["item"] == self.results.decided.noticed) & answers["response"].notna()]
         delays_ms = {setting.code: setting.delay_ms or 0.0 for setting in drawing.found.settings}
@@ -420,14 +421,13 @@ class DetectionThreshold(Finding[Threshold | None]):
 
 
 def _threshold_interval(threshold: Threshold) -> str:
-    """Return the interval of a detection threshold, or why there is none."""
     if threshold.interval is None:
         return threshold.no_interval
     return f"95 % interval {interval(threshold.interval, 0)} ms"
 
 
 def _half_way(threshold: Threshold) -> str:
-    """Return what a detection threshold is, and how many answers agree there, in a sentence."""
+    """Return a sentence that defines a detection threshold and gives the share of agreement there."""
     return (
         "The threshold is the delay at which the fitted function lies halfway between the guess rate "
         f"({percent(threshold.guess or 0.0)}) and one minus the lapse rate ({percent(threshold.lapse or 0.0)}): "
@@ -436,7 +436,7 @@ def _half_way(threshold: Threshold) -> str:
 
 
 class NoticedFrom(Finding[None]):
-    """The first page's answer to the delay from which participants notice a difference."""
+    """The first page's answer: the delay from which participants notice a difference."""
 
     key = "noticed from"
     place = 21
@@ -445,7 +445,7 @@ class NoticedFrom(Finding[None]):
     answer_figures = ("threshold", "delays")
 
     def answer(self) -> Answer:
-        """Return from which delay a change shows: by primary statements, or else by exploratory ones."""
+        """Return the shortest delay with a change, from primary statements or else from exploratory ones."""
         decided, threshold = self.results.decided, DetectionThreshold.of(self.found)
         fitted = decided.noticed if threshold is not None and threshold.effect is not None else None
         for primary, verdict in ((True, "shown"), (False, "suggested")):
@@ -458,7 +458,7 @@ class NoticedFrom(Finding[None]):
         return self.answered("not shown", f"It is not shown that any delay is noticed. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
-        """Return the sentence of the shortest delay that changes one of these statements; empty without any."""
+        """Return a sentence on the shortest delay that changes one of these statements, or ""."""
         lowest = [
             lowest for lowest in LowestDelay.of(self.found) if lowest.over_all_ms is not None and lowest.item in items
         ]
@@ -477,7 +477,7 @@ class NoticedFrom(Finding[None]):
         )
 
     def _threshold_words(self) -> str:
-        """Return the detection threshold in a sentence, with a space."""
+        """Return a sentence on the detection threshold, with a leading space."""
         threshold = DetectionThreshold.of(self.found)
         if threshold is None or threshold.effect is None:
             return ""
@@ -488,14 +488,14 @@ class NoticedFrom(Finding[None]):
         )
 
     def _correlation(self, lowest: Lowest, up_to_ms: float) -> float:
-        """Return the mean rank correlation of answers to a statement and delays up to one."""
+        """Return the mean rank correlation between answers to a statement and delays up to the given one."""
         step = next(step for step in lowest.steps.steps if step.longest_ms == up_to_ms)
         falling = self.results.decided.direction(lowest.item) == "decreasing"
         return (step.trend.effect or 0.0) * (-1 if falling else 1)
 
 
 class UnchangedUpTo(Finding[None]):
-    """The first page's answer to the delay up to which answers do not change by a relevant amount."""
+    """The first page's answer: the delay up to which answers do not change by a relevant amount."""
 
     key = "unchanged up to"
     place = 22
@@ -504,7 +504,7 @@ class UnchangedUpTo(Finding[None]):
     answer_figures = ("effects",)
 
     def answer(self) -> Answer:
-        """Return up to which delay mean answers are equivalent to those at the shortest."""
+        """Return the longest delay up to which mean answers are equivalent to those at the shortest."""
         against = ContrastsWithControl.of(self.found)
         if not against:
             why = next(
@@ -527,7 +527,7 @@ _NO_DELAY: Final = "We could not show for any delay that the mean answers to all
 
 
 def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) -> str:
-    """Return the largest mean difference with its interval, as a sentence with a space; nothing without any."""
+    """Return a sentence on the largest mean difference with its interval, with a leading space, or ""."""
     known = [tested for tested in against if tested.found.effect is not None and tested.found.interval is not None]
     if not known:
         return ""
@@ -540,7 +540,7 @@ def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) 
 
 
 def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
-    """Return how many comparisons are not equivalent, as a sentence; without any, that nothing follows."""
+    """Return a sentence on the number of comparisons that are not equivalent, or on their absence."""
     beyond = sum(tested.verdict == "not equivalent" for tested in against)
     if not beyond:
         return "This does not show that they change."
@@ -551,7 +551,7 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
 
 
 def _not_excluded(tested: Sequence[Equivalence]) -> str:
-    """Return how many people may differ by more than the bound, by the 95 % interval of their share."""
+    """Return a phrase for the share of participants that may differ by more than the bound."""
     most = max(
         (equivalence.beyond.interval.high for equivalence in tested if equivalence.beyond is not None), default=1.0
     )
@@ -571,7 +571,7 @@ _MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovemen
 
 
 def _kept(block: Block, results: Results) -> str:
-    """Say how many trials kept to the limits of timing."""
+    """Return a sentence on the number of trials within the timing limits."""
     here = [delivered for delivered in results.delivered if delivered.block == block.id]
     judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
     if not judged:
@@ -580,7 +580,7 @@ def _kept(block: Block, results: Results) -> str:
 
 
 class Movement(Finding[None]):
-    """The figure of how participants reach under a delay, measured from recordings."""
+    """The figure of reaching movements by delay, measured from recordings."""
 
     key = "movement"
     place = 11

@@ -33,14 +33,14 @@ _FEWER_DRAWS: Final = 1999
 
 @dataclass(frozen=True, kw_only=True)
 class BlockAnswers:
-    """A block's answers as arrays, settings in their order; NaN where one is missing.
+    """A block's answers as arrays, with settings in order; missing answers are NaN.
 
     ``values`` (participants, settings) are the medians of ``single`` answers (participants, settings, presentations);
-    ``sessions`` of the same shape are the sessions in which these were given. ``sites`` are those of the
-    participants of a merged study. ``verdicts_only``: leave out what decides no verdict, for thousands of simulated
-    studies. ``over_all`` is the one test over all statements, or why it failed, ``gate`` its p corrected by Holm over
-    the blocks of the study: no adjusted p of a statement is below it, so that in a study where nothing differs anything
-    is found at most as often as alpha says.
+    ``sessions`` of the same shape are the sessions of these answers. ``sites`` are those of the participants of a
+    merged study. ``verdicts_only`` omits results that decide no verdict, for thousands of simulated studies.
+    ``over_all`` is the global test over all statements, or its failure, ``gate`` its p value with Holm's correction
+    over the blocks of the study: no adjusted p of a statement is below it, so that in a study without any difference
+    the probability of any finding is at most alpha.
     """
 
     block: Block
@@ -57,36 +57,36 @@ class BlockAnswers:
 
     @property
     def n(self) -> int:
-        """How many participants answered anything."""
+        """The number of participants with any answer."""
         return len(self.people)
 
     @property
     def k(self) -> int:
-        """How many settings there are; conditions of one delay are one."""
+        """The number of settings, where conditions with the same delay count as one."""
         return len(set(self.block.columns.values()))
 
     @property
     def intervals(self) -> int | None:
-        """The seed of bootstrap intervals; None: leave them out."""
+        """The seed of bootstrap intervals; None omits them."""
         return None if self.verdicts_only else self.seed
 
     @property
     def draws(self) -> int:
-        """How many rearrangements are drawn for one statement where not all can be gone through.
+        """The number of random permutations for one statement if full enumeration is too expensive.
 
-        So many that their number never decides whether something can be shown.
+        It is large enough that it never decides whether significance can be reached.
         """
         return draws_for(self.decided.alpha, DRAWS, len(self.block.items))
 
     def verdict(self, p: float | None, least: float | None, *, primary: bool) -> Verdict:
-        """Return what may be said of a test of one statement, see `verdict`; nothing is shown that the gate hides."""
+        """Return the verdict on a test of one statement, see `verdict`; the gate can only make it weaker."""
         smallest = self.over_all.smallest_p if isinstance(self.over_all, Outcome) else None
         bounds = None if least is None else max(least, smallest or 0.0)
         return verdict(None if p is None else max(p, self.gate), bounds, self.decided.alpha, primary=primary)
 
     @property
     def draws_over_all(self) -> int:
-        """How many are drawn for the one test over all statements."""
+        """The number of random permutations for the global test over all statements."""
         return draws_for(self.decided.alpha, DRAWS if self.n <= MANY else _FEWER_DRAWS)
 
 
@@ -117,7 +117,7 @@ def of_tables(
 ) -> BlockAnswers:
     """Return a block's answers from tables of single answers (participants, settings, presentations) of each item.
 
-    Without ``sessions``, arrays of the same shape, all answers are of one session.
+    Without ``sessions``, arrays of the same shape, all answers are from one session.
     """
     return BlockAnswers(
         block=block,
@@ -133,7 +133,7 @@ def of_tables(
 
 
 def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
-    """Return a block without findings: settings, statements, counts; without a study no measures."""
+    """Return a block without findings: settings, statements and counts; without a study, no measures."""
     block = answers.block
     columns = list(block.columns.values())
     delays = enumerate(block.delays_ms) if block.kind == "delays" and block.revealed else ()
@@ -157,7 +157,7 @@ def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
 
 
 def untested(block: Block, *absent: NotTested) -> BlockResult:
-    """Return a block of which nothing was computed."""
+    """Return an empty result for a block."""
     return BlockResult(
         id=block.id,
         title=block.title,
@@ -174,7 +174,7 @@ def untested(block: Block, *absent: NotTested) -> BlockResult:
 
 
 def presented(single: Iterable[Array]) -> tuple[int, int]:
-    """Return the fewest and the most single answers that a participant gave to one statement on one setting."""
+    """Return the least and greatest number of answers by a participant to one statement in one setting."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
     given = counts[counts > 0]
     return (int(given.min()), int(given.max())) if len(given) else (0, 0)
@@ -188,7 +188,7 @@ ALONE: Final = "none"
 
 
 def judged(outcomes: Mapping[str, Outcome], answers: BlockAnswers, family: str) -> tuple[Tested, ...]:
-    """Return the tests of statements (item → outcome): primary ones as a Holm family, the others exploratory by FDR."""
+    """Return the tests of statements (item → outcome): primary ones with Holm's correction, the others with FDR."""
     primary = {item: outcome for item, outcome in outcomes.items() if answers.decided.is_primary(item)}
     others = {item: outcome for item, outcome in outcomes.items() if item not in primary}
     verdicts = {
@@ -210,7 +210,7 @@ def in_family(
     *,
     primary: bool | Sequence[bool],
 ) -> tuple[Tested, ...]:
-    """Return tests that are corrected together; ``primary``: all of them, or for each whether it is."""
+    """Return tests that are corrected together; ``primary`` is one value for all, or one for each."""
     of_primary = [primary] * len(outcomes) if isinstance(primary, bool) else primary
     ps = [outcome.p for outcome in outcomes.values()]
     members = []
@@ -234,10 +234,10 @@ def in_family(
 
 
 def verdict(p: float | None, least: float | None, alpha: float, *, primary: bool) -> Verdict:
-    """Return what may be said of a test.
+    """Return the verdict on a test.
 
-    ``p`` is adjusted; ``least`` is the one that these participants could have given at least (None: no bound), the
-    other tests of the family being as they are.
+    ``p`` is adjusted; ``least`` is the smallest adjusted p that these participants could have produced (None: no
+    bound), given the other tests of the family.
     """
     if p is None:
         return "not tested"
@@ -304,7 +304,7 @@ def test_row(result: BlockResult, question: str, outcome: Outcome) -> dict[str, 
 
 
 def codes_of(result: BlockResult, *delays_ms: float) -> str:
-    """Return the codes of a block's settings, or those of these delays, in order; those of one delay are joined."""
+    """Return the codes of a block's settings, or of these delays, in order; codes with the same delay are joined."""
     if not result.delays_ms:
         return " ".join(setting.code for setting in result.settings)
     return " ".join(
@@ -327,7 +327,7 @@ def judged_row(result: BlockResult, question: str, test: Tested) -> dict[str, An
 
 
 def rows_alone(result: BlockResult, what: str) -> dict[str, Any]:
-    """Return the family of a test that is corrected for no other."""
+    """Return the family entries of a test that is not corrected with others."""
     return {"family": f"{result.id}: {what}", "members": 1, "correction": ALONE}
 
 
@@ -337,10 +337,10 @@ FOUND: Final = ("shown", "suggested")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """A row of the first page: the verdict on one question (the key of a finding) about one block (its id), in words.
+    """A row of the first page: the verdict on one question (a finding's key) about one block (its id), as text.
 
-    ``claims`` says whether it claims that settings differ or that a delay is noticed, which would be false in a study
-    where nothing differs.
+    ``claims`` tells whether it claims that settings differ or that a delay is noticed, which would be false in a study
+    without any difference.
     """
 
     question: str
@@ -415,17 +415,17 @@ class Finding(Generic[R]):
 
     @classmethod
     def of(cls, result: BlockResult) -> R:
-        """Return the value that was found in a block."""
+        """Return its value in a block's result."""
         return cast("R", result.findings.get(cls.key, cls.empty))
 
     @classmethod
     def add_to(cls, result: BlockResult, value: R) -> BlockResult:
-        """Return a block's findings with this value."""
+        """Return a block's result with this value added."""
         return replace(result, findings={**result.findings, cls.key: value})
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[R, Absent]:
-        """Return the value, of a block's answers and the findings with lower places, and what was not tested."""
+        """Return the value computed from a block's answers and the findings with lower places, and untested parts."""
         raise NotImplementedError
 
     @classmethod
@@ -435,7 +435,7 @@ class Finding(Generic[R]):
 
     @classmethod
     def common_methods(cls, blocks: Sequence[BlockResult]) -> Iterable[str]:
-        """Return the sentences of the methods paragraph about all blocks together."""
+        """Return the sentences of the methods paragraph that concern all blocks together."""
         return ()
 
     def rows(self) -> Iterable[Row]:
@@ -443,11 +443,11 @@ class Finding(Generic[R]):
         return ()
 
     def section(self) -> Iterable[str]:
-        """Return its part of the report's section of the block, of `analysis.html_page`; text is escaped."""
+        """Return its HTML parts of the block's section in the report, made with `analysis.html_page`."""
         return ()
 
     def limits(self) -> Iterable[str]:
-        """Return the sentences about what was not shown."""
+        """Return sentences about limitations, such as effects that could not be shown."""
         return ()
 
     def methods(self) -> Iterable[str]:
@@ -455,19 +455,19 @@ class Finding(Generic[R]):
         return ()
 
     def figure(self, drawing: Drawing) -> Picture | None:
-        """Draw its figure; None where there is nothing to draw."""
+        """Draw its figure; None if it has none."""
         raise NotImplementedError
 
     def drawn(self) -> Iterable[str]:
-        """Return the HTML of its figure, where it was drawn."""
+        """Return the HTML of its figure, if it was drawn."""
         return drawn(self._pictures, self.figure_name)
 
     def answer(self) -> Answer:
-        """Return the answer to its question of the first page, once the key is open, also where nothing was found."""
+        """Return the answer to its question on the first page once the key is open, also for a negative result."""
         raise NotImplementedError
 
     def answered(self, verdict: str, text: str, *, claims: bool = False) -> Answer:
-        """Return an answer to its question in this block."""
+        """Return an answer to its question for this block."""
         return Answer(
             question=self.key, block=self.found.id, title=self.found.title, verdict=verdict, text=text, claims=claims
         )

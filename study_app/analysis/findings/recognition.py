@@ -33,7 +33,7 @@ _NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
 
 @dataclass(frozen=True, slots=True)
 class RecognitionResult:
-    """The recognition of liquids: the items that name one, and which of them is right for each setting (code)."""
+    """The recognition of liquids: the items that name one, and the correct item for each setting (code)."""
 
     labels: tuple[str, ...]
     settings: tuple[str, ...]
@@ -43,7 +43,7 @@ class RecognitionResult:
 
 
 class LiquidRecognition(Finding[RecognitionResult | None]):
-    """Recognition of liquids: the statement rated highest names one."""
+    """Recognition of liquids: the statement with the highest rating names the liquid."""
 
     key = "named"
     place = 4
@@ -56,7 +56,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[RecognitionResult | None, Absent]:
-        """Test whether settings were named for what they were."""
+        """Test whether settings were named correctly more often than by chance."""
         labels = answers.decided.names
         right = tuple(setting.label for setting in answers.block.settings)
         if not labels or not set(labels) <= answers.values.keys() or not any(right):
@@ -160,7 +160,7 @@ _UNDECIDED_COLUMN: Final = -2
 
 
 def _kappa_words(outcome: Recognition) -> str:
-    """Return kappa with its interval and of how many answers it is, in a sentence."""
+    """Return a sentence with kappa, its interval and the number of answers."""
     if outcome.effect is None:
         return f"Cohen's kappa does not exist ({outcome.no_interval.removeprefix('no interval: ')})."
     ends = outcome.no_interval if outcome.interval is None else f"95 % interval {interval(outcome.interval)}"
@@ -171,7 +171,7 @@ def _kappa_words(outcome: Recognition) -> str:
 
 
 def _undecided_words(outcome: Recognition) -> str:
-    """Return what becomes of undecided answers, as a sentence with a space; nothing without any."""
+    """Return a sentence on the treatment of undecided answers, with a leading space, or ""."""
     if not outcome.undecided:
         return ""
     one = outcome.undecided == 1
@@ -182,10 +182,10 @@ def _undecided_words(outcome: Recognition) -> str:
 
 
 def recognised(named: RecognitionResult, alpha: float) -> tuple[int, ...]:
-    """Return the places of the settings that were recognised.
+    """Return the indices of the settings that were recognised.
 
-    Only where names are right more often than by chance as a whole; then those whose name is used for them more often
-    than for each other setting.
+    Only if names are correct more often than by chance overall; then those settings whose name is used more often for
+    them than for each other setting.
     """
     if named.verdict not in FOUND:
         return ()
@@ -193,7 +193,7 @@ def recognised(named: RecognitionResult, alpha: float) -> tuple[int, ...]:
 
 
 class Distinguished(Finding[None]):
-    """The first page's answer to which liquids, or views, were distinguished."""
+    """The first page's answer: the liquids or views that were distinguished."""
 
     key = "distinguished"
     place = 20
@@ -202,9 +202,9 @@ class Distinguished(Finding[None]):
     answer_figures = ("effects", "recognition")
 
     def answer(self) -> Answer:
-        """Return which liquids were recognised by name, and which of them, or of the views, were rated differently.
+        """Return the liquids recognised by name, and the liquids or views that were rated differently.
 
-        Exploratory tests count only where no primary one shows anything.
+        Exploratory tests are used only if no primary one is significant.
         """
         result, named = self.found, LiquidRecognition.of(self.found)
         known = () if named is None else recognised(named, self.results.decided.alpha)

@@ -52,7 +52,7 @@ ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare
 def table_of_tests(
     title: str, result: BlockResult, tests: Sequence[Tested], compared: Sequence[str] = ()
 ) -> Iterator[str]:
-    """Yield a table of tests; ``compared`` are the names of what each of them compares."""
+    """Yield a table of tests; ``compared`` names what each of them compares."""
     if not tests:
         return
     first, outcomes = tests[0], [test.outcome for test in tests]
@@ -94,7 +94,7 @@ def _verdict(test: Tested) -> str:
 
 
 def families(tests: Sequence[Tested]) -> str:
-    """Return what is corrected together: primary statements, and apart from them the exploratory ones."""
+    """Return the description of the families: primary statements, and separately exploratory ones."""
     each = sorted({(not test.primary, test.members, test.correction) for test in tests})
     several = len(each) > 1
     return "with p adjusted " + listed(
@@ -107,7 +107,7 @@ def families(tests: Sequence[Tested]) -> str:
 
 
 def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
-    """Test in every statement whether the settings are answered alike."""
+    """Test for every statement whether the settings receive the same answers."""
     if answers.k < 2:
         return (), (NotTested("test of settings", "the block has only one setting, so there is nothing to compare"),)
     outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
@@ -121,7 +121,7 @@ def _alike(answers: BlockAnswers, values: Any) -> Outcome:
 
 
 def slope_tests(answers: BlockAnswers) -> dict[str, SlopeTest]:
-    """Return the test of means of every statement: slopes over the delay, or differences from the first setting."""
+    """Return the mean test of every statement: slopes against delay, or differences from the first setting."""
     over_delay = answers.block.kind == "delays"
     columns = np.array(answers.block.delays_ms)[:, None] / 100 if over_delay else None
     return {
@@ -131,14 +131,14 @@ def slope_tests(answers: BlockAnswers) -> dict[str, SlopeTest]:
 
 
 class StatementTests(Finding[tuple[Tested, ...]]):
-    """One test of every statement; words may contain {noun}, what the settings are called."""
+    """One test per statement; texts may contain {noun}, the term for settings."""
 
     empty = ()
     asks: ClassVar[str]
     title: ClassVar[str]
 
     def compared(self) -> Sequence[str]:
-        """Return the names of what is compared."""
+        """Return the names of the compared settings."""
         return ()
 
     def rows(self) -> Iterator[Row]:
@@ -152,7 +152,7 @@ class StatementTests(Finding[tuple[Tested, ...]]):
 
 
 class SettingsDiffer(StatementTests):
-    """Differences between settings, statement by statement."""
+    """Differences between settings for each statement."""
 
     key = "omnibus"
     place = 2
@@ -185,7 +185,7 @@ def _first_tested(tests: Sequence[Tested]) -> Tested:
 
 
 class DelayTrend(StatementTests):
-    """The test of a trend over the delay in every statement, in the direction that was stated or in either."""
+    """The trend test over the delay for each statement, in the stated direction or two-sided."""
 
     key = "trends"
     place = 5
@@ -230,7 +230,7 @@ class DelayTrend(StatementTests):
 
 
 class _SessionsDiffer(StatementTests):
-    """The comparison of sessions in every statement, by the participants who came to all of them."""
+    """The comparison of sessions for each statement, by participants who attended all of them."""
 
     key = "by_session"
     place = 12
@@ -245,7 +245,7 @@ class _SessionsDiffer(StatementTests):
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
-        """A participant's answers in a session are their median over the settings answered in all sessions."""
+        """Compare participants' medians per session over the settings that were answered in all sessions."""
         numbers = result.sessions
         if len(numbers) < 2:
             return (), ()
@@ -263,9 +263,9 @@ class _SessionsDiffer(StatementTests):
 
 
 def gated(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[BlockAnswers, ...]:
-    """Return the answers of a study's blocks, each with its test over all statements and the gate that it gives.
+    """Return the answers of a study's blocks, each with its global test over all statements and the resulting gate.
 
-    ``draws``: so many rearrangements, if not as usual. Where the test fails, the gate is closed.
+    ``draws`` overrides the usual number of random permutations. If the test fails, the gate is closed.
     """
 
     def test(answers: BlockAnswers) -> Outcome | None:
@@ -283,7 +283,7 @@ def gated(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[Blo
 
 
 class OverAll(Finding[Outcome | None]):
-    """Differences between settings at all: one test over all statements of a block."""
+    """The global test over all statements of a block for any difference between settings."""
 
     key = "overall"
     place = 1
@@ -325,9 +325,9 @@ class OverAll(Finding[Outcome | None]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """The mean difference of a setting (code) from the first one in one statement, of ``n`` participants.
+    """The mean difference of a setting (code) from the first one in one statement, for ``n`` participants.
 
-    ``low`` and ``high`` are the ends of Student's 95 % interval, None where there is none.
+    ``low`` and ``high`` are the ends of Student's 95 % interval, None if there is none.
     """
 
     item: str
@@ -339,7 +339,7 @@ class Effect:
 
 
 class Effects(Finding[tuple[Effect, ...]]):
-    """The figure of effects: how far each setting differs from the first, statement by statement, with intervals."""
+    """The figure of effects: the difference of each setting from the first for each statement, with intervals."""
 
     key = "effects"
     place = 0.5
@@ -367,7 +367,7 @@ class Effects(Finding[tuple[Effect, ...]]):
         yield from self.drawn()
 
     def figure(self, drawing: Drawing) -> Picture | None:
-        """Draw every participant's answers to each statement; of delays, their differences from the shortest."""
+        """Draw every participant's answers to each statement; for delays, the differences from the shortest."""
         result, study = self.found, drawing.study
         if not self.value:
             return None
@@ -419,7 +419,7 @@ class Effects(Finding[tuple[Effect, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class Pair:
-    """Two settings (codes) compared in one statement; the family is all pairs that are compared in the block."""
+    """Two settings (codes) compared for one statement; the family is all compared pairs of the block."""
 
     first: str
     second: str
@@ -427,14 +427,14 @@ class Pair:
 
 
 def _smallest_of_pairs(settings: int, participants: int) -> float:
-    """Return the smallest p that a comparison of two of the settings can have, corrected over all pairs by Holm."""
+    """Return the smallest p that a pairwise comparison can have after Holm's correction over all pairs."""
     return min(1.0, math.comb(settings, 2) * 2.0 ** (1 - participants))
 
 
 def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[Pair, ...], Absent]:
-    """Compare settings two by two in the statements that differ at all; all pairs of all of them are one Holm family.
+    """Compare settings pairwise in the statements that differ at all, as one Holm family.
 
-    Where one liquid differs from all others, every statement is opened, and each holds pairs that do not differ.
+    If one liquid differs from all others, every statement is included, and each has pairs that do not differ.
     """
     n, k, alpha, codes = answers.n, answers.k, answers.decided.alpha, answers.block.codes
     if k < 3:
@@ -463,7 +463,7 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
 
 
 class Pairs(Finding[tuple[Pair, ...]]):
-    """The comparison of settings two by two, in the statements that differ at all."""
+    """Pairwise comparisons of settings in the statements that differ at all."""
 
     key = "pairs"
     place = 3
@@ -522,20 +522,20 @@ class Pairs(Finding[tuple[Pair, ...]]):
 
 
 def _differing(pair: Pair) -> int:
-    """Return how many participants answered the two differently, who alone are tested."""
+    """Return the number of participants with different answers to the two, who alone enter the test."""
     outcome = pair.tested.outcome
     return outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
 
 
 def _pair_interval(pair: Pair) -> str:
-    """Return the interval of the effect, or in its place how many went one way, where all did."""
+    """Return the interval of the effect or, if all participants differ in one direction, their number."""
     outcome = pair.tested.outcome
     one_way = outcome.effect is not None and abs(outcome.effect) == 1.0
     return f"– (all {_differing(pair)} one way)" if one_way else interval(outcome.interval)
 
 
 class MeanTests(StatementTests):
-    """The test of means of every statement: exploratory, unless it is the planned test of trends."""
+    """The mean test of every statement: exploratory, unless it is the planned trend test."""
 
     key = "mixed"
     place = 13

@@ -42,9 +42,9 @@ _MOST_NAMED = 6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SettingEstimate:
-    """A participant's settings at one standard, as in `columns.RESULTS`, or the means of all ``n`` participants.
+    """A participant's settings at one standard, as in `columns.RESULTS`, or the means of ``n`` participants.
 
-    ``levels`` are a participant's settings, in order, and ``started_high`` says from which end.
+    ``levels`` are a participant's settings in order; ``started_high`` tells which of them started at the high end.
     """
 
     participant: str | None
@@ -61,7 +61,7 @@ class SettingEstimate:
 
 
 def settings(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SettingEstimate]:
-    """Yield the group's settings at each standard, followed by those of its participants; none of other designs."""
+    """Yield the group's settings at each standard, followed by those of its participants; none for other designs."""
     stimulus = block.stimulus
     if stimulus is None or not block.design.adjusts:
         return
@@ -190,13 +190,12 @@ SUMMARIES: Final[dict[Reply, Summary]] = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelAnswers:
-    """The answers at one level, of one participant or, where ``participant`` is None, of all.
+    """The answers at one level, of one participant or (``participant`` None) of all.
 
-    Those to catch trials are apart, with ``catch``.
-    A block that compares conditions has ``comparison`` in place of ``standard`` and ``level``. ``n`` answers of
-    ``participants`` are summarised in ``value``, ``count`` of them are what a share counts. ``low`` and ``high`` are
-    the ends of the 95 % interval: of a participant's share by Clopper and Pearson, otherwise by Student's t, over the
-    answers of one participant, or over the participants' values.
+    Answers to catch trials are separate, with ``catch``. A block that compares conditions has ``comparison`` instead of
+    ``standard`` and ``level``. ``value`` summarises ``n`` answers of ``participants``; ``count`` is the number of
+    counted answers in a share. ``low`` and ``high`` are the ends of the 95 % interval: Clopper–Pearson for a
+    participant's share, otherwise Student's t over the answers of one participant, or over the participants' values.
     """
 
     participant: str | None
@@ -213,14 +212,14 @@ class LevelAnswers:
 
 
 def chooses_units(block: LevelBlock) -> bool:
-    """Return whether each participant chooses the unit of the numbers named: there is no modulus."""
+    """Return whether each participant chooses the unit of magnitude estimates, because there is no modulus."""
     return block.design.reply == "number" and block.design.first is None
 
 
 def _level_answers(
     block: LevelBlock, opened: pd.DataFrame, bounds: tuple[float, float] | None
 ) -> Iterator[LevelAnswers]:
-    """Yield the answers at each level, and apart those to catch trials: of all participants, then of each."""
+    """Yield the answers at each level, and separately to catch trials: of all participants, then of each."""
     if block.design.adjusts:
         return
     rows = analysed(block, opened)
@@ -237,7 +236,7 @@ def _level_answers(
 
 
 def _own_units(block: LevelBlock, rows: pd.DataFrame) -> Mapping[str, float]:
-    """Return ln of the unit that each participant chose for numbers, over the mean unit; nothing with a modulus.
+    """Return ln of each participant's unit of estimates relative to the mean unit; empty with a modulus.
 
     It is the mean over levels of the participant's mean ln answer.
     """
@@ -287,7 +286,7 @@ class _Mean(NamedTuple):
 
 
 def _summarised(summary: Summary, bounds: tuple[float, float] | None, values: Array) -> _Mean:
-    """Return the mean of shares, points or logarithms and its 95 % interval within bounds, as numbers of their kind."""
+    """Return the back-transformed mean of shares, points or logarithms and its 95 % interval within bounds."""
     low, high = student_interval(values)
     if summary == "geometric mean":
         low, high = (None if end is None else math.exp(end) for end in (low, high))
@@ -298,7 +297,7 @@ def _summarised(summary: Summary, bounds: tuple[float, float] | None, values: Ar
 
 
 def _of_group(result: LevelsResult) -> tuple[LevelAnswers, ...]:
-    """Return the answers of all participants together, in order of standard and level; without catch trials."""
+    """Return the answers of all participants together by standard and level, without catch trials."""
     return tuple(answer for answer in Answers.of(result) if answer.participant is None and not answer.catch)
 
 
@@ -309,19 +308,19 @@ def people(result: LevelsResult) -> tuple[str, ...]:
 
 
 def summary_words(result: LevelsResult) -> str:
-    """Return what a value at a level is: "share correct", "mean rating", "geometric mean of the numbers"."""
+    """Return the description of a value at a level: "share correct", "mean rating", and so on."""
     if result.summary == "share":
         return "share correct" if result.counts == "correct" else f"share “{result.counts}”"
     return "mean rating" if result.summary == "mean" else "geometric mean of the numbers"
 
 
 def mean_words(result: LevelsResult) -> str:
-    """Return what a value of all participants is."""
+    """Return the description of a value of all participants."""
     return "geometric mean" if result.summary == "geometric mean" else "mean"
 
 
 class Answers(LevelStatistic[LevelAnswers]):
-    """The answers at each level; the section has a table of all participants, and one of each for every standard."""
+    """The answers at each level; the section has a table of all participants, and one by participant per standard."""
 
     key = "answers"
     place = 1
@@ -369,7 +368,7 @@ class Answers(LevelStatistic[LevelAnswers]):
         )
 
     def _of_people(self, standard: float | None) -> str:
-        """Return a row per participant, a column per level."""
+        """Return a table with one row per participant and one column per level."""
         shown = [answers for answers in _of_group(self.found) if answers.standard == standard]
         own = {
             (row.participant, row.level, row.comparison): row

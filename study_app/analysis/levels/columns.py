@@ -221,7 +221,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
 
 
 class Results(NamedTuple):
-    """A table of results: what a row is, and its columns."""
+    """A table of results: the meaning of a row, and its columns."""
 
     row: str
     columns: tuple[Column, ...]
@@ -238,7 +238,7 @@ RESULTS: Final = {
 
 
 def dictionary_markdown() -> str:
-    """Return the columns of these tables as Markdown: a heading and a table for each."""
+    """Return the columns of these tables as Markdown, with a heading and a table for each."""
     added = (
         "columns that `export` adds to responses, trials and intervals; `trials_missing` in studies with "
         "trials of intervals, the last four after unblinding"

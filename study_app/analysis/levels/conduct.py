@@ -36,7 +36,7 @@ class _Range(NamedTuple):
 
 
 def _by_levels(rows: pd.DataFrame) -> Iterator[_Range]:
-    """Yield each level as a range; of many levels `_MOST_LEVELS` ranges of neighbours."""
+    """Yield each level as a range or, if there are many levels, `_MOST_LEVELS` ranges of neighbours."""
     for standard, at_standard in rows[rows["level"].notna()].groupby("standard", dropna=False, sort=True):
         level = at_standard["level"].astype(float)
         levels = np.unique(level.to_numpy())
@@ -47,7 +47,7 @@ def _by_levels(rows: pd.DataFrame) -> Iterator[_Range]:
 
 
 def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[_Row]:
-    """Yield the share of the force [%] that safety withheld in comparisons whose link is varied, by level."""
+    """Yield the share of the force [%] withheld by the safety layer by level, in comparisons with a varied link."""
     if block.stimulus is None or block.stimulus.vary not in OF_LINK:
         return
     rows = intervals[(intervals["block"] == block.id) & (intervals["presented"] == "comparison")]
@@ -58,9 +58,9 @@ def _withheld(block: LevelBlock, intervals: pd.DataFrame) -> Iterator[_Row]:
 
 
 def _level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFrame) -> Iterator[_Row]:
-    """Yield how the analysed trials at each standard were presented; ``intervals`` are those of all their attempts.
+    """Yield how the analysed trials at each standard were presented; ``intervals`` are those of all attempts.
 
-    ``reasons`` counts the intervals that broke each limit; errors are delivered less requested levels.
+    ``reasons`` counts the intervals that violated each limit; errors are delivered minus requested levels.
     """
     if block.stimulus is None:
         return
@@ -86,7 +86,7 @@ def _level_conduct(block: LevelBlock, opened: pd.DataFrame, intervals: pd.DataFr
 
 
 def _catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[_Row]:
-    """Yield how many catch trials of each session were answered incorrectly; a share above ``most`` excludes it."""
+    """Yield the number of incorrect catch trials of each session; a share above ``most`` excludes it."""
     if block.wrong_most is None:
         return
     caught = opened[(opened["block"] == block.id) & opened["catch"].fillna(False) & opened["right"].notna()]
@@ -97,7 +97,7 @@ def _catch_answers(block: LevelBlock, opened: pd.DataFrame) -> Iterator[_Row]:
 
 
 class Delivery(LevelStatistic[_Row]):
-    """How the trials at each standard were delivered."""
+    """The delivery of the trials at each standard."""
 
     key = "conduct"
     place = 6
@@ -147,7 +147,7 @@ def _rule(row: _Row) -> str:
 
 
 class _CatchTrials(LevelStatistic[_Row]):
-    """The answers to catch trials of each session, also where they exclude it."""
+    """The answers to catch trials of each session, including sessions that they exclude."""
 
     key = "catches"
     place = 7
@@ -170,7 +170,7 @@ class _CatchTrials(LevelStatistic[_Row]):
 
 
 class _Withheld(LevelStatistic[_Row]):
-    """What safety withheld of the force in comparisons whose link is varied, by level."""
+    """The force that the safety layer withheld by level, in comparisons with a varied link."""
 
     key = "withheld"
     place = 8
@@ -197,7 +197,7 @@ class _Withheld(LevelStatistic[_Row]):
         )
 
     def _up_to(self) -> Iterator[str]:
-        """Yield for each standard up to which level hardly anything was withheld in any comparison."""
+        """Yield, for each standard, the level up to which hardly any force was withheld in any comparison."""
         of = f" {self.found.unit}" if self.found.unit else ""
         for standard in dict.fromkeys(row["standard"] for row in self.rows):
             rows = [row for row in self.rows if row["standard"] == standard]

@@ -29,9 +29,9 @@ _SEALED: Final = "Standards, levels, contents of each interval and correct answe
 
 
 def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsResult, ...]:
-    """Return what was answered in every main block of levels, in the order of the session.
+    """Return the results of every main block of levels in session order.
 
-    ``rows`` are those of `tracks`, where they are already known.
+    ``rows`` are those of `tracks`, if they are already known.
     """
     main = [block for block in study.levels if block.phase == "main"]
     if not main:
@@ -84,9 +84,9 @@ def _times(answers: pd.DataFrame, block: LevelBlock, setting: Setting) -> GroupA
 
 
 def level_section(result: LevelsResult, pictures: Sequence[Picture], estimator: str | None) -> Iterator[str]:
-    """Yield what a block's section says in addition to the counts of its answers.
+    """Yield the parts of a block's section that follow the counts of its answers.
 
-    ``estimator`` is the name of the servo's velocity estimator, None where the receipt has none.
+    ``estimator`` is the name of the servo's velocity estimator, None if the receipt has none.
     """
     yield heading(3, "Time to answer")
     yield table_of(
@@ -118,13 +118,13 @@ def level_findings(result: LevelsResult) -> Iterator[str]:
 
 
 def level_limits(result: LevelsResult) -> Iterator[str]:
-    """Yield what the statistics of a block cannot show."""
+    """Yield the limitations of a block's statistics."""
     for statistic in statistics():
         yield from statistic(result).limits()
 
 
 def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsResult]) -> Iterator[str]:
-    """Yield the sentences about blocks whose key is open and that have answers."""
+    """Yield the sentences about blocks with answers and an open key."""
     by_id = {block.id: block for block in blocks}
     opened = [level for level in levels if level.revealed and (Answers.of(level) or Settings.of(level))]
     for result in opened:
@@ -135,7 +135,7 @@ def level_methods(blocks: Sequence[LevelBlock], levels: Sequence[LevelsResult]) 
 
 
 def level_entries(result: LevelsResult) -> dict[str, Any]:
-    """Return the entries of report.json of a block's statistics; those of later formats only where there are rows."""
+    """Return the report.json entries of a block's statistics; entries of later formats only if they have rows."""
     return {
         statistic.key: statistic.of(result)
         for statistic in statistics()

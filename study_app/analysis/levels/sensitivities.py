@@ -54,12 +54,12 @@ _BIASES: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SensitivityEstimate:
-    """A participant's sensitivity and bias or, where ``participant`` is None, their means over ``n`` participants.
+    """A participant's sensitivity and bias or (``participant`` None) their means over ``n`` participants.
 
-    They are those at a ``standard``, to a condition as ``comparison``, or of ratings at a ``level`` against the lowest.
-    ``shares`` are those of each answer. ``d_prime`` has a 95 % interval where its variance is known, or from that of
-    the share correct, of the group by Student's t; ``criterion`` is c, or k of same–different; ``other`` is d′ under
-    the model that is not ``model``.
+    They are for a ``standard``, a condition as ``comparison``, or ratings at a ``level`` against the lowest. ``shares``
+    are those of each answer. ``d_prime`` has a 95 % interval from its variance if known, or from the share correct; the
+    group's is Student's t. ``criterion`` is c, or k for same–different; ``other`` is d′ under the model that is not
+    ``model``.
     """
 
     participant: str | None
@@ -83,7 +83,7 @@ _BIASED: Final = 0.2
 def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
     """Return the mean criterion over all standards of each participant who prefers one of two intervals.
 
-    It is further from 0 than `_BIASED` and than twice its standard error.
+    It differs from 0 by more than `_BIASED` and by more than twice its standard error.
     """
     counts = dict[str, list[tuple[float, float]]]()
     for estimate in of_people:
@@ -102,7 +102,7 @@ def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
 
 
 def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[SensitivityEstimate]:
-    """Yield the group's sensitivity at each standard, to each condition or at each level, then its participants'."""
+    """Yield the group's sensitivity to each standard, condition or level, then that of its participants."""
     rows = analysed(block, opened)
     match block.design.reply:
         case "choice":
@@ -122,7 +122,7 @@ def sensitivities(block: LevelBlock, opened: pd.DataFrame) -> Iterator[Sensitivi
 
 
 def _with_group(own: Sequence[SensitivityEstimate]) -> Iterator[SensitivityEstimate]:
-    """Yield the means over participants, followed by those of each."""
+    """Yield the means over participants, followed by the values of each."""
     if own:
         shares = {answer: float(np.mean([estimate.shares[answer] for estimate in own])) for answer in own[0].shares}
         yield replace(mean_over(own, "d_prime", "criterion", "other"), shares=shares)
@@ -155,7 +155,7 @@ def _of_choices(
 def _with_ends(
     estimate: SensitivityEstimate, design: Design, counts: Mapping[tuple[int, str], int], model: Model | None
 ) -> SensitivityEstimate:
-    """Return an estimate with d′ at the ends of the interval of the share correct; as it is if all are correct."""
+    """Return an estimate with the d′ interval from that of the share correct; unchanged if all are correct."""
     correct, n = design.correct_of(counts)
     if correct == n:
         return estimate
@@ -183,7 +183,7 @@ def _where(estimate: SensitivityEstimate) -> str:
 class Sensitivities(LevelStatistic[SensitivityEstimate]):
     """d′ and criterion of the group and of each participant.
 
-    The exported table has all estimates of a participant at a standard, thresholds among them.
+    The exported table has all estimates of a participant at a standard, including thresholds.
     """
 
     key = "sensitivities"

@@ -30,10 +30,10 @@ MOTORS: Final = "motors are audible and were not masked: participants may have u
 
 
 class LevelStatistic(Generic[R]):
-    """A statistic of blocks of levels; an instance says what outputs state of it in one block.
+    """A statistic of blocks of levels; an instance provides its output for one block.
 
     A subclass with a ``key`` in a module of this folder is in every output. ``R`` is the type of its rows; the
-    ``participant`` of a group's is None. A figure is a row of `level_figures.FIGURES`.
+    ``participant`` of a group's row is None. A figure is a row of `level_figures.FIGURES`.
 
     Attributes
     ----------
@@ -77,27 +77,27 @@ class LevelStatistic(Generic[R]):
 
     @classmethod
     def own(cls, result: LevelsResult) -> tuple[R, ...]:
-        """Return its rows of participants in a block."""
+        """Return its rows of single participants in a block."""
         return tuple(one for one in cls.of(result) if getattr(one, "participant", None) is not None)
 
     @classmethod
     def exported_in(cls, study: Study) -> bool:
-        """Return whether a study has its exported table."""
+        """Return whether its table is exported for a study."""
         return bool(cls.table)
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterable[str]:
-        """Return the sentences of the methods paragraph about all blocks together."""
+        """Return the sentences of the methods paragraph that concern all blocks together."""
         return ()
 
     def exported(self) -> Iterable[Mapping[str, Any]]:
-        """Return the rows of its exported table, with the participant of each."""
+        """Return the rows of its exported table, each with its participant."""
         names = ["participant", *(column.name for column in RESULTS[self.table].columns)]
         for one in self.own(self.found):
             yield {name: getattr(one, name, None) for name in names} | {"block": self.found.block}
 
     def section(self) -> Iterator[str]:
-        """Yield the HTML of its part of the report."""
+        """Yield the HTML of its section in the report."""
         if not self.rows:
             return
         yield heading(3, self.heading())
@@ -113,7 +113,7 @@ class LevelStatistic(Generic[R]):
             yield from drawn(self.pictures, f"{name}-{self.found.block}")
 
     def heading(self) -> str:
-        """Return the heading of its part of the report."""
+        """Return the heading of its section in the report."""
         return self.title
 
     def shown(self) -> Sequence[Shown]:
@@ -121,19 +121,19 @@ class LevelStatistic(Generic[R]):
         raise NotImplementedError
 
     def explained(self) -> str:
-        """Return what is said below the table."""
+        """Return the text below the table."""
         return ""
 
     def compares(self, measure: str) -> bool:
-        """Return whether published values of a measure are compared with it."""
+        """Return whether it can be compared with published values of a measure."""
         return False
 
     def sentences(self) -> Iterable[str]:
-        """Return the sentences of the summary."""
+        """Return its sentences in the summary."""
         return ()
 
     def limits(self) -> Iterable[str]:
-        """Return the sentences about what it cannot show."""
+        """Return sentences about its limitations."""
         return ()
 
     def methods(self, block: LevelBlock) -> Iterable[str]:
@@ -141,7 +141,7 @@ class LevelStatistic(Generic[R]):
         return ()
 
     def standard(self) -> Shown:
-        """Return the column of standards where the rows are at several; else None."""
+        """Return the column of standards if there are several; otherwise None."""
 
         def standard(one: Any) -> float | None:
             return one["standard"] if isinstance(one, dict) else one.standard  # type: ignore[no-any-return]
@@ -153,19 +153,19 @@ class LevelStatistic(Generic[R]):
 
 @cache
 def statistics() -> tuple[type[LevelStatistic[Any]], ...]:
-    """Return every statistic of the modules of this folder, in the order of their places."""
+    """Return all statistics in this folder's modules, ordered by their places."""
     held = {var for module in modules_of(levels) for var in vars(module).values() if isinstance(var, type)}
     classes = {one for one in held if issubclass(one, LevelStatistic) and hasattr(one, "key")}
     return tuple(sorted(classes, key=lambda one: one.place))
 
 
 def digits(value: float | None, count: int = 3) -> str:
-    """Return a number with so many digits, a dash where there is none."""
+    """Return a number with the given number of digits; a dash for None."""
     return "–" if value is None else f"{value:.{count}g}"
 
 
 def signed(value: float | None) -> str:
-    """Return a number with three digits and its sign, a dash where there is none."""
+    """Return a number with three digits and its sign; a dash for None."""
     return "–" if value is None else f"{value:+.3g}".replace("-", "−")
 
 
@@ -175,7 +175,7 @@ def plain(value: float | str | None) -> str:
 
 
 def between(low: float | None, high: float | None, written: Callable[[float], str] = digits) -> str:
-    """Return an interval, a dash where there is none."""
+    """Return an interval as text; a dash for None."""
     return "–" if low is None or high is None else f"{written(low)} – {written(high)}"
 
 
@@ -198,7 +198,7 @@ _LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "diff
 
 
 def level_words(result: LevelsResult) -> str:
-    """Return what a level is, with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
+    """Return the name of a level with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
     if result.quantity is None:
         return "Condition"
     words = f"{_LEVELS[result.level_kind]}{result.quantity}"
@@ -211,20 +211,20 @@ def with_unit(result: LevelsResult, value: float) -> str:
 
 
 def standards_of(result: LevelsResult, rows: Iterable[Any]) -> str:
-    """Return the standards of rows in words: " of 4 and 8 N·s/m"; nothing without any."""
+    """Return the standards of rows as a phrase: " of 4 and 8 N·s/m"; "" without any."""
     standards = sorted({row.standard for row in rows if row.standard is not None})
     return f" of {listed([f'{standard:g}' for standard in standards])} {result.unit}".rstrip() if standards else ""
 
 
 def interval_words(one: Any, written: Callable[[float], str]) -> str:
-    """Return the interval of a row in words."""
+    """Return the interval of a row as text."""
     if one.low is None or one.high is None:
         return "no interval"
     return f"95 % interval {written(one.low)} to {written(one.high)}"
 
 
 def analysed(block: LevelBlock, opened: pd.DataFrame, answer: str = "response") -> pd.DataFrame:
-    """Return the rows of a block that are analysed, those with this column known."""
+    """Return the analysed rows of a block in which this column is known."""
     return opened[(opened["block"] == block.id) & opened["analysed"] & opened[answer].notna()]
 
 
@@ -236,9 +236,9 @@ def mean_over(
     level_of: Callable[[float], float] = float,
     **group: Any,
 ) -> R:
-    """Return the group of these participants: means over those in whom a number is known; ``group`` are other values.
+    """Return the group's row: means over the participants with a known value; ``group`` overrides fields.
 
-    That of ``middle`` is a mean in the coordinate u with Student's 95 % interval.
+    The field ``middle`` is a mean in the coordinate u with Student's 95 % interval.
     """
     known = {name: [value for one in own if (value := getattr(one, name)) is not None] for name in (middle, *others)}
     means: dict[str, Any] = {name: float(np.mean(values)) if values else None for name, values in known.items()}

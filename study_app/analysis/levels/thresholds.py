@@ -103,12 +103,12 @@ class ThresholdEstimate:
 
     @property
     def fits(self) -> bool:
-        """Whether simulated answers deviate from the function as much as those given; true where this is not known."""
+        """Whether the fit is acceptable: simulated answers deviate as much as the observed ones; true if unknown."""
         return self.fit_p is None or self.fit_p >= WORST
 
     @property
     def learned(self) -> bool:
-        """Whether the thresholds of the group rose or fell after the first trials."""
+        """Whether the group's thresholds rose or fell after the first trials."""
         return abs(self.early_change or 0.0) > BEYOND_CHANCE
 
     @property
@@ -118,7 +118,7 @@ class ThresholdEstimate:
 
 
 def given_by(stimulus: Stimulus, rows: pd.DataFrame) -> Given:
-    """Return the answers of a person from rows of tracks: levels at the mean of what was delivered of each."""
+    """Return a person's answers from rows of tracks, with levels at the mean of those delivered for each request."""
     asked, places = np.unique(rows["level"].to_numpy(dtype=float), return_inverse=True)
     each = rows["level_delivered"].astype("Float64").to_numpy(dtype=float, na_value=math.nan)
     known, k = np.isfinite(each), len(asked)
@@ -137,7 +137,7 @@ def given_by(stimulus: Stimulus, rows: pd.DataFrame) -> Given:
 
 
 def _answered(block: LevelBlock, opened: pd.DataFrame) -> pd.DataFrame:
-    """Return the answers in the order of the trials, with which interval is correct and the answer before, as ±1."""
+    """Return the answers in trial order, with the correct interval and the previous answer as ±1."""
     rows = opened[(opened["block"] == block.id) & opened["success"].notna()]
     rows = rows.sort_values(["participant", "session", "trial"])
     letters = rows["arrangement"].astype("string")
@@ -149,7 +149,7 @@ def _answered(block: LevelBlock, opened: pd.DataFrame) -> pd.DataFrame:
 
 
 def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEstimate]:
-    """Yield the group's threshold of each standard, followed by those of its participants."""
+    """Yield the group's threshold at each standard, followed by those of its participants."""
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return
@@ -178,7 +178,7 @@ def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> I
 
 @dataclass(frozen=True, slots=True)
 class FittedPerson:
-    """What the ``rows`` of a participant at a standard say; width and lapse rate follow from the answers of all."""
+    """The fit to the ``rows`` of a participant at a standard; width and lapse rate are informed by all answers."""
 
     person: Any
     rows: pd.DataFrame
@@ -372,11 +372,12 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackCourse:
-    """The answers of one participant at one standard in the order of the trials, shape (n,) each.
+    """The answers of one participant at one standard in trial order, shape (n,) each.
 
-    ``levels`` were requested; ``tracks`` count from 1; ``catches`` are catch trials, ``noises`` presented the standard
-    alone: neither has a level that its track chose; ``low`` and ``high`` are the ends, as levels, of the 95 %
-    interval of the threshold from the answers so far, without the change over all of them.
+    ``levels`` are requested levels; ``tracks`` are numbered from 1; ``catches`` are catch trials, ``noises``
+    presentations of the standard alone, neither with a level chosen by a track; ``low`` and ``high`` are the ends, as
+    levels, of the 95 % interval of the threshold from the answers so far, without the correction for changes over the
+    session.
     """
 
     participant: str
@@ -422,7 +423,7 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
 
 
 def percent_compared(result: LevelsResult) -> float | None:
-    """Return the percentage of successes at which thresholds are compared with published ones; None: at no other."""
+    """Return the percentage correct at which thresholds are compared with published ones, or None."""
     return (
         compared_percent(result.published)
         if any(threshold.compared is not None for threshold in Thresholds.of(result))
@@ -442,7 +443,7 @@ def _with_device(result: LevelsResult, estimate: ThresholdEstimate) -> float | N
 
 
 def _named_people(own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEstimate]) -> str:
-    """Return whose thresholds they are: at each standard where there are several, at most `_MOST_NAMED` by name."""
+    """Return a phrase on whose thresholds are meant, with at most `_MOST_NAMED` participants by name."""
     if len(some) > _MOST_NAMED:
         return f"{len(some)} of {len(own)} thresholds"
     several = len({estimate.standard for estimate in own}) > 1
@@ -455,7 +456,7 @@ def _named_people(own: Sequence[ThresholdEstimate], some: Sequence[ThresholdEsti
 
 
 class Thresholds(LevelStatistic[ThresholdEstimate]):
-    """The group's threshold of each standard, followed by those of its participants."""
+    """The group's threshold at each standard, followed by those of its participants."""
 
     key = "thresholds"
     place = 2
@@ -619,7 +620,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         yield f"{title}: {MOTORS}"
 
     def _limit_of_device(self) -> str:
-        """Return what the device's own dynamics leave open."""
+        """Return the sentence on the limitation due to the device's own dynamics."""
         result, own = self.found, self.found.device
         if own is None:
             return (
@@ -683,9 +684,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ExponentEstimate:
-    """A participant's exponent: of a power law, from ``n`` levels, or Weber's, of the JND over ``n`` standards.
+    """A participant's exponent: of a power law from ``n`` levels, or Weber's, of the JND over ``n`` standards.
 
-    Where ``participant`` is None, it is the mean over ``n`` participants, with its 95 % interval by Student's t.
+    If ``participant`` is None, it is the mean over ``n`` participants, with its 95 % interval by Student's t.
     """
 
     participant: str | None
@@ -798,7 +799,7 @@ class Exponents(LevelStatistic[ExponentEstimate]):
 
     @property
     def name(self) -> str:
-        """What the exponents are."""
+        """The name of the exponents."""
         return "exponent of the power law" if self._is_power_law else "Weber exponent"
 
     def heading(self) -> str:

@@ -46,11 +46,11 @@ def answers_timed(study: Study) -> pd.DataFrame:
 
 
 def tracks(study: Study) -> pd.DataFrame:
-    """Return the last attempt at each trial of levels, with what it presented; the key must be open.
+    """Return the last attempt at each trial of levels with its presented level; the key must be open.
 
-    ``right`` says whether the answer was correct, ``success`` what it counts as for a psychometric function;
-    ``analysed`` is false where the trial does not count or presents the modulus of a magnitude estimation; ``reversal``
-    says where an up–down track changed its direction.
+    ``right`` tells whether the answer was correct, ``success`` whether it counts as a success of the psychometric
+    function; ``analysed`` is false if the trial is excluded or presents the modulus of a magnitude estimation;
+    ``reversal`` tells whether an up–down track reversed.
     """
     by_id = {block.id: block for block in study.levels}
     rows = study.trials[study.trials["block"].isin(list(by_id))]
@@ -75,7 +75,7 @@ def tracks(study: Study) -> pd.DataFrame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BelowChance:
-    """A session's answers in a block, of which fewer are correct than by chance; ``p`` is one-sided."""
+    """A session's answers in a block with fewer correct answers than by chance; ``p`` is one-sided."""
 
     participant: str
     session: int
@@ -86,9 +86,9 @@ class BelowChance:
 
 
 def below_chance(frame: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[BelowChance]:
-    """Yield where answers are correct less often than by chance (binomial p below `BELOW_CHANCE_P`).
+    """Yield the sessions with answers below chance (binomial p below `BELOW_CHANCE_P`).
 
-    Chance is known of designs with a guess rate alone: elsewhere a preference makes answers of few correct.
+    Only designs with a guess rate have a chance level: in others a bias reduces the share of correct answers.
     """
     by_id = {block.id: block for block in blocks}
     answered = frame[frame["analysed"].fillna(False) & frame["right"].notna()]
@@ -103,25 +103,25 @@ def below_chance(frame: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[
 
 
 def setting_of(block: LevelBlock, track: str) -> TrackSetting | None:
-    """Return what the levels of a track ("8/1") were chosen for; None where conditions are compared."""
+    """Return the setting for which a track ("8/1") chose its levels; None for a comparison of conditions."""
     number = track.rpartition("/")[2]
     return None if block.stimulus is None else TrackSetting(block.stimulus, block.design, int(number))
 
 
 def answers_of(rows: pd.DataFrame) -> list[Answer]:
-    """Return the answers of one track as its method heard them: those that were not counted, too."""
+    """Return the answers of one track as its method received them, including excluded ones."""
     heard = _heard(rows)
     return list(zip(heard["level"].astype(float), heard["success"].astype(bool), strict=True))
 
 
 def _heard(rows: pd.DataFrame) -> pd.DataFrame:
-    """Return the rows whose answers moved their track, in order: neither catch trials nor the standard alone."""
+    """Return, in order, the rows whose answers changed their track: no catch trials or standards alone."""
     compared = rows["success"].notna() & rows["level"].notna() & rows["arrangement"].str.contains("C").fillna(False)
     return rows[compared & ~rows["catch"].fillna(False).astype(bool)].sort_values("trial")
 
 
 def _reversals(frame: pd.DataFrame, blocks: Mapping[str, LevelBlock]) -> pd.Series[Any]:
-    """Return whether the direction of its track changed at each trial; missing where the method has no steps."""
+    """Return whether each trial reversed its track; missing if the method has no steps."""
     reversal = pd.Series(pd.NA, index=frame.index, dtype="boolean")
     for _, rows in frame.groupby(TRACK, sort=False):
         block = blocks[rows["block"].iloc[0]]
@@ -158,9 +158,9 @@ def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
 
 
 def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: float, row: Mapping[Any, Any]) -> Any:
-    """Return the level at which the comparison was delivered; missing where it was not measured, or not presented.
+    """Return the delivered level of the comparison; missing if it was not measured, or not presented.
 
-    Of a delay it is the requested one and how much more late the comparison's frames were than the standard's.
+    For a delay it is the requested one plus the difference in lateness between the frames of comparison and standard.
     """
     value, of_standard, error_ms, of_standard_ms = (row[name] for name in _DELIVERED)
     if stimulus.vary == DELAY:
@@ -176,7 +176,7 @@ def _level_delivered(stimulus: Stimulus, standard: float | None, comparison: flo
 
 
 def _presented(intervals: pd.DataFrame) -> pd.DataFrame:
-    """Return a row per presentation: standard, level, arrangement, and of each interval force and speed."""
+    """Return one row per presentation: standard, level, arrangement, and force and speed of each interval."""
     ordered = intervals.sort_values([*_PRESENTATION, "interval"])
     letters = ordered["presented"].map({"comparison": "C", "standard": "S"}).fillna("?")
     frame = ordered.groupby(_PRESENTATION, sort=False)[["standard", "level", "catch", "setting"]].first()

@@ -58,13 +58,13 @@ _OVER_ALL: Final = "all statements at once"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """The power of one test over the sizes.
+    """The power of one test as a function of sample size.
 
-    ``item`` is None for tests over several statements, which ``over`` then names; ``setting`` the delay that a test is
-    about, where it is about one. ``power`` holds shares of studies, ``alarms`` the same without any effect, which for
-    equivalence is the power where there is truly no difference. ``effect`` is the effect that was simulated, in points
-    of the scale: between the two settings whose mean answers differ most. ``detectable`` is the smallest one, in the
-    same points, that is found in 80 % of studies, None where it is beyond eight times the simulated one.
+    ``item`` is None for tests over several statements, which ``over`` then names; ``setting`` is the delay of tests
+    about one delay. ``power`` holds shares of studies, ``alarms`` the same without any effect (for equivalence: the
+    power without any true difference). ``effect`` is the simulated effect, in scale points, between the two settings
+    whose mean answers differ most. ``detectable`` is the smallest effect in the same unit that 80 % of studies find,
+    None if it exceeds eight times the simulated one.
     """
 
     block: str
@@ -79,15 +79,15 @@ class Curve:
 
     @property
     def test(self) -> tuple[str | None, ...]:
-        """What identifies the test among those of a study."""
+        """The key that identifies the test within a study."""
         return self.block, self.question, self.item, self.over, self.setting
 
     def points(self, place: int) -> float | None:
-        """Return ``detectable`` at one of the sizes."""
+        """Return ``detectable`` at the sample size with this index."""
         return None if self.detectable is None else self.detectable[place]
 
     def needed(self, sizes: Sequence[int]) -> int | None:
-        """Return the smallest of the sizes from which on the power is 80 %."""
+        """Return the smallest sample size from which the power is at least 80 %."""
         enough = [share >= WANTED for share in self.power]
         for place, size in enumerate(sizes):
             if all(enough[place:]):
@@ -97,7 +97,7 @@ class Curve:
 
 @dataclass(frozen=True, kw_only=True)
 class Powers:
-    """What so many simulated studies of each size found, of each kind of people; the main kind comes first."""
+    """The results of simulated studies of each size, for each kind of participants; the main kind comes first."""
 
     plan: Plan
     sizes: tuple[int, ...]
@@ -108,16 +108,16 @@ class Powers:
 
     @property
     def complete(self) -> bool:
-        """Whether all studies that were asked for were simulated."""
+        """Whether all requested studies were simulated."""
         return self.studies == self.asked
 
     @property
     def curves(self) -> tuple[Curve, ...]:
-        """The curves of the main kind of people."""
+        """The curves for the main kind of participants."""
         return next(iter(self.kinds.values()))
 
     def among_kinds(self, curve: Curve) -> tuple[Curve, ...]:
-        """Return the curves of a test for every kind of people, in the order of ``kinds``."""
+        """Return the curves of a test for every kind of participants, in the order of ``kinds``."""
         none = replace(curve, power=(0.0,) * len(self.sizes), detectable=None)
         return tuple(next((one for one in of if one.test == curve.test), none) for of in self.kinds.values())
 
@@ -125,7 +125,7 @@ class Powers:
 def powers(
     plan: Plan, sizes: Sequence[int], studies: int, asked: int, seed: int, counts: Mapping[str, Counts]
 ) -> Powers:
-    """Return what ``studies`` of ``asked`` studies found, from their counts for each kind of people."""
+    """Return the power from the counts in ``studies`` of ``asked`` studies, for each kind of participants."""
     kinds = {}
     for kind, counted in counts.items():
         curves = [curve for block in plan.blocks for curve in _curves(block, counted, studies)]
@@ -217,14 +217,14 @@ def _shares(shares: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
 
 
 def _effects(block: Planned, means: Array) -> Array:
-    """Return the difference of mean answers (effects, settings) that is the effect: first to last, or the largest."""
+    """Return the effect as a difference of mean answers (effects, settings): first to last, or the largest."""
     if block.kind == "delays":
         return np.asarray(np.abs(means[:, -1] - means[:, 0]))
     return np.asarray(np.ptp(means, axis=1))
 
 
 def _detectable(array: Array, effects: Array) -> float | None:
-    """Return the effect at which the share of studies that find it reaches 80 %, between those that were simulated."""
+    """Return the effect that 80 % of studies find, interpolated between the simulated effects."""
     rising = np.maximum.accumulate(array)
     reached = np.flatnonzero(rising >= WANTED)
     if not len(reached):
@@ -332,7 +332,7 @@ _HEADS: Final[dict[Question, tuple[str, str]]] = {
 
 
 def power_csv(power: Powers) -> bytes:
-    """Return a row for every test and size."""
+    """Return a CSV row for every test and size."""
     return csv_bytes(COLUMNS, _csv_rows(power))
 
 
@@ -361,7 +361,7 @@ def _csv_rows(power: Powers) -> Iterator[dict[str, Any]]:
 
 
 def power_markdown(power: Powers) -> str:
-    """Return the tables in Markdown, with what they rest on and what they cannot tell."""
+    """Return the tables in Markdown, with their assumptions and limitations."""
     lines = [f"# Power of {power.plan.title} ({power.plan.name} {power.plan.version})", "", *_preface(power)]
     lines += _summary(power)
     for block in power.plan.blocks:
@@ -437,7 +437,7 @@ def _people(kind: str) -> str:
 
 
 def _summary(power: Powers) -> Iterator[str]:
-    """Yield the power of the primary tests at the planned number of participants, for each kind of people."""
+    """Yield the power of the primary tests at the planned sample size, for each kind of participants."""
     plan, sizes = power.plan, power.sizes
     place = sizes.index(plan.participants) if plan.participants in sizes else len(sizes) - 1
     planned = "the planned " if plan.participants in sizes else ""
@@ -461,7 +461,7 @@ def _summary(power: Powers) -> Iterator[str]:
 
 
 def _between(power: Powers) -> Iterator[str]:
-    """Yield a table for each contrast of a statement between groups; the model knows no difference between groups."""
+    """Yield a table for each contrast of a statement between groups, for which the answer model has no effect."""
     plan = power.plan
     given = people(plan, _MANY, power.seed, 0) if plan.between else ()
     for contrast, shares in plan.between:
@@ -480,7 +480,7 @@ def _between(power: Powers) -> Iterator[str]:
 
 
 def _bounds(plan: Plan) -> int:
-    """Return how many hypotheses state a bound of equality."""
+    """Return the number of hypotheses with an equivalence bound."""
     return sum(contrast.bound is not None for contrast in plan.contrasts) + plan.untested_bounds
 
 
@@ -499,13 +499,13 @@ def smallest_differences(
     bounds: int = 1,
     largest: float | None = None,
 ) -> Iterator[str]:
-    """Yield a table of the smallest difference in a contrast that 80 % of studies show, as Markdown.
+    """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies show.
 
-    It is one of ``members`` hypotheses, and shown by the strictest p of Holm over them. ``rows`` are its first cell,
-    below the heading ``first``, and the standard deviation in words and as a number; ``said`` says what that is.
-    ``shares`` are those that two groups have of all participants; None: within people. ``bound`` is that of equality,
-    on the scale of the standard deviation, of which ``bounds`` hypotheses state one; ``largest`` is the largest
-    difference of a participant that the scale permits, None without a limit.
+    It is one of ``members`` hypotheses, tested at the strictest p of Holm's correction. ``rows`` are its first cell,
+    below the heading ``first``, and the standard deviation as text and as a number; ``said`` describes it. ``shares``
+    are the shares of participants in the two groups; None: within participants. ``bound`` is the equivalence bound, on
+    the scale of the standard deviation, which ``bounds`` hypotheses state; ``largest`` is the largest difference of a
+    participant that the scale permits, None without a limit.
     """
     equal = [] if bound is None else [f"shown within the bound {IF_EQUAL}"]
     heads = (first, "participants", "SD", "half width of the 95 % interval", "smallest difference", *equal)
@@ -540,10 +540,10 @@ def smallest_differences(
 
 
 def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float, float]:
-    """Return half the 95 % interval and the smallest mean difference that 80 % of t tests show [standard deviations].
+    """Return half the 95 % interval and the smallest mean difference that 80 % of t tests show [SD].
 
-    The tests are of ``n`` pairs, or of two groups of ``n`` and ``second`` people; ``tail`` is the probability of each
-    tail that counts as significant.
+    The tests have ``n`` pairs, or two groups of ``n`` and ``second`` participants; ``tail`` is the probability of each
+    significant tail.
     """
     root, freedom = _precision(n, second)
     tested = min(n, second or n) - 1  # the report's degrees of freedom are those of the smaller group
@@ -554,9 +554,10 @@ def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float
 
 
 def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float) -> float:
-    """Return the share of studies without a difference whose t tests show that it lies within ± ``bound`` [SD].
+    """Return the power of equivalence t tests for a bound of ± ``bound`` [SD] and no true difference.
 
-    Of ``n`` pairs, or of two groups of ``n`` and ``second`` people; the mean over quantiles of the estimated SD.
+    They have ``n`` pairs, or two groups of ``n`` and ``second`` participants; the power is averaged over quantiles of
+    the estimated SD.
     """
     root, freedom = _precision(n, second)
     spreads = np.sqrt(chi2.ppf((np.arange(_SPREADS) + 0.5) / _SPREADS, freedom) / freedom)
@@ -565,14 +566,14 @@ def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float
 
 
 def _precision(n: int, second: int | None) -> tuple[float, int]:
-    """Return one over the standard error of a mean difference [1/SD], and the degrees of freedom of its t."""
+    """Return the inverse standard error of a mean difference [1/SD], and the degrees of freedom of its t."""
     if second is None:
         return math.sqrt(n), n - 1
     return math.sqrt(n * second / (n + second)), n + second - 2
 
 
 def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
-    """Return for every statement the power of equivalence where no delay makes a difference: the mean over delays."""
+    """Return, for every statement, the power of equivalence without any effect of delay, averaged over delays."""
     items = {curve.item: [one.alarms for one in curves if one.item == curve.item and one.alarms] for curve in curves}
     return [
         Curve(
@@ -620,9 +621,10 @@ def _explained(question: Question, found: Powers) -> list[str]:
 def _markdown_table(
     curves: list[Curve], found: Powers, first: str, cell: Callable[[Curve, int], str], *, needed: bool = False
 ) -> list[str]:
-    """Return a table of a row a curve and a column a size; ``needed`` adds from which size on the power is 80 %.
+    """Return a table with one row per curve and one column per size.
 
-    A cell has the lowest and highest number over all kinds of people in parentheses.
+    A cell has the range over all kinds of participants in parentheses; ``needed`` adds the size from which the power is
+    at least 80 %.
     """
     heads = [first, *(f"n = {size}" for size in found.sizes), *(["80 % from"] if needed else [])]
     lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
@@ -639,19 +641,19 @@ def _markdown_table(
 
 
 def difference_text(points: float | None, decimals: int) -> str:
-    """Return a smallest difference in words; None: it is beyond those that were simulated."""
+    """Return a smallest difference as text; None means beyond those that were simulated."""
     return BEYOND if points is None else f"{points:.{decimals}f}"
 
 
 def with_range(numbers: Sequence[str]) -> str:
-    """Return the first of some numbers in words, and the lowest and highest of all in parentheses where they differ."""
+    """Return the first number as text, with the range of all numbers in parentheses if they differ."""
     lowest, *_, highest = sorted(numbers, key=_order)
     joint = "–" if highest.strip("%").replace(".", "").isdigit() else " to "
     return numbers[0] if lowest == highest else f"{numbers[0]} ({lowest.strip('%')}{joint}{highest})"
 
 
 def _order(number: str) -> tuple[bool, float]:
-    """Return the place of a number in words: what is beyond all others comes last."""
+    """Return the sort key of a number as text; "beyond" comes last."""
     return number == BEYOND or ">" in number, 0.0 if number == BEYOND else float(number.strip("%> "))
 
 
@@ -680,7 +682,7 @@ _Plot: TypeAlias = tuple[str, Question, tuple[Curve, ...]]
 
 
 def _plots(power: Powers, block: Planned) -> Iterator[list[_Plot]]:
-    """Yield the rows of plots of a block: a plot for each statement and for the test over all."""
+    """Yield the rows of plots of a block: one plot per statement and one for the global test."""
     for question in HEADS:
         curves = [
             curve
@@ -698,7 +700,7 @@ def _plots(power: Powers, block: Planned) -> Iterator[list[_Plot]]:
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw_power(power: Powers, block: Planned) -> Figure:
-    """Draw the power of one block over the number of participants."""
+    """Draw the power of one block against the number of participants."""
     rows = list(_plots(power, block))
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 0.7 + 1.45 * len(rows)), layout="constrained")
     figure.suptitle(
@@ -726,7 +728,7 @@ def draw_power(power: Powers, block: Planned) -> Figure:
 
 
 def _draw_curves(axes: Axes, found: Powers, curves: Sequence[Curve]) -> None:
-    """Draw a curve, the range over all kinds of people, and that without any effect; of several delays a line each."""
+    """Draw a curve, its range over kinds of participants, and that without any effect; one line per delay."""
     for place, curve in enumerate(curves):
         if curve.setting is not None:
             share = place / max(len(curves) - 1, 1)
@@ -742,7 +744,7 @@ def _draw_curves(axes: Axes, found: Powers, curves: Sequence[Curve]) -> None:
 
 
 def write_power(power: Powers, to: Path) -> tuple[Path, ...]:
-    """Write tables (CSV, Markdown) and a figure a block (PNG, SVG, PDF) into ``to``; return the files.
+    """Write tables (CSV, Markdown) and one figure per block (PNG, SVG, PDF) into ``to``; return the files.
 
     Raises
     ------

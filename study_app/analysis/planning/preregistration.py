@@ -44,7 +44,7 @@ _BLOCK: Final = re.compile(r"^```json\n(\{.*?\})\n```$", re.MULTILINE | re.DOTAL
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Commitment:
-    """What was committed to: participants, precision of the group's mean, and the rules that exclude sessions."""
+    """The preregistered commitments: participants, precision of the group's mean, and exclusion rules."""
 
     study: str
     version: str
@@ -55,7 +55,7 @@ class Commitment:
 
 
 def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
-    """Return what a protocol commits to."""
+    """Return the commitments of a protocol."""
     decided = protocol.analysis
     return Commitment(
         study=protocol.study.name,
@@ -72,12 +72,12 @@ def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
 
 
 def written(one: Commitment) -> str:
-    """Return it as the last lines of a preregistration."""
+    """Return the commitments as the last lines of a preregistration."""
     return f"```json\n{json.dumps(asdict(one), indent=1)}\n```\n"
 
 
 def read_commitment(folder: Path) -> Commitment | None:
-    """Return what the preregistration in a study's folder commits to; None: there is none."""
+    """Return the commitments in a study folder's preregistration; None if there is none."""
     path = folder / FILE
     try:
         blocks = _BLOCK.findall(path.read_text(encoding="utf-8"))
@@ -95,7 +95,7 @@ def read_commitment(folder: Path) -> Commitment | None:
 
 
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
-    """Yield the contrasts, and what each main block asks; what a test would show is marked as a hypothesis."""
+    """Yield the contrasts and the questions of each main block; predictions are marked as hypotheses."""
     for contrast in () if protocol.analysis is None else protocol.analysis.contrasts:
         stimuli = {block.id: stimulus_of(protocol, block) for block in protocol.main_blocks if block.stimulus}
         words = contrast.words({block: condition_of(protocol, stimulus) for block, stimulus in stimuli.items()})
@@ -127,7 +127,7 @@ def _test_of(contrast: Contrast, of: str) -> str:
 
 
 def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
-    """Return how equality is tested, and how many participants it takes; nothing without a bound."""
+    """Return a sentence on the equivalence test and the participants that it needs; "" without a bound."""
     if contrast.bound is None or protocol.analysis is None:
         return ""
     bounds = sum(contrast.bound is not None for contrast in protocol.analysis.contrasts)
@@ -196,7 +196,7 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
 
 
 def analyses(protocol: Protocol) -> Iterator[str]:
-    """Yield how each block is analysed."""
+    """Yield sentences on the analysis of each block."""
     for block in protocol.main_blocks:
         plan = threshold_plan(protocol, block)
         if plan is not None:
@@ -262,7 +262,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
 
 
 def _equivalence_words(decided: Decided) -> str:
-    """Return how equivalence of delays is tested; nothing without a bound."""
+    """Return a sentence on the equivalence test of delays; "" without a bound."""
     if (bound := decided.equivalence_bound) is None:
         return ""
     return (
@@ -272,7 +272,7 @@ def _equivalence_words(decided: Decided) -> str:
 
 
 def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:
-    """Return the text: hypotheses, design, sample size, exclusions, analysis, the protocol in words.
+    """Return the text: hypotheses, design, sample size, exclusions, analysis, and a description of the protocol.
 
     ``power`` is the Markdown that ``liquid-study power`` wrote.
     """
@@ -352,7 +352,7 @@ def _design(protocol: Protocol) -> Iterator[str]:
 
 
 def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
-    """Yield how many participants there are and why."""
+    """Yield sentences on the planned number of participants and its justification."""
     planned = "The number of participants is not decided, and there is no stopping rule."
     if one.participants is not None:
         decided = decisions(protocol)
@@ -436,10 +436,10 @@ _SHOWN = 20
 
 @dataclass(frozen=True, slots=True)
 class Deviations:
-    """What was preregistered, and each point at which the study differs from it, in words.
+    """The preregistered commitments, and each deviation of the study from them as text.
 
-    ``commitment`` is None where no preregistration is in the study's folder; then only the planned number of
-    participants is compared.
+    ``commitment`` is None without a preregistration in the study's folder; then only the planned number of participants
+    is compared.
     """
 
     commitment: Commitment | None
@@ -447,7 +447,7 @@ class Deviations:
 
 
 def deviations(study: Study) -> Deviations | None:
-    """Return where a study left what was planned; None: nothing was preregistered, nor a number of people planned."""
+    """Return deviations from the plan; None without a preregistration or a planned number of participants."""
     sites = {prefix.removesuffix(DASH): read_commitment(place) for prefix, place in folders_of(study.folder).items()}
     committed = next(filter(None, sites.values()), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
@@ -457,7 +457,7 @@ def deviations(study: Study) -> Deviations | None:
 
 
 def _differences(study: Study, sites: Mapping[str, Commitment | None], committed: Commitment) -> Iterator[str]:
-    """Yield where a study, or a site's preregistration, differs from what was committed to."""
+    """Yield the differences of a study, or of a site's preregistration, from the commitments."""
     for site, own in sites.items():
         if own is None:
             yield f"site {site} does not have {FILE}"
@@ -498,7 +498,7 @@ def _other_participants(study: Study, planned: int | None) -> Iterator[str]:
 
 
 def deviations_section(study: Study) -> Iterator[str]:
-    """Yield the report's section; nothing where nothing was planned."""
+    """Yield the report's section on deviations; nothing without a plan."""
     compared = deviations(study)
     if compared is None:
         return

@@ -41,9 +41,9 @@ ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Planned(StatementBlock):
-    """A main block that asks something: its settings in the order of the tests, delays ascending.
+    """A main block with questions: its settings in the order of the tests, delays ascending.
 
-    ``features`` are those of rehearsed trials of each setting; ``groups`` those that have the block, where not all do.
+    ``features`` are those of rehearsed trials of each setting; ``groups`` those that have the block, if not all do.
     """
 
     features: tuple[tuple[TrialFeatures, ...], ...]
@@ -52,7 +52,7 @@ class Planned(StatementBlock):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The delays, or the conditions, of its settings in words."""
+        """The delays, or the conditions, of its settings as text."""
         if self.kind == "delays":
             return tuple(f"{setting.delay_ms:g} ms" for setting in self.settings)
         return tuple(str(setting.condition).replace("_", " ") for setting in self.settings)
@@ -65,12 +65,11 @@ class Planned(StatementBlock):
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """A study that is planned; of its contrasts those of statements within people, and how many others there are.
+    """A planned study, its within-participant contrasts of statements, and the number of its other contrasts.
 
-    ``kinds`` are the people whose power is computed, by name, the main kind first; ``participants`` is their planned
-    number.
-    Those of statements ``between`` groups come with the share of all participants that each of the two groups has.
-    ``untested_bounds`` of the others state a bound of equality.
+    ``kinds`` are the kinds of participants whose power is computed, by name, the main kind first; ``participants`` is
+    their planned number. Contrasts of statements ``between`` groups come with the share of participants in each of the
+    two groups. Of the others, ``untested_bounds`` have an equivalence bound.
     """
 
     name: str
@@ -87,12 +86,12 @@ class Plan:
 
     @property
     def unknown(self) -> tuple[str, ...]:
-        """The items that the answer model knows nothing of, so that no effect on them is simulated."""
+        """The items that the answer model does not cover, so that no effect on them is simulated."""
         return tuple(dict.fromkeys(it.id for block in self.blocks for it in block.items if it.id not in OPINIONS))
 
 
 def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
-    """Return what can be planned of a protocol; AnalysisError says that no block compares settings and asks of them."""
+    """Return the plan for a protocol; raise AnalysisError if no block compares settings by questions."""
     language = spoken({"study": {"languages": protocol.study.languages}})
     asked = _compared(protocol)
     if not asked:
@@ -123,7 +122,7 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
 
 
 def group_shares(protocol: Protocol, contrast: Contrast) -> tuple[float, float] | None:
-    """Return the share of all participants that each of two compared groups has; None where none are compared."""
+    """Return the shares of participants in the two compared groups; None if no groups are compared."""
     if contrast.groups is None:
         return None
     whole = sum(group.share for group in protocol.groups.values())
@@ -174,17 +173,17 @@ def _planned(protocol: Protocol, block: Block, features: ConditionFeatures, lang
 
 
 def _statements(protocol: Protocol, block: Block) -> tuple[Question, ...]:
-    """Return the statements that a block asks about; power is planned for no other questions."""
+    """Return the statements of a block, the only questions for which power is planned."""
     questionnaire = protocol.questionnaire_of(block.id)
     return () if questionnaire is None else questionnaire.statements
 
 
 @dataclass(frozen=True, kw_only=True)
 class Opinions:
-    """What people think in a block, and what else is in their answers (participants, repetitions, settings, items).
+    """Participants' opinions in a block, and other components of their answers.
 
-    Response bias and slopes are of participants. Both, and noise, are standardised; an answer is given in error if
-    ``lapse``, from 0 to 1, is below the lapse rate.
+    Arrays have the shape (participants, repetitions, settings, items); response bias and slopes belong to participants.
+    Both, and noise, are standardised; an answer is a lapse if ``lapse``, from 0 to 1, is below the lapse rate.
     """
 
     thought: Array
@@ -194,9 +193,9 @@ class Opinions:
     slopes: Array
 
     def answers(self, effect: float, kind: SimulatedParticipants) -> Array:
-        """Return the answers (participants, settings, items) where settings differ ``effect`` times as much.
+        """Return the answers (participants, settings, items) with the effect multiplied by ``effect``.
 
-        The people are of a ``kind``. The median over repetitions, as everywhere in the analysis.
+        The participants are of a ``kind``. Repetitions are reduced to their median, as in the analysis.
         """
         middle = self.thought.mean(axis=2, keepdims=True)
         slopes, bias = (one[:, None, None, None] for one in (1.0 + kind.slope_sd * self.slopes, self.bias))
@@ -212,7 +211,7 @@ _OF_SLOPES: Final = 1
 
 
 def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinions, ...]:
-    """Return what the participants of simulated study number ``study`` think in each block of the plan."""
+    """Return the opinions of the participants of simulated study number ``study`` in each block of the plan."""
     rng = np.random.default_rng([seed, study])
     slopes = np.random.default_rng([seed, study, _OF_SLOPES]).standard_normal(participants)
     people_of: list[list[tuple[Array, Array, Array]]] = [[] for _ in plan.blocks]
@@ -233,7 +232,7 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
 def together(
     studies: Sequence[tuple[Opinions, ...]], place: int, effects: Sequence[float], kind: SimulatedParticipants
 ) -> Array:
-    """Return one block's answers (effects, studies, participants, settings, items) by people of a kind."""
+    """Return one block's answers (effects, studies, participants, settings, items) by participants of a kind."""
     return np.array([[study[place].answers(effect, kind) for study in studies] for effect in effects])
 
 
@@ -253,9 +252,9 @@ def ranks(answers: Array) -> _Single:
 
 
 def friedman(ranked: _Single, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Return Friedman's p of every item (studies, items), and of the sum of their statistics (studies,): a global test.
+    """Return Friedman's p of every item (studies, items), and of the global test on the sum of their statistics.
 
-    The ranks are of (studies, participants, settings, items).
+    The ranks are (studies, participants, settings, items).
     """
     studies, n, k, items = ranked.shape
     orders = rng.random((PLANNED_DRAWS, n, k)).argsort(axis=-1)
@@ -280,9 +279,9 @@ def friedman(ranked: _Single, rng: np.random.Generator) -> tuple[Array, Array]:
 
 
 def trend(ranked: _Single, both_ways: NDArray[np.bool_], rng: np.random.Generator) -> Array:
-    """Return the p (studies, items) that answers rise; ``ranked``: (studies, people, settings, items).
+    """Return the p (studies, items) of an increasing trend; ``ranked``: (studies, participants, settings, items).
 
-    Two-sided for the items (items,) that may go ``both_ways``.
+    Two-sided for the items (items,) in ``both_ways``.
     """
     studies, n, k, items = ranked.shape
     scores = np.einsum("snki,k->sin", ranked, np.arange(1, k + 1, dtype=np.float32)).reshape(-1, n)
@@ -293,7 +292,7 @@ def trend(ranked: _Single, both_ways: NDArray[np.bool_], rng: np.random.Generato
 
 
 def slopes(rising: Array, block: Planned, both_ways: NDArray[np.bool_]) -> Array:
-    """Return the p (studies, items) that slopes over the delay rise; as `trend`, by t of the slopes."""
+    """Return the p (studies, items) of increasing slopes over the delay; like `trend`, by t tests of the slopes."""
     delays = np.array(block.delays_ms) - np.mean(np.array(block.delays_ms))
     own = np.einsum("snki,k->sin", rising, delays)
     rising_p, falling_p = np.ones((2, *own.shape[:2]))
@@ -304,7 +303,7 @@ def slopes(rising: Array, block: Planned, both_ways: NDArray[np.bool_]) -> Array
 
 
 def signed(answers: Array, rng: np.random.Generator) -> Array:
-    """Return the p (studies, items) of Wilcoxon's signed ranks for ``answers`` (studies, people, 2, items)."""
+    """Return the p (studies, items) of Wilcoxon's signed-rank test of ``answers`` (studies, participants, 2, items)."""
     differences = answers[:, :, 0] - answers[:, :, 1]
     studies, n, items = differences.shape
     flat = differences.transpose(0, 2, 1).reshape(-1, n)
@@ -317,7 +316,7 @@ def signed(answers: Array, rng: np.random.Generator) -> Array:
 
 
 def sizes(differences: Array) -> Array:
-    """Return the (doubled) ranks of differences (rows, n) among those that are not 0, whose own are 0."""
+    """Return the (doubled) ranks of the non-zero differences (rows, n); those of zero differences are 0."""
     if not len(differences):
         return differences
     ranked = doubled_ranks(np.abs(differences)) - 2 * (differences == 0).sum(axis=1, keepdims=True)
@@ -325,9 +324,9 @@ def sizes(differences: Array) -> Array:
 
 
 def _p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32]) -> Array:
-    """Return the one-sided p (rows,) that the ``positive`` of ``values`` (rows, n) outweigh the others.
+    """Return the one-sided p (rows,) of the ``positive`` values among ``values`` (rows, n).
 
-    ``up`` (draws, n) are the signs that are drawn, 1 for positive.
+    ``up`` (draws, n) are random signs, 1 for positive.
     """
     seen = np.where(positive, values, 0).sum(axis=1).astype(np.float32) * np.float32(1 - 1e-6)
     drawn = up @ values.T.astype(np.float32)
@@ -335,7 +334,7 @@ def _p_above(values: Array, positive: NDArray[np.bool_], up: NDArray[np.float32]
 
 
 def equivalent(differences: Array, bound: float, alpha: float) -> NDArray[np.bool_]:
-    """Return whether equivalence of differences (studies, people, …) within ± ``bound`` is shown as in the report."""
+    """Return whether differences (studies, participants, …) are equivalent within ± ``bound`` as in the report."""
     rows = np.moveaxis(differences, 1, -1)
     shown = shows_equivalence(rows.reshape(-1, rows.shape[-1]), bound, alpha)
     return np.asarray(shown.reshape(rows.shape[:-1]))
@@ -360,9 +359,9 @@ are planned the sizes are theirs, and what counts is shown at one of them or an 
 
 
 def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> dict[str, Counts]:
-    """Simulate ``studies`` of the studies of a batch (from 0, of `BATCH`) and count what is found at every size.
+    """Simulate ``studies`` studies of a batch (from 0, of `BATCH`) and count their findings at every size.
 
-    Counted for each of the plan's kinds of people.
+    They are counted for each of the plan's kinds of participants.
     """
     held = [people(plan, max(sizes), seed, batch * BATCH + number) for number in range(studies)]
     return {
@@ -374,7 +373,7 @@ def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int)
 
 
 def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: int, batch: int) -> Counts:
-    """Count what is found at every size in the answers of each block."""
+    """Count the findings at every size in the answers of each block."""
     flat = [answers.reshape(-1, *answers.shape[2:]) for answers in given]
     ranked = [ranks(answers) for answers in flat]
     of_sizes: dict[tuple[str, str], list[NDArray[np.bool_]]] = {}
@@ -402,10 +401,10 @@ IF_EQUAL: Final = "if truly equal"
 
 
 def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
-    """Return which studies (studies, effects) show each contrast of statements, in words, as in the report.
+    """Return which studies (studies, effects) show each contrast of statements, by its text, as in the report.
 
-    With a bound also which would show equality within it, `IF_EQUAL`. Both are corrected by Holm. ``given`` are each
-    block's answers (effects, studies, participants, settings, items).
+    For a contrast with a bound, equivalence within it is included as `IF_EQUAL`. Both are corrected by Holm. ``given``
+    are each block's answers (effects, studies, participants, settings, items).
     """
     if not plan.contrasts:
         return {}
@@ -438,7 +437,7 @@ def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDA
 
 
 def _p_of_contrast(away: Array, contrast: Contrast, strictest: float) -> Array:
-    """Return the p (effects, studies) of differences (effects, studies, participants); 1 where all are equal."""
+    """Return the p (effects, studies) of differences (effects, studies, participants); 1 if all are equal."""
     rows = away.reshape(-1, away.shape[-1])
     differ = np.ptp(rows, axis=-1) > 0
     p_values = np.ones(len(rows))
@@ -449,13 +448,13 @@ def _p_of_contrast(away: Array, contrast: Contrast, strictest: float) -> Array:
 
 
 def _holm(ps: Sequence[Array], others: int) -> Array:
-    """Return p (…, contrasts), corrected together with so many ``others`` that show nothing."""
+    """Return p (…, contrasts) corrected together with ``others`` tests that are not significant."""
     family = np.stack([*ps, *[np.ones_like(ps[0])] * others], axis=-1)
     return np.asarray(np.apply_along_axis(lambda each: np.array(holm(each.tolist())), -1, family))
 
 
 def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -> dict[str, NDArray[np.bool_]]:
-    """Return which studies (studies, effects, …) show what is ``found`` (effects · studies, items), in all and each."""
+    """Return which studies (studies, effects, …) show the findings (effects · studies, items), in all and each."""
     by_effect = found.reshape(effects, -1, found.shape[-1]).swapaxes(0, 1)
     return {"found": by_effect, "any": np.any(by_effect, axis=2), "all": shown.reshape(effects, -1).T}
 
@@ -463,7 +462,7 @@ def _counted(found: NDArray[np.bool_], shown: NDArray[np.bool_], effects: int) -
 def _liquids(
     block: Planned, decided: Decided, answers: Array, ps: Array, shown: NDArray[np.bool_], rng: np.random.Generator
 ) -> dict[str, NDArray[np.bool_]]:
-    """Return what is found where the test over all statements (studies,) shows a difference; ``ps`` are Friedman's."""
+    """Return the findings if the global test (studies,) shows a difference; ``ps`` are Friedman's."""
     effects = len(answers)
     if block.k == 2:
         ps = signed(answers.reshape(-1, *answers.shape[2:]), rng)
@@ -502,8 +501,8 @@ def _step_down(
 ) -> NDArray[np.bool_]:
     """Return whether a trend is shown up to each delay or a shorter one (studies, items, delays).
 
-    ``shown`` (studies, items) says where the trend over all delays is; rank correlations over less than ``first``
-    delays are tested, without a correction.
+    ``shown`` (studies, items) tells where the trend over all delays is significant; rank correlations over fewer than
+    ``first`` delays are tested, without a correction.
     """
     _, _, k, items = rising.shape
     rejected = np.zeros((len(shown), items, k), dtype=bool)
@@ -516,9 +515,9 @@ def _step_down(
 
 
 def _family(block: Planned, decided: Decided, ps: Array) -> NDArray[np.bool_]:
-    """Return what is significant of ``ps`` (studies, items): primary statements by Holm, the others by their rate.
+    """Return which of ``ps`` (studies, items) are significant: primary statements by Holm, the others by FDR.
 
-    Without any decision all are tested as if they were primary: planning asks what the study could show.
+    Without an analysis plan all are tested as primary, since planning asks what the study could show.
     """
     primary = np.array([not decided.made or decided.is_primary(item.id) for item in block.items])
     rejected = np.zeros(ps.shape, dtype=bool)
@@ -532,9 +531,9 @@ def _family(block: Planned, decided: Decided, ps: Array) -> NDArray[np.bool_]:
 def sweep(
     plan: Plan, sizes: Sequence[int], studies: int, seed: int, executor: Executor
 ) -> Iterator[tuple[int, dict[str, Counts]]]:
-    """Yield after every batch how many studies of each size were simulated so far, and what was counted in them all.
+    """Yield after every batch the number of simulated studies of each size so far, and their counts.
 
-    Every batch draws from a stream of its own, so the counts do not depend on the executor.
+    Every batch has its own random stream, so the counts do not depend on the executor.
     """
     starts = range(0, studies, BATCH)
     sizes_of_batches = [min(BATCH, studies - first) for first in starts]
@@ -547,7 +546,7 @@ def sweep(
 
 
 def total_counts(total: Mapping[str, Counts], more: Mapping[str, Counts]) -> dict[str, Counts]:
-    """Return the sums of the counts of each kind of people; ``total`` is empty before the first batch."""
+    """Return the sums of the counts for each kind of participants; ``total`` is empty before the first batch."""
     return {
         kind: {what: total.get(kind, {}).get(what, 0) + number for what, number in counts.items()}
         for kind, counts in more.items()

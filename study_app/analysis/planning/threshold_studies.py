@@ -47,7 +47,7 @@ PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, _Plan]]
 
 @dataclass(frozen=True)
 class Case:
-    """A batch of studies of one block with so many trials for each standard."""
+    """A batch of studies of one block with a given number of trials per standard."""
 
     block: str
     plan: _Plan
@@ -56,12 +56,12 @@ class Case:
 
 @dataclass
 class PrecisionResult:
-    """What studies of one block found with so many trials for each standard.
+    """The results of studies of one block with a given number of trials per standard.
 
-    ``errors`` are of each study the errors of the participants' thresholds, (people, standards), in natural logarithms;
-    as shares of the threshold on linear spacing, of the mean d′, d_a or exponent. ``halves`` are half the
-    group's 95 % interval as a share of the mean, (sizes,); NaN below three participants, infinite where limits clip
-    the levels above the mean threshold.
+    ``errors`` are the errors of the participants' thresholds in each study, (participants, standards), in natural
+    logarithms, or relative to the threshold on linear spacing, or to the mean d′, d_a or exponent. ``halves`` are half
+    the group's 95 % interval relative to the mean, (sizes,); NaN below three participants, infinite if limits clip the
+    levels above the mean threshold.
     """
 
     errors: list[Array] = field(default_factory=list)
@@ -69,26 +69,26 @@ class PrecisionResult:
 
     @property
     def spread(self) -> float:
-        """The standard deviation of one participant's error at one standard: the median of the studies.
+        """The standard deviation of one participant's error at one standard: the median over studies.
 
-        Infinite where nothing is measured.
+        Infinite if nothing is measured.
         """
         spreads = [float(errors.std(ddof=1)) for errors in self.errors if np.isfinite(errors).all()]
         return float(np.median(spreads)) if spreads else math.inf
 
     def half(self, place: int) -> float:
-        """Return the median of half the group's interval at one of the sizes."""
+        """Return the median of half the group's interval at the size with this index."""
         return float(np.median([half[place] for half in self.halves]))
 
     def within(self, place: int, precision: float) -> float:
-        """Return the share of studies whose half interval is within the precision, at one of the sizes."""
+        """Return the share of studies whose half interval is within the precision, at the size with this index."""
         return float(np.mean([half[place] <= precision for half in self.halves]))
 
 
 def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
-    """Return for each block of thresholds, d′, d_a or exponents the plan for each number of trials, by default its own.
+    """Return each block's plans by number of trials (default: its own), for thresholds, d′, d_a or exponents.
 
-    AnalysisError says that a method cannot have so few trials.
+    AnalysisError is raised if a method cannot have so few trials.
     """
     planned = {}
     for block in protocol.main_blocks:
@@ -107,7 +107,7 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
 
 
 def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
-    """Return what the studies of a batch find.
+    """Return the results of the studies of a batch.
 
     ``sizes`` ascend; smaller studies have the first participants of the largest.
     """
@@ -146,7 +146,7 @@ def study_batch(case: Case, sizes: Sequence[int]) -> PrecisionResult:
 
 
 def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> PrecisionResult:
-    """Return what the studies of a batch find of d′, d_a or exponents: their means have Student's interval."""
+    """Return the results of a batch for d′, d_a or exponents, whose means have Student's interval."""
     people, precision = sizes[-1], PrecisionResult()
     truth = plan.value * np.exp(math.log(BETWEEN_PEOPLE) * rng.standard_normal((BATCH, people)))
     estimates = plan.estimates(truth.reshape(-1), rng).reshape(BATCH, people)
@@ -161,17 +161,17 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Pr
 
 
 def _kind_of(plan: ThresholdPlan, study: int) -> Person:
-    """Return the kind of people of a study: kinds take turns."""
+    """Return the kind of participants of a study; the kinds alternate."""
     return [*plan.kinds.values()][study % len(plan.kinds)]
 
 
 def _estimates(
     plan: ThresholdPlan, truth: Array, kinds: Sequence[Person], sizes: Sequence[int], rng: np.random.Generator
 ) -> Iterator[tuple[Array, ...]]:
-    """Yield for each size medians and variances, (studies, people, standards), and what is shared, (studies, 1, …).
+    """Yield for each size medians and variances (studies, participants, standards), and shared errors (studies, 1, …).
 
-    Observers have thresholds ``truth`` (studies, people, standards) [u]; in each study all are of one of ``kinds``. The
-    first of them are the people of the smaller studies, who have their own widths.
+    Observers have thresholds ``truth`` (studies, participants, standards) [u]; all participants of a study are of one
+    of ``kinds``. The first of them are the participants of the smaller studies, which estimate their own widths.
     """
     studies, people, standards = truth.shape
     own, at_once = truth.transpose(0, 2, 1).reshape(-1), max(1, _TRACKS_AT_ONCE // people) * people
@@ -192,10 +192,10 @@ def _estimates(
 def sweep(
     planned: PrecisionPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
 ) -> Iterator[tuple[int, dict[tuple[str, int], PrecisionResult]]]:
-    """Yield after every round of batches how many studies were simulated so far, and what was found in them all.
+    """Yield after every round of batches the number of simulated studies so far, and their results.
 
-    ``studies`` is how many there are for each block and number of trials; ``sizes`` ascend. Every batch draws from a
-    seed of its own, so the numbers do not depend on the executor.
+    ``studies`` is the number for each block and number of trials; ``sizes`` ascend. Every batch has its own seed, so
+    the numbers do not depend on the executor.
     """
     keys = [(block, trials) for block, of_trials in planned.items() for trials in of_trials]
     rounds = math.ceil(studies / BATCH)
@@ -248,9 +248,9 @@ COLUMNS: Final = (
 
 @dataclass(frozen=True, kw_only=True)
 class Precisions:
-    """What so many simulated studies of each size found.
+    """The results of simulated studies of each size.
 
-    ``found`` is by block and trials of each standard; ``asked`` says how many studies were to be simulated.
+    ``found`` is by block and trials per standard; ``asked`` is the requested number of studies.
     """
 
     protocol: Protocol
@@ -262,13 +262,13 @@ class Precisions:
 
     @property
     def precision(self) -> float | None:
-        """The planned half interval, as a share of the mean."""
+        """The planned half interval relative to the mean."""
         decided = self.protocol.analysis
         return None if decided is None else decided.precision
 
 
 def threshold_csv(precisions: Precisions) -> bytes:
-    """Return a row for every block, number of trials and size."""
+    """Return a CSV row for every block, number of trials and size."""
     return csv_bytes(COLUMNS, _rows(precisions))
 
 
@@ -297,7 +297,7 @@ def _rows(all_of_it: Precisions) -> Iterator[dict[str, Any]]:
 
 
 def threshold_markdown(precisions: Precisions) -> str:
-    """Return a table for each block, with what it is based on."""
+    """Return a table for each block, with its assumptions."""
     study, precision = precisions.protocol.study, precisions.precision
     language = spoken({"study": {"languages": study.languages}})
     lines = [
@@ -331,7 +331,7 @@ def threshold_markdown(precisions: Precisions) -> str:
 
 
 def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
-    """Yield how wide the largest group's interval is with the most trials, over kinds of people: median and worst."""
+    """Yield the width of the largest group's interval with the most trials, over kinds: median and worst."""
     trials = max(trials for of_block, trials in precisions.found if of_block == block)
     halves = [half[-1] for half in precisions.found[block, trials].halves]
     plan = plans(precisions.protocol, (trials,))[block][trials]
@@ -351,7 +351,7 @@ _MEASURED: Final = {ThresholdPlan: "threshold", SensitivityPlan: "d_prime", Esti
 
 
 def _contrasts(precisions: Precisions) -> Iterator[str]:
-    """Yield for each contrast whose blocks are planned a table of the smallest difference that 80 % of studies show."""
+    """Yield, for each contrast of planned blocks, a table of the smallest difference that 80 % of studies show."""
     if (decided := precisions.protocol.analysis) is None:
         return
     planned = plans(precisions.protocol, ())
@@ -381,7 +381,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
 
 
 def log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
-    """Return the logarithm of the bound of equality; None: there is none, or thresholds are no ratios."""
+    """Return the logarithm of the equivalence bound; None if there is none, or if thresholds are not ratios."""
     stimuli = [stimulus_of(protocol, protocol.blocks[block]) for block in contrast.blocks]
     if contrast.bound is None or any(stimulus.spacing != "log" for stimulus in stimuli):
         return None
@@ -389,7 +389,7 @@ def log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
 
 
 def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, str, float]]:
-    """Yield numbers of trials, and the standard deviation of what is compared of a participant with them."""
+    """Yield numbers of trials, and the resulting standard deviation of a participant's compared value."""
     protocol = precisions.protocol
     tracks = [
         () if contrast.measure == "exponent" else tracks_of(protocol, protocol.blocks[it]) for it in contrast.blocks
@@ -404,7 +404,7 @@ def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, 
 
 
 def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
-    """Return what the simulated people of a block are like, and what the group's interval is."""
+    """Return sentences on the simulated participants of a block and on the group's interval."""
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (

@@ -28,9 +28,9 @@ _NO_NUMBERS: Final[Mapping[str, Sequence[Numbers]]] = MappingProxyType({})
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Card:
-    """An answer of the first page: its question, verdict and sentences, and the names of figures that may show it.
+    """An answer on the first page: its question, verdict and sentences, and the names of possible figures.
 
-    The first of the ``figures`` that was drawn does; ``block`` is where they are from. Two that are small are side by
+    The first of the ``figures`` that was drawn is shown; ``block`` is their block. Two small ones are placed side by
     side.
     """
 
@@ -42,7 +42,7 @@ class Card:
     is_small: bool = False
 
     def figure_of(self, drawn: Sequence[Picture]) -> Picture | None:
-        """Return the figure that shows the answer; None without any."""
+        """Return the figure that shows the answer; None if there is none."""
         for name in self.figures:
             for one in drawn:
                 if one.name == name or (one.block == self.block and one.name.partition("-")[0] == name):
@@ -81,7 +81,7 @@ def _statements(results: Results) -> Iterator[Card]:
 
 
 def _levels(results: Results) -> Iterator[Card]:
-    """Yield what blocks of levels measure, but for those whose numbers a hypothesis shows."""
+    """Yield the estimates of blocks of levels, except those that a hypothesis already shows."""
     shown = {(block, contrast.contrast.measure) for contrast in results.contrasts for block in contrast.contrast.blocks}
     for level in results.levels:
         estimates = estimates_of(level)
@@ -104,7 +104,7 @@ def _levels(results: Results) -> Iterator[Card]:
 
 
 def _estimate_words(result: LevelsResult, group: Sequence[Any], attribute: str, words: str) -> Iterator[str]:
-    """Yield the mean of the group at each standard, or to each comparison, with its interval."""
+    """Yield the mean of the group for each standard or comparison, with its interval."""
     of_level, is_weber = attribute in ("threshold", "pse"), result.level_kind == "weber"
     before = "a Weber fraction of " if of_level and is_weber else ""
     after = f" {result.unit}" if of_level and not is_weber and result.unit else ""
@@ -125,7 +125,7 @@ def _ends(low: float, high: float) -> str:
 
 
 def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) -> Iterator[Card]:
-    """Yield the answers to questions besides statements, where these were asked, and scores in their place."""
+    """Yield the answers to questions other than statements, by place; scores replace their questions."""
     levels, scores = {level.block for level in results.levels}, {score.where for score in results.scores}
     asked_at = [result for result in results.questions if result.where not in levels]
     in_order = sorted(asked_at, key=lambda one: one.is_form + (one.is_form and one.where not in scores))
@@ -151,7 +151,7 @@ def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) ->
 
 
 def _number_words(numbers: Numbers) -> str:
-    """Return the means of a score or question in each setting, and of two the mean difference within people."""
+    """Return the means of a score or question by setting, and for two settings the mean difference."""
     what = f"The mean score ({numbers.title})" if numbers.is_score else f"The mean of “{numbers.title}”"
     means = [(name, mean, len(held)) for name, held in numbers.by_setting.items() if (mean := mean_of(held.values()))]
     parts = [
@@ -204,7 +204,7 @@ def first_page(
     numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS,
     drawn: Sequence[Picture] = (),
 ) -> Markup:
-    """Return the answers beside their figures, what the study cannot show, and how often the page is wrong."""
+    """Return the answers next to their figures, the limitations, and the error rate of the page."""
     given = cards(results, numbers)
     shown = [(card, card.figure_of(drawn)) for card in given]
     claimed = any(block.n for block in results.blocks) and bool(answers(results))
@@ -231,7 +231,7 @@ def first_page(
 
 
 def _limits_once(limits: Sequence[str]) -> list[str]:
-    """Return the limits, each once: those of several blocks that say the same are one."""
+    """Return the limitations without duplicates."""
     blocks: dict[str, list[str]] = {}
     for line in limits:
         title, colon, words = line.partition(": ")
@@ -243,6 +243,6 @@ def _limits_once(limits: Sequence[str]) -> list[str]:
 
 
 def figures_shown(given: Sequence[Card], drawn: Sequence[Picture]) -> set[str]:
-    """Return the names of the figures on the first page, which its sections leave out."""
+    """Return the names of the figures on the first page, which later sections omit."""
     figures = (card.figure_of(drawn) for card in given)
     return {figure.name for figure in figures if figure is not None}

@@ -35,7 +35,7 @@ _BLOCK_ORDERS: Final = {
 
 
 def methods(study: Study, results: Results) -> str:
-    """Return the methods paragraph. A sentence is in it only if it applies to the study."""
+    """Return the methods paragraph. Each sentence is included only if it applies to the study."""
     return " ".join(sentence for sentence in _sentences(study, results) if sentence)
 
 
@@ -72,7 +72,7 @@ def _sample(study: Study) -> str:
 
 
 def _fewer_settings(study: Study) -> str:
-    """Return that participants were not in all conditions: how many, if exclusions of single trials are the cause."""
+    """Return a sentence on participants with missing conditions, if exclusions of single trials are the cause."""
     fewer: set[str] = set()
     for block in study.blocks:
         trials = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
@@ -86,7 +86,7 @@ def _fewer_settings(study: Study) -> str:
 
 
 def _groups(study: Study) -> str:
-    """Return how participants came into groups, and how many there are; "" without groups."""
+    """Return a sentence on the assignment to groups and their number; "" without groups."""
     counts, shares = group_counts(study), {name: one["share"] for name, one in study.protocol.get("groups", {}).items()}
     named = listed([f"{name} (n = {counts.get(name, 0)})" if counts else name for name in shares])
     match group_assignment(study):
@@ -105,7 +105,7 @@ def _groups(study: Study) -> str:
 
 
 def _planned(study: Study, results: Results) -> str:
-    """Return how many participants were planned, at which numbers looks were, and which look this is."""
+    """Return sentences on the planned sample size, the planned looks, and the current look."""
     decided = results.decided
     if decided.looks:
         levels = listed([significant(level) for level in decided.alphas])
@@ -119,7 +119,7 @@ def _planned(study: Study, results: Results) -> str:
 
 
 def _exclusions(study: Study) -> str:
-    """Return what was left out, and whether the key was sealed when it was decided."""
+    """Return sentences on the exclusions, and on whether the key was sealed when they were decided."""
     trials, sessions = sum(exclusion.trial is not None for exclusion in study.exclusions), len(study.excluded_sessions)
     out = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
     parts = [counted(count, noun) for count, noun in out if count]
@@ -137,7 +137,7 @@ def _exclusions(study: Study) -> str:
 
 
 def late_exclusions(study: Study) -> str:
-    """Return how many exclusions were decided, and how many reversed, after the key was opened."""
+    """Return the number of exclusions decided, and of those reversed, after the key was opened, as text."""
     decided = sum(exclusion in study.exclusions for exclusion in study.late)
     back = len(study.late) - decided
     parts = [f"{counted(decided, 'exclusion')} of {len(study.exclusions)}"] if decided else []
@@ -145,14 +145,14 @@ def late_exclusions(study: Study) -> str:
 
 
 def version_words(study: Study) -> str:
-    """Return the versions of the protocol whose sessions are pooled."""
+    """Return the protocol versions of the pooled sessions as text."""
     versions = study.versions
     pooled = f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
     return f"{pooled}, in {study.contents} different files" if study.contents > len(versions) else pooled
 
 
 def _apparatus(study: Study) -> str:
-    """Return the devices, their force if any gives one, and how large ball and motion were, as receipts have it."""
+    """Return a sentence on devices, forces, ball size and motion, as recorded in receipts."""
     used = study.participants.loc[study.participants["counted"], "device"].dropna()
     names = sorted({str(name).partition(":")[0] for name in used} - {"answers-only"})
     device, scene = study.protocol.get("device"), study.protocol.get("scene")
@@ -175,7 +175,7 @@ def _apparatus(study: Study) -> str:
 
 
 def _liquids(study: Study) -> str:
-    """Return the liquids of the main blocks with their parameters; nothing while the key is sealed."""
+    """Return the liquids of the main blocks with their parameters; "" while the key is sealed."""
     settings = [setting for block in study.blocks for setting in block.settings]
     settings += [setting for block in study.levels for setting in block.settings]
     held = [
@@ -193,7 +193,7 @@ def _liquids(study: Study) -> str:
 
 
 def _parameters(liquid: Mapping[str, Any]) -> str:
-    """Return a liquid's numbers and effects in words."""
+    """Return a liquid's numbers and effects as text."""
     damping, viscosity = liquid["drag"].get("damping_nspm"), liquid.get("viscosity_pa_s")
     numbers = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
     numbers += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
@@ -206,7 +206,7 @@ def _parameters(liquid: Mapping[str, Any]) -> str:
 
 
 def _design(study: Study, results: Results) -> Iterator[str]:
-    """Yield what each block of statements presented, in which order, and how blocks followed each other."""
+    """Yield sentences on the presentation and order of trials in each block of statements, and on block order."""
     blocks = {block.id: block for block in study.blocks}
     for result in results.blocks:
         yield _presented(study, blocks[result.id], result)
@@ -235,7 +235,7 @@ def _presented(study: Study, block: Block, result: BlockResult) -> str:
 
 
 def _block_order(study: Study) -> str:
-    """Return the order of the main blocks, of each group if these differ; nothing with one block."""
+    """Return the order of the main blocks, by group if these differ; "" with one block."""
     titles = {block.id: block.title for block in study.blocks}
     titles |= {level.id: level.title for level in study.levels if level.phase == "main"}
     if len(titles) < 2:
@@ -254,7 +254,7 @@ def _block_order(study: Study) -> str:
 
 
 def _delays(study: Study, results: Results) -> Iterator[str]:
-    """Yield requested and achieved delays of each block of delays whose key is open."""
+    """Yield requested and achieved delays of each unblinded block of delays."""
     for block in results.blocks:
         rows = [
             delivered
@@ -275,7 +275,7 @@ def _delays(study: Study, results: Results) -> Iterator[str]:
 
 
 def _missing_trials(study: Study) -> str:
-    """Return how many trials of intervals were not delivered in the sessions that count, as a sentence."""
+    """Return a sentence on undelivered interval trials in the included sessions."""
     known = [one for one in study.participants.loc[study.participants["counted"], "missing"] if one is not None]
     asked, count = sum(one.asked for one in known), sum(one.count for one in known)
     if not study.levels or not asked:
@@ -302,7 +302,7 @@ def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) ->
 
 
 def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
-    """Yield which means are shown, and in which tests they are."""
+    """Yield sentences on the means shown, and on the tests that use them."""
     if any(Effects.of(block) for block in blocks):
         yield "Mean differences from the first setting are shown with Student's 95 % intervals."
     tested = [

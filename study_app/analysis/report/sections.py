@@ -52,7 +52,7 @@ from study_app.store.study_runs import recorded_contents
 
 
 def of_levels(results: Results) -> tuple[str, ...]:
-    """Return what was found in blocks of levels, a sentence each."""
+    """Return the findings in blocks of levels, one sentence each."""
     return tuple(line for level in results.levels for line in level_findings(level))
 
 
@@ -67,7 +67,7 @@ def none_found(results: Results) -> str:
 
 
 def limits(study: Study, results: Results) -> tuple[str, ...]:
-    """Return what cannot be shown, a sentence each."""
+    """Return the limitations of the study, one sentence each."""
     lines = list(_in_general(study, results))
     for result in results.blocks:
         if not result.n:
@@ -152,7 +152,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
 
 
 def _mixed_up(result: BlockResult, results: Results) -> Iterator[str]:
-    """Name the settings that were in the same position for all participants, if several orders were expected."""
+    """Yield the settings that had the same position for all participants, if several orders were expected."""
     counts = results.orders.get(result.id)
     if counts is None or counts.orders < 2 or len(counts.codes) < 2:
         return
@@ -171,7 +171,7 @@ answer model and by the ordinal probit model: ``liquid-study validate-report --s
 
 
 def conclusions(results: Results) -> list[tuple[str, ...]]:
-    """Return the conclusions: part, question, verdict and what can be said."""
+    """Return the conclusions: part, question, verdict and sentence."""
     asked = {finding.key: finding.question for finding in all_findings() if finding.question}
     kinds = {result.id: result.kind for result in results.blocks}
     hypotheses = [
@@ -217,10 +217,10 @@ def _conclusions_by_question(results: Results) -> dict[str, str]:
 
 
 def answers(results: Results) -> tuple[Answer, ...]:
-    """Return the answers that a study gives, block by block; none of a block in which nobody's answers count.
+    """Return the answers of a study, block by block; none for a block without valid answers.
 
-    They claim something about a block only where the one test over all its statements finds a difference: this is the
-    gate of every verdict of the block.
+    They make a claim about a block only if the global test over all its statements is significant; it gates every
+    verdict of the block.
     """
     return tuple(
         _answer(finding(result, results))
@@ -238,7 +238,7 @@ def _answer(finding: Finding[Any]) -> Answer:
 
 
 def empty_studies(participants: int) -> str:
-    """Return in how many of a hundred empty studies the report claims something; ``participants`` take part."""
+    """Return how many of a hundred reports claim an effect although there is none, for this sample size."""
     n = min(CLAIMS, key=lambda size: abs(size - participants))
     claims, studies = CLAIMS[n]
     share, low, high = (number(100 * one, 1) for one in (claims / studies, *share_interval(claims / studies, studies)))
@@ -252,7 +252,7 @@ def empty_studies(participants: int) -> str:
 def block(
     result: BlockResult, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
 ) -> Iterator[str]:
-    """Yield the section of one block; a part that fails is said in its place, and kept in ``failures``."""
+    """Return the section of one block; a part that fails is replaced by its reason and added to ``failures``."""
     yield heading(2, lead(result))
     if not result.n:
         untested = any(failure.block == result.id for failure in results.failures)
@@ -268,7 +268,7 @@ def block(
 def _parts(
     result: BlockResult, results: Results, pictures: Mapping[str, Picture]
 ) -> Iterator[tuple[str, Callable[[], Iterable[str]]]]:
-    """Yield what the parts of a block's section are, and how each is made."""
+    """Yield the titles of a block's parts and the functions that make them."""
     if said := said_of_presentations(result):
         yield "presentations", lambda: [paragraph(" ".join(said))]
     if result.incomplete:
@@ -284,7 +284,7 @@ def _parts(
 
 
 def verdicts_mean(results: Results) -> Iterator[str]:
-    """Yield what the words of verdicts mean, once for all tables; nothing where nothing was tested."""
+    """Yield a common explanation of verdicts for all tables; nothing without tests."""
     if not results.blocks:
         return
     yield heading(2, "What the verdicts mean")
@@ -319,7 +319,7 @@ def _measures(result: BlockResult) -> str:
 
 
 def places(results: Results) -> dict[str, str]:
-    """Return where questions were asked: id → title of the section, in the order of the session."""
+    """Return the places of questions: id → title of the section, in session order."""
     levels = {level.block for level in results.levels}
 
     def kind(result: QuestionResult) -> str:
@@ -388,7 +388,7 @@ _SHOWN: Final = 20
 
 
 def conduct(study: Study, results: Results) -> Iterator[str]:
-    """Yield the section on sessions and on how the study was run."""
+    """Yield the section on sessions and on the conduct of the study."""
     yield heading(2, "How it was run")
     states = Counter(map(str, study.participants["status"]))
     yield paragraph(
@@ -426,7 +426,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
 
 
 def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
-    """Yield the section on groups, or sites: their sizes, and the answers in each block; nothing without any."""
+    """Yield the section on groups or sites: their sizes, and the answers in each block; nothing without any."""
     counts = group_counts(study, by)
     if not counts:
         return
@@ -467,7 +467,7 @@ def _means(result: BlockResult, rows: Sequence[Any], by: By) -> str:
 
 
 class _LostTrials(NamedTuple):
-    """A session, whether it counts, and its missing trials."""
+    """A session, whether it is included, and its missing trials."""
 
     session: str
     counted: bool
@@ -475,7 +475,7 @@ class _LostTrials(NamedTuple):
 
 
 def _missing(study: Study) -> Iterator[str]:
-    """Yield who lost how many trials of intervals, which and why; nothing in a study without such trials."""
+    """Yield how many interval trials each participant lost, which and why; nothing without such trials."""
     if not study.levels:
         return
     yield heading(3, "Trials that were not delivered")
@@ -571,7 +571,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
 
 
 def _beyond(study: Study, limits: Mapping[str, float]) -> str:
-    """Return which limits how many trials broke, as a sentence; empty where none did."""
+    """Return a sentence on the timing limits that trials violated; "" if there are none."""
     rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
     records: list[dict[str, Any]] = [dict(row.dropna()) for _, row in rows.iterrows()]
     broken = [broken_limits(row, limits) for row in records]
@@ -583,7 +583,7 @@ def _beyond(study: Study, limits: Mapping[str, float]) -> str:
 
 
 def _limit(what: str, limit: float) -> str:
-    """Return a limit in words: "frame gap at most 250 ms"."""
+    """Return a limit as text: "frame gap at most 250 ms"."""
     words, _, unit = what.rpartition("_")
     most = f"at most {limit:g} {'%' if words and unit == 'percent' else unit}"
     return f"{words.replace('_', ' ')} {most}" if words else most

@@ -23,9 +23,9 @@ from study_app.store.output_files import write_output
 def pictures(
     study: Study, results: Results, forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
 ) -> Iterator[Picture]:
-    """Draw every figure that there are answers or recordings for, block by block, in each of ``forms``.
+    """Draw every figure with data, block by block, in each of ``forms``.
 
-    A figure that fails is left out, and kept in ``failures``.
+    A figure that fails is omitted and added to ``failures``.
     """
     yield from attempted(_of_blocks(study, results, forms), failures)
 
@@ -50,7 +50,7 @@ def _of_blocks(
 
 
 def block_name(study: Study, block: Block, what: str = "") -> str:
-    """Return the name of a figure as a file, by default of the block's answers."""
+    """Return the file name of a figure, by default of the block's answers."""
     name = what or block.kind
     return f"{name}-{block.id}" if len(study.blocks_of(block.kind)) > 1 else name
 
@@ -58,8 +58,8 @@ def block_name(study: Study, block: Block, what: str = "") -> str:
 def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None) -> tuple[Path, ...]:
     """Write every figure of a study as PNG, SVG and PDF, each with its caption as text, into the folder ``to``.
 
-    The same results give the same bytes. Returns the files written. Files that are not as they were recorded are used
-    as they are: ``warn`` receives each, and the captions say how many.
+    The same results give the same bytes. Returns the written files. Files that differ from their recorded state are
+    used: ``warn`` is called for each, and the captions state their number.
 
     Raises
     ------

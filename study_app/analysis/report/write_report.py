@@ -60,7 +60,7 @@ _OF_FORMAT_2: Final = {
 
 
 def plain(value: Any) -> Any:
-    """Return a result as JSON's objects, arrays, texts, numbers, true, false and null."""
+    """Return a result as JSON types."""
     if isinstance(value, BlockResult):
         return {name: plain(entry) for name, entry in _entries(value)}
     if isinstance(value, LevelsResult):
@@ -86,7 +86,7 @@ def plain(value: Any) -> Any:
 
 
 def _entries(result: BlockResult) -> Iterator[tuple[str, Any]]:
-    """Yield a block's fields, with its findings in their midst."""
+    """Yield a block's fields, with its findings inserted at their place."""
     for field in fields(result):
         if field.name != "findings":
             if field.name != "incomplete" or result.incomplete:
@@ -116,19 +116,19 @@ _MOTION: Final = (
 
 
 def tests(results: Results) -> list[dict[str, Any]]:
-    """Return a row for every test."""
+    """Return one row per test."""
     in_order = sorted(all_findings(), key=lambda finding: finding.row_place)
     of_blocks = (finding(block, results).rows() for block in results.blocks for finding in in_order)
     return [*contrast_rows(results), *chain.from_iterable(of_blocks)]
 
 
 def tests_csv(results: Results) -> bytes:
-    """Return a table with a row for every test."""
+    """Return a CSV table with one row per test."""
     return csv_bytes(TESTS, tests(results))
 
 
 def motion_csv(results: Results) -> bytes:
-    """Return a table with a row for every measure of motion and force under every setting."""
+    """Return a CSV table with one row per measure of motion and force and setting."""
     moved = () if results.performance is None else results.performance.moved
     blocks = {block.id: block for block in results.blocks}
     kept = {(delivered.block, delivered.code): delivered for delivered in results.delivered}
@@ -146,7 +146,7 @@ def motion_csv(results: Results) -> bytes:
 
 
 def document(study: Study, results: Results, texts: Mapping[str, Any], failures: Failures) -> bytes:
-    """Return everything as JSON; ``texts`` are the findings in words. A part that fails is null."""
+    """Return all results as JSON; ``texts`` are the findings as sentences. A part that fails is null."""
     parts: dict[str, Callable[[], Any]] = {
         "versions": versions,
         **({"plug_ins": lambda: used} if (used := plug_ins(study)) else {}),
@@ -177,7 +177,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
 
 
 def versions() -> dict[str, str]:
-    """Return the versions of what computed the results."""
+    """Return the versions of the software that computed the results."""
     return {
         "liquid-study": __version__,
         "python": python_version(),
@@ -186,7 +186,7 @@ def versions() -> dict[str, str]:
 
 
 def plug_ins(study: Study) -> dict[str, list[str]]:
-    """Return the plug-ins that the sessions used, and those of this report: kinds and names by package and version."""
+    """Return the plug-ins used in the sessions and in this report: kinds and names by package and version."""
     places = map(StudyFolder, folders_of(study.folder).values())
     found = recorded_plug_ins(session.receipt for place in places for session in place.sessions())
     for plug_in in FINDINGS.plug_ins:
@@ -196,7 +196,7 @@ def plug_ins(study: Study) -> dict[str, list[str]]:
 
 
 def sessions(study: Study) -> list[dict[str, Any]]:
-    """Return of every session what made it what it was: its seed, its protocol's hash, the program's version."""
+    """Return the provenance of every session: seed, protocol hash, and program version."""
     columns = ["participant", "session", "status", "counted", "seed", "protocol_hash", "key_hash", "version", "device"]
     rows = study.participants[columns].astype(object).where(study.participants[columns].notna(), None)
     found = [{str(key): plain(value) for key, value in row.items()} for row in rows.to_dict("records")]
@@ -207,7 +207,7 @@ def sessions(study: Study) -> list[dict[str, Any]]:
 
 
 def files(study: Study) -> dict[str, str]:
-    """Return the SHA-256 of every file that the numbers come from; recordings are in their session's checksums."""
+    """Return the SHA-256 of every input file; recordings are in their session's checksums."""
     paths = [study.folder / MANIFEST]
     for place in map(StudyFolder, folders_of(study.folder).values()):
         paths += [place.exclusions, place.key, place.reveals, place.path / PREREGISTRATION]
@@ -222,7 +222,7 @@ def _path_in_study(study: Study, path: Any) -> str:
 
 
 def r_script(study: Study) -> str:
-    """Return the script, which reads the exported tables and tests.csv."""
+    """Return the R script, which reads the exported tables and tests.csv."""
     script = resources.files("study_app.analysis.report").joinpath("templates", "report.R").read_text("utf-8")
     sealed = "FALSE" if study.revealed else "TRUE"
     return "".join(f"# {line}\n" for line in credit_lines(study)) + f"sealed <- {sealed}  # the key\n{script}"
@@ -242,7 +242,7 @@ def report(
 ) -> tuple[Path, ...]:
     """Write the report of a study's results into the folder ``to``; return the files, ``report.html`` first.
 
-    The same results give the same bytes. While the key is sealed the report is by code, and says what waits for it.
+    The same results give the same bytes. While the key is sealed the report uses codes, and lists what awaits the key.
 
     Parameters
     ----------
@@ -283,9 +283,9 @@ def has_questions(study: Study) -> bool:
 
 
 def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
-    """Return the files of a study's report by their names, ``report.html`` first, and the sections that failed.
+    """Return the files of a study's report by name, ``report.html`` first, and the sections that failed.
 
-    report.json is made last, since it holds the failures of the others.
+    report.json is made last, since it lists the failures of the others.
     """
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
@@ -332,7 +332,7 @@ def _drawn(study: Study, results: Results, failures: Failures) -> Iterator[Pictu
 
 
 def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
-    """Yield the sentence on sessions for which a person has to decide."""
+    """Yield the sentence on sessions that await a person's decision."""
     if proposals:
         who = listed(
             [
@@ -402,7 +402,7 @@ def _page(
 
 
 def _facts(study: Study) -> str:
-    """Say which study it is, how many took part, and on which days the sessions that count began."""
+    """Return sentences with the study's name, sample size, and the dates of the included sessions."""
     people = counted(study.n, "participant")
     rows = study.participants
     days = sorted({str(at)[:10] for at in rows.loc[rows["counted"], "started_at"]})
@@ -415,14 +415,14 @@ def _facts(study: Study) -> str:
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:
-    """Return what must be seen at the head of the page: a class of the style, and words."""
+    """Return the marks at the top of the page: CSS class and text."""
     marks = [("mark", "SIMULATED participants, not people")] if study.simulated else []
     marks += [("mark", "PILOT")] if study.pilot else []
     return marks if study.revealed else [*marks, ("sealed", "Blinded: by code")]
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:
-    """Yield what it takes to get the same numbers again."""
+    """Yield the requirements for reproducing the numbers."""
     yield heading(2, "Reproducing this report")
     decided = results.decided
     bound = decided.equivalence_bound

@@ -52,7 +52,7 @@ def d_z(differences: Array) -> EffectSize | None:
 
 
 def hedges_g(first: Array, second: Array) -> EffectSize | None:
-    """Return the difference of two groups' means in units of their pooled standard deviation, without its bias.
+    """Return the difference of two groups' means in units of their pooled SD, corrected for bias.
 
     The correction is the exact one (Hedges 1981). None if a group has fewer than two numbers, or none of them varies.
     """
@@ -85,7 +85,7 @@ def _noncentrality(t: float, freedom: int) -> tuple[float, float]:
 
 
 def cliffs_delta(first: Array, second: Array) -> EffectSize | None:
-    """Return how much more often a number of the first group is above one of the second than below it.
+    """Return P(first > second) − P(first < second) over pairs of numbers from the two groups.
 
     None if a group has fewer than two numbers.
     """
@@ -103,7 +103,7 @@ def cliffs_delta(first: Array, second: Array) -> EffectSize | None:
 
 
 def paired_delta(differences: Array) -> EffectSize | None:
-    """Return how many more participants have a positive difference than a negative one, as a share of all.
+    """Return the share of positive differences minus the share of negative ones.
 
     None if there are fewer than two, or all are zero.
     """
@@ -115,7 +115,7 @@ def paired_delta(differences: Array) -> EffectSize | None:
 
 
 def _of_signs(delta: float, variance: float, freedom: int, cases: int) -> EffectSize:
-    """Return delta with an interval that cannot leave −1 to 1.
+    """Return delta with an interval that is limited to −1 to 1.
 
     At ±1, where the variance is zero, it ends at the bound of Clopper and Pearson (1934) for ``cases`` of ``cases``.
     """
@@ -131,7 +131,7 @@ def _of_signs(delta: float, variance: float, freedom: int, cases: int) -> Effect
 
 
 def jzs_bayes_factor(t: float, n: int, m: int | None = None, scale: float = PRIOR_SCALE) -> float:
-    """Return how much likelier t is under a difference than under none: the JZS Bayes factor, two-sided.
+    """Return the JZS Bayes factor, two-sided: the likelihood of t with a difference relative to that without.
 
     Parameters
     ----------

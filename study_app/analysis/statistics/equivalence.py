@@ -34,7 +34,7 @@ STEPS: Final = 6.0
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Beyond:
-    """How many of ``n`` participants differ by more than the bound: their ``share``, Clopper-Pearson interval."""
+    """The number of ``n`` participants who differ by more than the bound: ``share`` with Clopper–Pearson interval."""
 
     count: int
     n: int
@@ -46,16 +46,16 @@ class Beyond:
 class Equivalence(Outcome):
     """Two one-sided t tests against ± ``bound``; ``p`` is the larger of ``p_lower`` and ``p_upper``.
 
-    ``p_bootstrap`` is the larger p of the bootstrap, which alone decides where all differences are equal. ``p_unseen``
-    is the probability that the sample holds no member of a minority that shifts the mean by the bound if its members
+    ``p_bootstrap`` is the larger p of the bootstrap, which alone decides if all differences are equal. ``p_unseen`` is
+    the probability that the sample contains no member of a minority that shifts the mean by the bound if its members
     differ by ``largest``.
 
-    ``verdict`` is "equivalent" where every p is at most alpha; "not equivalent" where the whole interval lies beyond
-    the bound (without an interval, where all differences are equal, beyond it, and of so many participants that a sign
-    test is significant); else "out of reach" where no answers of so many participants could have been equivalent, else
-    "inconclusive", which is no evidence of a difference. ``checks_agree`` tells whether the bootstrap supports what t
-    tests decide. ``beyond`` tells how many single participants differ by more than the bound: equivalent means say
-    nothing about them.
+    ``verdict`` is "equivalent" if every p is at most alpha; "not equivalent" if the whole interval lies beyond the
+    bound (or, if all differences are equal, if they lie beyond it for so many participants that a sign test is
+    significant); "out of reach" if no answers of so many participants could have been equivalent; and otherwise
+    "inconclusive", which is no evidence of a difference. ``checks_agree`` tells whether the bootstrap supports the
+    decision of the t tests. ``beyond`` is the number of single participants who differ by more than the bound, about
+    which equivalent means say nothing.
     """
 
     bound: float
@@ -102,9 +102,9 @@ def tost(
 
 
 def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> Array:
-    """Return the p (studies,) that decide whether means lie within ± ``bound``.
+    """Return the p (studies,) of the tests that means lie within ± ``bound``.
 
-    ``n`` is the number of participants, of two groups that of the smaller one.
+    ``n`` is the number of participants, for two groups that of the smaller one.
     """
     both = (means, means.opposite())
     ps = [p for means in both for p in (means.p_t(-bound), means.p_bootstrap(-bound))]
@@ -114,24 +114,24 @@ def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> A
 def minority(bound: float, largest: float | None) -> float:
     """Return the share of people that shifts the mean by the bound if they differ by ``largest``; at most `_UNSEEN`.
 
-    None: differences have no limit, so that no number of participants excludes the smallest minorities.
+    With None, differences are unlimited, so that no number of participants excludes the smallest minorities.
     """
     return _UNSEEN if largest is None else min(_UNSEEN, bound / largest)
 
 
 def p_unseen(n: int, bound: float, largest: float | None = STEPS) -> float:
-    """Return the probability that such a `minority` is not among ``n`` participants at all."""
+    """Return the probability that a sample of ``n`` participants contains no member of such a `minority`."""
     return float((1 - minority(bound, largest)) ** n)
 
 
 def fewest(alpha: float, bound: float, largest: float | None = STEPS) -> int:
-    """Return how many participants it takes at least to show equivalence."""
+    """Return the minimum number of participants for which equivalence can be shown."""
     return math.ceil(math.log(alpha) / math.log1p(-minority(bound, largest)) - 1e-9)
 
 
 @lru_cache(maxsize=4096)
 def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: int, largest: float) -> Equivalence:
-    """Return the comparison of ascending ``differences``: answers in whole points repeat."""
+    """Return the comparison of sorted ``differences``, which often repeat since answers are whole points."""
     kept = np.array(differences)
     equivalence = _described(kept, bound, alpha, largest)
     if equivalence.n < 2:
@@ -179,7 +179,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
 def is_beyond(outcome: Outcome, bound: float, alpha: float) -> bool:
     """Return whether the whole interval of an effect is further than ``bound`` from 0.
 
-    Without an interval, because all participants differ equally, so many must be beyond it that a sign test shows it.
+    Without an interval, because all differences are equal, enough of them must lie beyond it for a sign test.
     """
     if outcome.effect is None:
         return False
@@ -191,7 +191,7 @@ def is_beyond(outcome: Outcome, bound: float, alpha: float) -> bool:
 
 
 def _described(kept: Array, bound: float, alpha: float, largest: float) -> Equivalence:
-    """Return what can be said before any test."""
+    """Return the descriptive part of a result, before any test."""
     n = len(kept)
     people = f"{counted(n, 'participant')}: no spread"
     reason = f"all {n} differences are equal, so an interval cannot be computed" if n > 1 else people
@@ -214,7 +214,7 @@ def _described(kept: Array, bound: float, alpha: float, largest: float) -> Equiv
 
 
 def people_beyond(differences: Array, bound: float) -> Beyond:
-    """Return how many participants differ by more than a bound."""
+    """Return the number of participants who differ by more than a bound."""
     n, count = len(differences), int((np.abs(differences) > bound + SAME).sum())
     return Beyond(count=count, n=n, share=count / n, interval=clopper_pearson(count, n))
 

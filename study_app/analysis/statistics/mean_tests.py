@@ -29,10 +29,10 @@ SAME: Final = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Means:
-    """Estimates of the mean of each study, shape (studies,), with standard ``error``; t has so much ``freedom``.
+    """The estimated mean of each study (studies,), with its standard ``error``; t has ``freedom`` degrees of freedom.
 
-    ``lowest`` and ``highest`` are resampled means (resamples, studies), with a further participant like the lowest, or
-    the highest.
+    ``lowest`` and ``highest`` are resampled means (resamples, studies), with an additional participant like the lowest
+    or the highest one.
     """
 
     mean: Array
@@ -42,7 +42,7 @@ class Means:
     highest: Array
 
     def __sub__(self, other: Means) -> Means:
-        """Return the differences to the means of an independent group."""
+        """Return the differences from the means of an independent group."""
         return Means(
             mean=self.mean - other.mean,
             error=np.hypot(self.error, other.error),
@@ -52,7 +52,7 @@ class Means:
         )
 
     def widened(self, variance: float) -> Means:
-        """Return the means with a further normal error, of this variance, that all participants have in common."""
+        """Return the means with an additional normal error of this variance that is common to all participants."""
         further = math.sqrt(variance) * np.random.default_rng(len(self.lowest)).normal(size=(len(self.lowest), 1))
         return replace(
             self,
@@ -62,7 +62,7 @@ class Means:
         )
 
     def t(self, value: float = 0.0) -> Array:
-        """Return t of the differences to a value; infinite where participants do not differ."""
+        """Return t of the differences from a value; infinite if participants do not differ."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(np.nan_to_num((self.mean - value) / self.error, posinf=math.inf, neginf=-math.inf))
 
@@ -72,23 +72,23 @@ class Means:
         return np.asarray(np.where(self.error > SAME, stdtr(self.freedom, -self.t(value)), flat))
 
     def p_bootstrap(self, value: float = 0.0) -> Array:
-        """Return the one-sided p by the bootstrap that the mean is above a value."""
+        """Return the one-sided bootstrap p that the mean is above a value."""
         return np.asarray((1 + (self.lowest <= value + SAME).sum(axis=0)) / (1 + len(self.lowest)))
 
     def opposite(self) -> Means:
-        """Return the means of what has the other sign, whose tests are those of the other side."""
+        """Return the means with the opposite sign, for tests of the other side."""
         return Means(
             mean=-self.mean, error=self.error, freedom=self.freedom, lowest=-self.highest, highest=-self.lowest
         )
 
     def interval(self, level: float) -> tuple[Array, Array]:
-        """Return the ends of Student's interval of this confidence."""
+        """Return Student's interval at this confidence level."""
         reach = float(stdtrit(self.freedom, (1 + level) / 2)) * self.error
         return self.mean - reach, self.mean + reach
 
 
 def resamples_for(alpha: float) -> int:
-    """Return how many resamples are drawn: so many that their number does not decide whether p reaches ``alpha``."""
+    """Return the number of resamples, large enough that it does not decide whether p reaches ``alpha``."""
     return min(_MOST_RESAMPLES, max(_RESAMPLES, math.ceil(20 / alpha)))
 
 
@@ -124,7 +124,7 @@ def means_of(
 
 
 def _resampled(values: Array, weights: Array, draws: Array, further: int) -> Array:
-    """Return resampled means (resamples, studies), with a further participant like the one at this place."""
+    """Return resampled means (resamples, studies), with an additional participant like the one at this index."""
     of_further = draws[:, -1:] * weights[further]
     sums = draws[:, :-1] @ (values * weights).T + of_further * values[:, further]
     return np.asarray(sums / ((draws[:, :-1] @ weights)[:, None] + of_further))
@@ -136,9 +136,9 @@ def _random_weights(n: int, seed: int, group: int, resamples: int) -> Array:
 
 
 def p_differs(means: Means, alternative: str) -> tuple[Array, Array]:
-    """Return the p (studies,) of t and of the bootstrap that means are not 0: "greater", "less" or "two-sided".
+    """Return the t and the bootstrap p (studies,) that means are not 0: "greater", "less" or "two-sided".
 
-    Two-sided the bootstrap must show the side of the mean alone: t doubles its p already.
+    A two-sided bootstrap only has to show the sign of the mean: the p of t is already doubled.
     """
     above, below = (np.array([one.p_t(), one.p_bootstrap()]) for one in (means, means.opposite()))
     if alternative == "two-sided":

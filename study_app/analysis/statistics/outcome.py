@@ -41,7 +41,7 @@ NO_VARIATION: Final = "no variation: every participant gave the same answer in a
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interval:
-    """An interval of confidence ``level`` (0.95) and the method that it comes from."""
+    """A confidence interval with its ``level`` (0.95) and method."""
 
     low: float
     high: float
@@ -51,12 +51,12 @@ class Interval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """What a report prints with every test.
+    """The values that a report prints for every test.
 
-    ``n`` participants were used, ``dropped`` were not, for missing answers. ``statistic``, ``p``, ``effect`` are None
-    where they do not exist; ``note`` then says why, and otherwise what must be said with the numbers. ``smallest_p`` is
-    the smallest p that so many participants with these ties could have given however they had answered; None where p
-    is continuous. ``interval`` belongs to ``effect``; where it is None ``no_interval`` says why.
+    ``n`` participants were used, ``dropped`` were not because of missing answers. ``statistic``, ``p`` and ``effect``
+    are None if they do not exist; ``note`` then gives the reason, and otherwise a remark that must accompany the
+    numbers. ``smallest_p`` is the smallest p that these participants could have produced given their ties; None if p is
+    continuous. ``interval`` belongs to ``effect``; if it is None, ``no_interval`` gives the reason.
     """
 
     test: str
@@ -75,7 +75,7 @@ class Outcome:
 
 
 def checked(values: ArrayLike, axes: str) -> Array:
-    """Return ``values`` as floats, NaN where an answer is missing; ``axes`` names them ("participants, settings")."""
+    """Return ``values`` as floats, with NaN for missing answers; ``axes`` names them ("participants, settings")."""
     array = np.asarray(values, dtype=np.float64)
     wanted = axes.count(",") + 1
     if array.ndim != wanted:
@@ -86,7 +86,7 @@ def checked(values: ArrayLike, axes: str) -> Array:
 
 
 def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]:
-    """Return the participants (rows) that answered under all settings (columns), and how many did not."""
+    """Return the participants (rows) with answers in all settings (columns), and the number of others."""
     array = checked(values, "participants, settings")
     if array.shape[1] < at_least:
         raise AnalysisError(f"{array.shape[1]} settings: at least {at_least} are needed{why}")
@@ -95,7 +95,7 @@ def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]
 
 
 def draws_for(alpha: float, usual: int, members: int = 1) -> int:
-    """Return how many rearrangements are drawn for each of ``members`` tests: their number decides no verdict."""
+    """Return the number of permutations for each of ``members`` tests, large enough not to decide a verdict."""
     return min(_MOST_DRAWS, max(usual, math.ceil(members / (_FLOOR * alpha))))
 
 
@@ -108,7 +108,7 @@ _NODES: Final = 200
 
 @lru_cache(maxsize=64)
 def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple[float, ...]:
-    """Return the largest two-sided p that is significant at each look: the error rate of all of them is ``alpha``.
+    """Return the two-sided significance level at each look for an overall error rate of ``alpha``.
 
     Parameters
     ----------
@@ -145,9 +145,9 @@ _MOST_REPORTS: Final = 200
 
 @lru_cache(maxsize=64)
 def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -> float:
-    """Return the error rate of a study that is tested at every participant from the first look on.
+    """Return the error rate of a study that is tested after every participant from the first look onwards.
 
-    Each test has the alpha of the last look that is reached; for the parameters see `alpha_of_looks`.
+    Each test uses the alpha of the last look that is reached; for the parameters see `alpha_of_looks`.
     """
     levels = np.array(alpha_of_looks(looks, alpha, spending))
     every = np.unique([*np.linspace(looks[0], looks[-1], _MOST_REPORTS).round().astype(int), *looks])
@@ -164,22 +164,22 @@ def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -
 
 
 def _excess(end: float, places: Array, weights: Array, step: float, due: float) -> float:
-    """Return how much likelier than ``due`` a walk from ``places`` is beyond ± ``end`` after a ``step``."""
+    """Return the probability beyond ``due`` that a walk from ``places`` leaves ± ``end`` in a ``step``."""
     return float(weights @ (norm.sf(end, places, step) + norm.cdf(-end, places, step))) - due
 
 
 @lru_cache(maxsize=4096)
 def clopper_pearson(count: int, n: int) -> Interval:
-    """Return the exact 95 % interval of a share of ``count`` in ``n``."""
+    """Return the exact 95 % interval of the proportion ``count`` / ``n``."""
     ends = binomtest(count, n).proportion_ci(0.95, method="exact")
     return Interval(low=float(ends.low), high=float(ends.high), level=0.95, method="Clopper-Pearson")
 
 
 def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike: str) -> tuple[Interval | None, str]:
-    """Return the 95 % percentile interval of a statistic over ``n`` participants drawn anew, or why there is none.
+    """Return the 95 % percentile bootstrap interval of a statistic over ``n`` participants, or why there is none.
 
-    Without ``seed`` there is no interval. ``sampled`` returns the statistic (draws,) of participants given by their
-    places (draws, n), NaN where there is none; ``alike`` says why there is no interval where all draws give the same.
+    Without ``seed`` there is no interval. ``sampled`` returns the statistic (draws,) of participants given by index
+    (draws, n), NaN where it is undefined; ``alike`` is the reason if all draws give the same value.
     """
     if seed is None:
         return None, "an interval was not requested"
@@ -198,9 +198,9 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
 
 
 def drawn_p(reached: NDArray[np.bool_], seed: int, least: float) -> tuple[float, float, str]:
-    """Return p, the smallest it could have been (``least`` if all were gone through), and how it was found.
+    """Return p, the smallest possible p (``least`` for a full enumeration), and a description of the method.
 
-    ``reached`` says of each random rearrangement whether it is as extreme.
+    ``reached`` tells for each random permutation whether it is as extreme.
     """
     draws = len(reached)
     method = f"Monte Carlo permutation, {draws} draws, seed {seed}"
@@ -208,10 +208,10 @@ def drawn_p(reached: NDArray[np.bool_], seed: int, least: float) -> tuple[float,
 
 
 def p_of_draws(drawn: NDArray[np.floating], seen: NDArray[np.floating]) -> Array:
-    """Return the share of drawn statistics (draws, …) that are as extreme as those seen (…).
+    """Return the share of random statistics (draws, …) that are as extreme as the observed ones (…).
 
-    Where none is, p is at most that of one, and follows from a Pearson distribution of type III with the first three
-    moments of those drawn: the verdict at a small alpha does not depend on the number of draws.
+    If there are none, p is at most that of one, and follows from a Pearson type III distribution with the first three
+    moments of the draws, so that the verdict at a small alpha does not depend on the number of draws.
     """
     p = np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(drawn)))
     if (alone := p * (1 + len(drawn)) < 1.5).any():
@@ -238,7 +238,7 @@ class Lattice:
 
     @property
     def highest(self) -> float:
-        """The probability of the highest value: the smallest that ``at_least`` can give."""
+        """The probability of the highest value, the smallest possible result of ``at_least``."""
         return float(self.probabilities[-1])
 
     @property
@@ -248,7 +248,7 @@ class Lattice:
 
 
 def total(parts: Iterable[Lattice]) -> Lattice:
-    """Return the distribution of the sum of independent ``parts``; of an empty sum that of 0."""
+    """Return the distribution of the sum of independent ``parts``; an empty sum is 0."""
     return reduce(Lattice.plus, parts, Lattice(0, np.ones(1)))
 
 
@@ -283,7 +283,7 @@ def student_interval(values: Array) -> tuple[float | None, float | None]:
 def holm(ps: Sequence[float | None]) -> tuple[float | None, ...]:
     """Return Holm's adjusted p of each test of a family (Holm 1979, Scand. J. Stat. 6, 65–70).
 
-    None, a test that gave no p, stays None and counts as a member: it was asked.
+    None, for a test without p, stays None but counts as a member of the family.
     """
     known = _known(ps)
     adjusted: list[float | None] = [None] * len(ps)
@@ -295,7 +295,7 @@ def holm(ps: Sequence[float | None]) -> tuple[float | None, ...]:
 
 
 def false_discovery(ps: Sequence[float | None]) -> tuple[float | None, ...]:
-    """Return the p adjusted for the rate of false discoveries (Benjamini & Hochberg 1995), for exploratory blocks.
+    """Return p values adjusted for the false discovery rate (Benjamini & Hochberg 1995), for exploratory tests.
 
     None stays None and counts as a test with p = 1.
     """

@@ -50,7 +50,7 @@ class Paired(Outcome):
     """Wilcoxon's V, the ranks of positive differences; ``effect`` is the matched rank-biserial correlation.
 
     ``zeros`` pairs were equal. ``superiority`` is P(x > y) − P(x < y) over participants (Cliff's delta of pairs).
-    ``median_difference`` is that of all pairs.
+    ``median_difference`` includes all pairs.
     """
 
     zeros: int
@@ -59,10 +59,9 @@ class Paired(Outcome):
 
 
 def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
-    """Compare answers (participants,) of the same participants under two settings; equal pairs are left out.
+    """Compare answers (participants,) of the same participants in two settings; equal pairs are dropped, as in R.
 
-    So do R and JASP. Pairs with NaN, a missing answer, are dropped. The note says where so few pairs cannot reach p
-    of ``alpha``.
+    Pairs with NaN, a missing answer, are also dropped. The note says if too few pairs remain to reach p of ``alpha``.
     """
     first, second = checked(x, "participants"), checked(y, "participants")
     if len(first) != len(second):
@@ -104,7 +103,7 @@ def signed(differences: Array) -> tuple[Whole, Array]:
 
 
 def signed_p(ranks: Whole, v: int, alternative: Alternative = "two-sided") -> tuple[float | None, float | None, str]:
-    """Return p of the (doubled) ranks ``v`` of positive differences, the smallest p, and the method.
+    """Return p of the sum ``v`` of the (doubled) ranks of positive differences, the smallest p, and the method.
 
     None without any difference. Every sign of every rank is equally likely.
     """
@@ -177,10 +176,10 @@ _NO_INTERVAL: Final = "no interval for W: W cannot be negative, so such interval
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Friedman(Outcome):
-    """Friedman's chi-square with ``df`` degrees of freedom, ``effect`` Kendall's W.
+    """Friedman's chi-square with ``df`` degrees of freedom; ``effect`` is Kendall's W.
 
-    ``p`` is exact or drawn, as ``method`` says; ``p_chi2`` and ``p_f`` (of ``f``) are the two approximations.
-    ``mean_ranks`` has one entry a setting.
+    ``p`` is exact or from random permutations, as ``method`` says; ``p_chi2`` and ``p_f`` (of ``f``) are the two
+    approximations. ``mean_ranks`` has one entry per setting.
     """
 
     test: str = "Friedman"
@@ -194,9 +193,9 @@ class Friedman(Outcome):
 
 
 def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedman:
-    """Test whether settings are answered alike: values (participants, settings), NaN where an answer is missing.
+    """Test whether settings have the same answers: values (participants, settings), NaN if an answer is missing.
 
-    ``draws`` and ``seed`` are of a drawn p, where the exact distribution would take too long.
+    ``draws`` and ``seed`` are for random permutations, if the exact distribution would take too long.
     """
     rows, dropped = complete(values, at_least=3, why=" for Friedman's test; compare two by the signed ranks of pairs")
     n, k = rows.shape
@@ -251,7 +250,7 @@ def _f(w: float, n: int, k: int) -> tuple[float | None, float | None]:
 
 
 def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None, float | None, str]:
-    """Return p (None: take the chi-square's), the smallest it could have been (None: any), and how it was found."""
+    """Return p (None: use chi-square), the smallest possible p (None: unbounded), and the method."""
     n, k = ranks.shape
     exact = distribution(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist())))
     if exact is not None:
@@ -266,7 +265,7 @@ def _p(ranks: Whole, squares: int, draws: int, seed: int) -> tuple[float | None,
 
 @lru_cache(maxsize=1024)
 def distribution(patterns: tuple[tuple[int, ...], ...]) -> tuple[Whole, Array] | None:
-    """Return every sum of squares that (doubled) ranks of these ``patterns`` (n × k) can have, ascending, and P(≥).
+    """Return every sum of squares of (doubled) ranks with these ``patterns`` (n × k), ascending, and P(≥).
 
     None if it would take more than ``WORK``. Rank sums are kept sorted, since every relabelling is equally likely.
     """
@@ -310,7 +309,7 @@ def _shuffles(rng: np.random.Generator, draws: int, k: int) -> Whole:
 def _shuffled_sums(scores: NDArray[Any], draws: int, seed: int) -> NDArray[Any]:
     """Return the sums over participants (items, draws, settings) after shuffling each one's scores at random.
 
-    ``scores`` (items, participants, settings) move together.
+    All items of ``scores`` (items, participants, settings) are shuffled together.
     """
     items, _, k = scores.shape
     rng = np.random.default_rng(seed)
@@ -331,8 +330,8 @@ _ROUNDING: Final = 1e-9
 class GlobalPermutation(Outcome):
     """The sum of Friedman's chi-square over ``items`` statements that vary; ``effect`` is their mean Kendall's W.
 
-    ``dropped`` participants completed no statement; ``incomplete`` counts the rows of single statements that were left
-    out of ``n`` × statements.
+    ``dropped`` participants completed no statement; ``incomplete`` counts the dropped rows of single statements, out of
+    ``n`` × statements.
     """
 
     items: int
@@ -340,10 +339,10 @@ class GlobalPermutation(Outcome):
 
 
 def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> GlobalPermutation:
-    """Test whether settings are answered alike in all statements: values (items, participants, settings).
+    """Test whether settings have the same answers in all statements: values (items, participants, settings).
 
-    NaN where an answer is missing: that participant's row of that statement is left out. ``draws`` and ``seed`` are of
-    a drawn p, where not all rearrangements can be gone through.
+    A row of a participant and statement with NaN, a missing answer, is dropped. ``draws`` and ``seed`` are for random
+    permutations, if a full enumeration is impossible.
     """
     array = checked(values, "items, participants, settings")
     k = array.shape[2]
@@ -390,7 +389,7 @@ def _scores_over_all(array: Array, whole: NDArray[np.bool_]) -> Array:
 
 
 def _p_over_all(scores: Array, found: float, draws: int, seed: int) -> tuple[float, float, str]:
-    """Return p, the smallest it could have been, and how it was found."""
+    """Return p, the smallest possible p, and the method."""
     _, n, k = scores.shape
     orders = math.factorial(k)
     if (n - 1) * math.log(orders) <= math.log(_EXACT_OVER_ALL):

@@ -36,9 +36,9 @@ from study_app.errors import AnalysisError
 
 
 def kappa(tables: ArrayLike) -> Array:
-    """Return Cohen's kappa (…) of tables (…, labels, labels) of counts; NaN where nothing or always one name was given.
+    """Return Cohen's kappa (…) of tables (…, labels, labels); NaN without answers or with only one name.
 
-    The counts are of right and given names.
+    The tables count correct names (rows) and given names (columns).
     """
     counts = np.asarray(tables, dtype=np.float64)
     n = counts.sum(axis=(-2, -1), keepdims=True)
@@ -59,9 +59,9 @@ MOST: Final = 8
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HitRate:
-    """How often one setting was given its own name: ``hits`` of ``n`` answers, with a Clopper-Pearson interval.
+    """The correct answers for one setting: ``hits`` of ``n``, with a Clopper–Pearson interval.
 
-    ``p`` is the largest over the other settings, of which ``rival`` gave it, that the name is used as often for one of
+    ``p`` is the largest p over the other settings (reached for ``rival``) that the name is used as often for one of
     them; ``p_adjusted`` is corrected by Holm over the settings with a name. None without an answer or another setting.
     """
 
@@ -77,10 +77,10 @@ class HitRate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recognition(Outcome):
-    """Hits in all (``statistic``), tested against ``expected`` hits by chance; ``effect`` is kappa of decided answers.
+    """Total hits (``statistic``), tested against ``expected`` hits by chance; ``effect`` is kappa of decided answers.
 
-    ``table`` counts names: one row a setting, one column a label, then undecided, then unanswered. ``rates`` has one
-    entry for each setting that has a label of its own.
+    ``table`` counts names: one row per setting, one column per label, then undecided and unanswered. ``rates`` has one
+    entry for each setting with its own label.
     """
 
     expected: float | None
@@ -92,10 +92,10 @@ class Recognition(Outcome):
 
 
 def named(ratings: ArrayLike) -> Whole:
-    """Return the place of the label that each participant named for each setting (participants, settings).
+    """Return the index of the label that each participant named for each setting (participants, settings).
 
-    ``ratings`` (participants, settings, labels) are agreement with "this liquid behaves like <label>". ``UNDECIDED``
-    where several are highest, ``UNANSWERED`` where a rating is missing.
+    ``ratings`` (participants, settings, labels) are agreement with "this liquid behaves like <label>". ``UNDECIDED`` if
+    several are highest, ``UNANSWERED`` if a rating is missing.
     """
     array = checked(ratings, "participants, settings, labels")
     missing = np.isnan(array).any(axis=2)
@@ -105,10 +105,10 @@ def named(ratings: ArrayLike) -> Whole:
 
 
 def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, seed: int | None = 1) -> Recognition:
-    """Test whether settings were named for what they were, more often than by chance.
+    """Test whether settings were named correctly more often than by chance.
 
-    ``names`` (participants, settings) are of `named`, ``truth`` the place of the right one of so many ``labels`` for
-    each setting, None where there is none; ``seed`` is of the bootstrap interval of kappa, from two participants.
+    ``names`` (participants, settings) are from `named`, ``truth`` is the index of the correct label for each setting,
+    None if there is none; ``seed`` is for the bootstrap interval of kappa, which needs two participants.
     """
     given = _names(names, truth, labels)
     used = (given != UNANSWERED).any(axis=1)
@@ -157,7 +157,7 @@ def _columns(labels: int) -> list[int]:
 
 @lru_cache(maxsize=1024)
 def _chance(row: tuple[int, ...], right: tuple[int, ...]) -> Lattice:
-    """Return the distribution of one participant's hits when the names change places among answered settings."""
+    """Return the distribution of one participant's hits when the names are permuted among answered settings."""
     answered = np.array(row) != UNANSWERED
     names, wanted = np.array(row)[answered], np.array(right)[answered]
     if not len(names):
@@ -169,9 +169,9 @@ def _chance(row: tuple[int, ...], right: tuple[int, ...]) -> Lattice:
 def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[float | None, Interval | None, str]:
     """Return kappa over decided answers and its interval, or why there is none.
 
-    The interval is that of the share of correct answers by random weights of the participants (Gaffke 2005), with a
-    further one whose answers are all incorrect for the lower end and all correct for the upper end: it does not shrink
-    to a point where everybody agrees. The agreement expected by chance is taken as observed.
+    The interval is that of the share of correct answers by random weights of the participants (Gaffke 2005), with an
+    additional participant whose answers are all incorrect for the lower end and all correct for the upper end, so that
+    it does not shrink to a point if all agree. The agreement expected by chance is taken as observed.
     """
     used = (given >= 0) & (right >= 0)
     tables = np.zeros((len(given), labels, labels))
@@ -234,9 +234,9 @@ def _rate(given: Whole, setting: int, label: int, truth: Sequence[int | None]) -
 
 
 def _p_more_often(named: _Flags, named_other: _Flags, answered: _Flags) -> float:
-    """Return the exact one-sided p that a name is used more often for a setting than for another one.
+    """Return the exact one-sided p that a name is used more often for one setting than for another.
 
-    ``named`` and ``named_other`` say for each participant (n,) whether the name was used for the one and the other;
+    ``named`` and ``named_other`` tell for each participant (n,) whether the name was used for the one and the other;
     ``answered`` (n, 2) whether both were answered.
     """
     both = answered.all(axis=1)

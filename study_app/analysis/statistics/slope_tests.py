@@ -27,11 +27,11 @@ HOTELLING: Final = "Hotelling's T²"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SlopeTest(Outcome):
-    """The test of all slopes; ``effect`` is the slope where there is one, otherwise they are in ``slopes``.
+    """The test of all slopes; ``effect`` is the slope if there is only one, otherwise they are in ``slopes``.
 
     ``intervals`` are Student's 95 % intervals of the slopes [points per unit of the column], ``sds`` the standard
-    deviations between the participants' own slopes, ``intercept_sd`` that between their own answers where all columns
-    are 0: at no delay, or in the first setting.
+    deviations between the participants' own slopes, ``intercept_sd`` that between their own answers if all columns are
+    0: without a delay, or in the first setting.
     """
 
     slopes: tuple[float, ...] = ()
@@ -41,7 +41,7 @@ class SlopeTest(Outcome):
 
 
 def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: Direction | None = None) -> SlopeTest:
-    """Test whether settings move answers up or down in the population.
+    """Test whether settings shift answers up or down in the population.
 
     Parameters
     ----------

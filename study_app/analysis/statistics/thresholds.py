@@ -44,12 +44,12 @@ _WIDTH_PRIOR: Final = (0.3, 2.5)
 class Threshold(Outcome):
     """The detection threshold (``effect``, in ms): half-way between ``guess`` and 1 − ``lapse``.
 
-    ``statistic`` is the deviance. ``yes`` of ``asked`` answers noticed something at each of ``levels``, where the curve
-    expects ``expected``. ``effect`` and all that belongs to the curve are None where no threshold can be stated;
-    ``note`` then says why in one sentence, and otherwise what must be said with the number. ``lower`` and ``upper`` are
-    the ends of the interval that exist: where one is None there is no interval, and ``no_interval`` says which end is
-    open. ``dispersion`` is how many times more than independent answers the participants' answers vary (1: no more, or
-    not known).
+    ``statistic`` is the deviance. ``yes`` of ``asked`` answers report a delay at each of ``levels``, where the curve
+    predicts ``expected``. ``effect`` and all values of the curve are None if no threshold can be stated; ``note`` then
+    gives the reason in one sentence, and otherwise a remark that must accompany the number. ``lower`` and ``upper`` are
+    the existing ends of the interval: if one is None there is no interval, and ``no_interval`` says which end is open.
+    ``dispersion`` is the variance of the participants' answers relative to independent answers (1: no more, or
+    unknown).
     """
 
     levels: tuple[float, ...]
@@ -65,7 +65,7 @@ class Threshold(Outcome):
 
     @property
     def half_way(self) -> float | None:
-        """The share of answers that agree at the threshold, by the curve."""
+        """The share of agreement at the threshold according to the curve."""
         return None if self.guess is None or self.lapse is None else (1 + self.guess - self.lapse) / 2
 
 
@@ -137,7 +137,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
 
 
 def _impossible(levels: Array, yes: Array, asked: Array) -> str:
-    """Return why the answers show no threshold whatever the curve; else nothing."""
+    """Return the reason why no curve can give a threshold, or ""."""
     if len(levels) < 3:
         return "fewer than three levels were answered"
     if not yes.any():
@@ -146,10 +146,10 @@ def _impossible(levels: Array, yes: Array, asked: Array) -> str:
 
 
 def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, tuple[float | None, float | None]]:
-    """Return the posterior of all answers, the dispersion, and the ends of the interval that exist.
+    """Return the posterior of all answers, the dispersion, and the existing ends of the interval.
 
-    The interval is scaled by the dispersion times the square of t over the normal quantile (pooled answers that belong
-    to clusters: Chandler & Bate 2007, Biometrika 94, 167–183).
+    The interval is scaled by the dispersion times the squared ratio of the t and normal quantiles (pooled clustered
+    answers: Chandler & Bate 2007, Biometrika 94, 167–183).
     """
     low, span, people = float(levels[0]), float(np.ptp(levels)), len(yes)
     least, most, count = _WIDTHS
@@ -177,10 +177,10 @@ def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, 
 
 
 def _dispersion(posterior: Posterior, levels: Array, yes: Array, asked: Array) -> float:
-    """Return the variance of the participants' scores over the information that independent answers would have.
+    """Return the variance of the participants' scores relative to the information of independent answers.
 
     A score is the difference of a participant's log-likelihood between the best curves at the ends of the interval of
-    independent answers, over their distance: it exists for a curve that is as steep as the grid allows.
+    independent answers, divided by their distance; it also exists for a curve that is as steep as the grid permits.
     """
     _, log_yes, log_no = tables(posterior.grid, tuple(levels.tolist()))
     thresholds = posterior.grid.thresholds
@@ -197,10 +197,10 @@ def _dispersion(posterior: Posterior, levels: Array, yes: Array, asked: Array) -
 
 
 def _ends(posterior: Posterior, scale: float) -> tuple[float | None, float | None]:
-    """Return the ends of the interval; None where the threshold may lie beyond that end of the grid.
+    """Return the ends of the interval; None if the threshold may lie beyond that end of the grid.
 
-    The density of the threshold there is exp(−scale z²/2) of the highest, as that of a normal distribution whose
-    variance is ``scale`` times larger.
+    At the ends the density is exp(−scale z²/2) of its maximum, like that of a normal distribution whose variance is
+    ``scale`` times larger.
     """
     thresholds = np.array(posterior.grid.thresholds)
     heights = np.log(np.maximum(posterior.marginal, 1e-300)) - float(np.log(posterior.marginal.max()))
@@ -217,7 +217,7 @@ def _ends(posterior: Posterior, scale: float) -> tuple[float | None, float | Non
 
 
 def _outside(levels: Array, threshold: float, lower: float | None, upper: float | None) -> str:
-    """Return why a curve gives no threshold: the levels that were presented do not hold it; else nothing."""
+    """Return the reason if the threshold is outside the presented levels, or ""."""
     low, high = float(levels[0]), float(levels[-1])
     if not low <= threshold <= high:
         return f"the fitted threshold lies outside the levels that were presented ({low:g} to {high:g})"
@@ -227,7 +227,7 @@ def _outside(levels: Array, threshold: float, lower: float | None, upper: float 
 
 
 def _remarks(levels: Array, lower: float | None, upper: float | None, people: int, dispersion: float) -> Iterator[str]:
-    """Yield what must be said with a threshold."""
+    """Yield remarks that must accompany a threshold."""
     if any(end is not None and not levels[0] <= end <= levels[-1] for end in (lower, upper)):
         yield (
             "the interval reaches beyond the levels that were presented, where it depends only on the shape "
@@ -254,7 +254,7 @@ WORST: Final = 0.05
 
 
 def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
-    """Return twice the log-likelihood ratio of the saturated model to the function, of each level.
+    """Return the deviance at each level: twice the log-likelihood ratio of the saturated model to the function.
 
     ``successes`` of ``n`` answers have shape (…, k), the function's shares (k,) lie strictly between 0 and 1.
     """
@@ -264,7 +264,7 @@ def deviances(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> Array:
 
 
 def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
-    """Return the share of simulated sets of answers (k,) whose deviance is no smaller: (1 + #{D* ≥ D})/1000."""
+    """Return the share of simulated answers (k,) with at least the observed deviance: (1 + #{D* ≥ D})/1000."""
     draw = np.random.default_rng(SEED)
     drawn = draw.binomial(np.asarray(n, np.int64), np.asarray(expected, float), (SETS, np.size(expected)))
     simulated = deviances(drawn, n, expected).sum(axis=-1)
@@ -273,9 +273,9 @@ def p_of_fit(successes: ArrayLike, n: ArrayLike, expected: ArrayLike) -> float:
 
 
 def drift(successes: ArrayLike, expected: ArrayLike) -> float | None:
-    """Return the correlation of trial number and deviance residual; None where either does not vary.
+    """Return the correlation of trial number and deviance residual; None if either does not vary.
 
-    ``successes`` (n,) are in the order of the trials, ``expected`` the function's share at the level of each.
+    ``successes`` (n,) are in trial order, ``expected`` are the function's shares at their levels.
     """
     y, psi = np.asarray(successes, float), np.asarray(expected, float)
     residuals = np.sign(y - psi) * np.sqrt(deviances(y, np.ones_like(y), psi))
@@ -319,9 +319,9 @@ def group_mean(
 ) -> GroupMean:
     """Return the random-effects mean of estimates, shape (n,), with their variances, each above zero.
 
-    A variance counts as its geometric mean with the median of all: variances are estimates, too, and thresholds that
-    are too high have the smaller ones. ``shared`` is how far the 95 % interval of an error that all have in common
-    extends below and above.
+    Each variance is replaced by its geometric mean with the median variance: variances are estimates, and overestimated
+    thresholds have smaller ones. ``shared`` are the lower and upper parts of the 95 % interval of an error that all
+    estimates share.
     """
     y, n = np.asarray(estimates, float), len(estimates)
     if n == 0:

@@ -48,8 +48,8 @@ _MOST: Final = 12
 class Trend(Outcome):
     """Page's L and the p of a trend in the population; ``effect`` is the mean rank correlation with the order.
 
-    One-sided in ``direction``, two-sided where it is None. ``p_page`` is Page's exact p of the answers with their ties,
-    one-sided (None without a direction). A participant who answered alike everywhere has correlation 0.
+    One-sided in ``direction``, two-sided if it is None. ``p_page`` is Page's exact one-sided p given the ties (None
+    without a direction). A participant with equal answers in all settings has correlation 0.
     """
 
     direction: Direction | None
@@ -58,7 +58,7 @@ class Trend(Outcome):
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """One step down: the test of all delays up to ``longest_ms``."""
+    """One step: the test of all delays up to ``longest_ms``."""
 
     longest_ms: float
     trend: Trend
@@ -66,10 +66,10 @@ class Step:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StepDown:
-    """The steps taken, the longest delay first; the last may be the first that is not significant.
+    """The steps, the longest delay first; the last may be the first non-significant one.
 
     ``lowest_ms`` is the lowest delay up to which a trend was shown at ``alpha``: an upper bound of the noticeable
-    delay, biased upward. None: no trend was shown, which is not evidence that there is none. ``note`` says so.
+    delay, biased upward. None means that no trend was shown, which is not evidence against one. ``note`` says so.
     """
 
     steps: tuple[Step, ...]
@@ -79,10 +79,10 @@ class StepDown:
 
 
 def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed: int | None = 1) -> Trend:
-    """Test whether answers (participants, settings) follow the order of the settings, in the direction stated before.
+    """Test for a trend of answers (participants, settings) in the order of the settings, in the stated direction.
 
-    NaN where an answer is missing: such participants are dropped. ``direction`` None: either way. ``seed`` is of the
-    bootstrap interval of the effect, from ten participants; None: no interval.
+    Participants with NaN, a missing answer, are dropped. ``direction`` None means two-sided. ``seed`` is for the
+    bootstrap interval of the effect, from ten participants upwards; None: no interval.
     """
     rows, dropped = complete(values, at_least=2, why=" for a trend")
     ranks = doubled_ranks(rows if direction != "decreasing" else -rows)
@@ -126,11 +126,12 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
 def step_down(
     values: ArrayLike, delays_ms: Sequence[float], direction: Direction | None = "increasing", *, alpha: float = 0.05
 ) -> StepDown:
-    """Drop the longest delay as long as a trend is shown over those that are left.
+    """Drop the longest delay repeatedly while the remaining delays show a trend.
 
-    The order of the tests is fixed and the first that fails ends them, so ``alpha`` holds for all of them together
-    (Tamhane, Hochberg & Dunnett 1996, Biometrics 52, 21–37). ``values`` (participants, delays) are in the order of
-    ``delays_ms``, which ascend from the control. Participants who miss any answer are dropped from all steps.
+    The order of the tests is fixed and the first non-significant one ends them, so ``alpha`` holds for all of them
+    together (Tamhane, Hochberg & Dunnett 1996, Biometrics 52, 21–37). ``values`` (participants, delays) are in the
+    order of ``delays_ms``, which ascend from the control. Participants with any missing answer are dropped from all
+    steps.
     """
     array = checked(values, "participants, delays")
     if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):
@@ -181,7 +182,7 @@ def _sums(patterns: tuple[tuple[int, ...], ...]) -> Lattice:
 def _scores(ranks: tuple[int, ...]) -> Lattice:
     """Return the distribution of Σ j·rank_j over all orders of one participant's (doubled) ranks (k,).
 
-    Filled setting by setting: what matters is which ranks are used up, not in which order.
+    It is built setting by setting, over sets of used ranks rather than orders.
     """
     k = len(ranks)
     most = sum(place * rank for place, rank in enumerate(ranks, start=1))
