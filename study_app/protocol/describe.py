@@ -53,8 +53,7 @@ _GROUP_WORDS = {
 def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force: str = "") -> str:
     """Describe the whole study in its first language.
 
-    Forces act ``delay_ticks`` ticks late; ``without_force`` is the name of the device that sessions use, if it gives
-    none.
+    Forces act ``delay_ticks`` ticks late; ``without_force`` is the name of the sessions' device, if it has no force.
     """
     language = protocol.study.languages[0]
     effects = [line for name in protocol.liquids for line in (*describe_gate(protocol.scene_of(name)), "")]
@@ -137,7 +136,7 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
 
 
 def number_range(numbers: Sequence[int]) -> str:
-    """Return the number that all kinds of sessions share, or the least and the largest."""
+    """Return the number that all kinds of sessions have in common, or its range."""
     least, largest = min(numbers), max(numbers)
     return f"{least}" if least == largest else f"{least} to {largest}"
 
@@ -303,7 +302,7 @@ def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
 
 
 def _drawing_notes(condition: Condition) -> Iterator[str]:
-    """Yield notes on how a condition is drawn and its force sent, if unusual."""
+    """Yield notes on unusual displays and force links of a condition."""
     if condition.delay_ms:
         yield f"seen {condition.delay_ms:g} ms late"
     if condition.shows_video:

@@ -23,23 +23,22 @@ _Place: TypeAlias = tuple[str | int, ...]
 
 
 class Difference(NamedTuple):
-    """One place where two protocols differ, and how."""
+    """A place where two protocols differ, and the difference."""
 
     place: _Place
     words: str
 
     @property
     def sentence(self) -> str:
-        """The place as people read it, entries counted from 1, and the difference."""
+        """The place for display, with entries counted from 1, and the difference."""
         return f"{'.'.join(str(step + 1) if isinstance(step, int) else step for step in self.place)}: {self.words}"
 
 
 def differences(old: Protocol | Mapping[str, Any], new: Protocol | Mapping[str, Any]) -> tuple[str, ...]:
     """Return a sentence for each difference between two protocols; empty if they are equal.
 
-    A mapping is a protocol as a receipt holds it: JSON values, without conditions, blocks with their codes. Conditions
-    are compared as far as both sides have them: add ``conditions`` and ``liquids`` from the opened key, or compare
-    hashes.
+    A mapping is a protocol from a receipt: JSON values, without conditions, blocks with their codes. Conditions are
+    compared only if both sides have them: add ``conditions`` and ``liquids`` from the opened key, or compare hashes.
     """
     before, after = _tables(old), _tables(new)
     _drop_unknown_comparisons(before, after)
@@ -118,7 +117,7 @@ def _has_ids(value: Any) -> bool:
 def _entry_differences(
     place: _Place, old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]
 ) -> Iterator[Difference]:
-    """Yield the differences between tables matched by id, then between the orders of those in both."""
+    """Yield the differences between tables matched by id, then differences in the order of common tables."""
     before, after = ({entry["id"]: entry for entry in entries} for entries in (old, new))
     yield from _differences(place, before, after)
     stayed = before.keys() & after.keys()

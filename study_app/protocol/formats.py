@@ -71,7 +71,7 @@ _DENSITY_KG_M3: Final = 1000.0
 
 
 def is_unknown_format(document: Mapping[str, Any]) -> bool:
-    """Return whether a file has a format that this program does not know: nothing else in it can be judged."""
+    """Return whether a file has an unknown format, so that its other content cannot be checked."""
     stated = document.get("format")
     return isinstance(stated, int) and stated > LATEST
 
@@ -104,7 +104,7 @@ def upgrade(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
 
 
 def _with_omitted_keys(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a format 2 document with its omitted keys; invalid parts stay as they are."""
+    """Return a format 2 document with its omitted keys filled in; invalid parts are unchanged."""
     completed = dict(document)
     head = completed.get("study", {})
     if isinstance(head, dict):
@@ -185,7 +185,7 @@ def _languages(document: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _with_density(liquid: Any) -> Any:
-    """Add a density, which does not matter, to a liquid that is only a linear damper."""
+    """Add a density, which has no effect, to a liquid that is only a linear damper."""
     if not isinstance(liquid, dict):
         return liquid
     drag = liquid.get("drag")
@@ -194,7 +194,7 @@ def _with_density(liquid: Any) -> Any:
 
 
 def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: tuple[str, ...]) -> dict[str, Any]:
-    """Return the blocks with numbers and free letters for the main ones, and names for all and their trials."""
+    """Return the blocks with numbers and unused code letters for the main ones, and names for all blocks and trials."""
     taken = [table.get("code_prefix") for table in blocks.values() if isinstance(table, Mapping)]
     letters = (letter for letter in string.ascii_uppercase if letter not in taken)
     numbered: dict[str, Any] = {}

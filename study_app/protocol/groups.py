@@ -54,12 +54,12 @@ def sequences_in(document: Any) -> Iterator[tuple[Path, tuple[Any, ...]]]:
 
 
 def next_group(shares: Mapping[str, int], sizes: Mapping[str, int]) -> str:
-    """Return the group furthest behind its share, the first of several; `sizes` may omit empty groups."""
+    """Return the group furthest below its share (the first in a tie); `sizes` may omit empty groups."""
     return min(shares, key=lambda name: sizes.get(name, 0) / shares[name])
 
 
 class HasSteps(Protocol):
-    """A protocol, from its file or from a receipt."""
+    """A protocol, read from its file or from a receipt."""
 
     @property
     def sequence(self) -> Steps: ...  # noqa: D102
@@ -75,12 +75,12 @@ def sessions_differ(protocol: HasSteps) -> bool:
 
 
 def session_count(protocol: HasSteps, group: str | None) -> int | None:
-    """Return the number of sessions of a group's participant; None: unlimited, all with the same steps."""
+    """Return the number of sessions of a participant in a group; None: unlimited, all with the same steps."""
     return len(_sequences(protocol, group)) or None
 
 
 def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
-    """Return the steps of a session (from 1) of a group's participant; StudyError if there are fewer sessions."""
+    """Return the steps of a participant's session (from 1) in a group; StudyError if there are fewer sessions."""
     sequences = _sequences(protocol, group)
     if not sequences:
         own = () if group is None else protocol.groups[group].sequence
@@ -110,7 +110,7 @@ def check_session_number(protocol: HasSteps, session: int) -> None:
 
 
 def every_step(protocol: HasSteps) -> Steps:
-    """Return the steps of all groups and sessions, each once, in order of first use; one sequence unchanged."""
+    """Return the steps of all groups and sessions without duplicates, in order of first use."""
     if not sessions_differ(protocol):
         return protocol.sequence
     of_groups = (_steps_of_group(protocol, group) for group in protocol.groups or (None,))
@@ -122,7 +122,7 @@ def follows(
 ) -> tuple[str | None, ...]:
     """Return the blocks before each use of a form, None before the first; empty if no session has it twice.
 
-    After one of the blocks that are ``exchanged`` any of them that a session has can come.
+    After one of the blocks that are ``exchanged``, any of them that a session has can follow.
     """
     preceding: dict[str | None, None] = {}
     again = False

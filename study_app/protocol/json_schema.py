@@ -26,7 +26,7 @@ _NEED_NO_DENSITY: Final = [{"required": ["file"]}, {"properties": {"drag": _LINE
 
 
 class _Generator(GenerateJsonSchema):
-    """Writes defaults as they are; pydantic would make a validator for the type of each."""
+    """Writes defaults unchanged; pydantic would build a validator for the type of each."""
 
     def encode_default(self, dft: Any) -> Any:
         """Return a default as JSON."""
@@ -65,7 +65,7 @@ def schema(of: type[BaseModel] = Protocol) -> dict[str, Any]:
 def editor_schema() -> dict[str, Any]:
     """Return the JSON Schema for editors with completion and checks.
 
-    Unlike `schema` it asks for whole questions only where no instrument supplies what a study leaves out of them.
+    Unlike `schema` it requires complete questions only if no instrument supplies the missing parts.
     """
     described = deepcopy(schema())
     tables = described["$defs"]
@@ -212,7 +212,7 @@ def _default_text(key: str, part: _Node, node: _Node) -> str:
 
 
 def _meaning(part: _Node, root: _Node) -> str:
-    """Return the description of a key, of its only alternative to null, or of the only model that it holds."""
+    """Return the description of a key, of its only alternative to null, or of its only nested model."""
     alternatives = [branch for branch in part.get("anyOf", ()) if branch.get("type") != "null"]
     meant = (part, *alternatives) if len(alternatives) == 1 else (part,)
     described = next((meaning for meaning in meant if "description" in meaning), None)

@@ -88,7 +88,7 @@ def load(name_or_path: str | File, *, delay_ticks: int = ASSUMED_TICKS) -> Proto
 
 
 def parse(source: bytes, name: str, *, delay_ticks: int = ASSUMED_TICKS) -> Protocol:
-    """Return the protocol in ``source``; messages call it ``name``, the rest is as in `load`."""
+    """Return the protocol in ``source``; messages use ``name``, otherwise like `load`."""
     document, places = read_document(source, name)
     protocol, faults = validate_document(document, delay_ticks=delay_ticks)
     if protocol is None or faults:
@@ -99,10 +99,10 @@ def parse(source: bytes, name: str, *, delay_ticks: int = ASSUMED_TICKS) -> Prot
 def validate_document(
     document: dict[str, Any], *, delay_ticks: int = ASSUMED_TICKS
 ) -> tuple[Protocol | None, list[Fault]]:
-    """Return the protocol of a document that `read_document` read, and its faults.
+    """Return the protocol of a document read by `read_document`, and its faults.
 
-    There is a protocol where the only faults are forces beyond a limit, so that these can be shown; else, with faults,
-    None.
+    If the only faults are forces beyond a limit, the protocol is returned with them so that they can be displayed; with
+    other faults it is None.
     """
     document, faults = _with_liquids_of_files(document)
     document, missing = _with_footage(document)
@@ -170,9 +170,9 @@ def _completed_scene(document: dict[str, Any], name: str, places: Places) -> dic
 
 
 def is_scene_file(name_or_path: str | File) -> bool:
-    """Return whether a file holds liquids and no other part of a study.
+    """Return whether a file contains liquids and no other part of a study.
 
-    ProtocolError if it is not there or no TOML.
+    ProtocolError is raised if it does not exist or is not TOML.
     """
     document, _ = read_document(source_bytes(name_or_path), str(name_or_path))
     return "liquids" in document and not _holds_study(document)
@@ -225,7 +225,7 @@ def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]
 
 
 class _LiquidFileFault(Exception):
-    """What is wrong with a liquid file, and a hint."""
+    """A fault of a liquid file, with a hint."""
 
 
 def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
@@ -255,7 +255,7 @@ def _holds_study(document: Mapping[str, Any]) -> bool:
 
 
 def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
-    """Return the tables of a text, arrays as tuples, and their lines (ProtocolError if it is no TOML)."""
+    """Return the tables of a TOML text, with arrays as tuples, and their lines (ProtocolError if it is invalid)."""
     check_size(source, name)
     if is_utf16(source):
         raise ProtocolError(name, (Problem("file", "is UTF-16 text", hint="save it as UTF-8"),))

@@ -392,7 +392,7 @@ class Contrast(Table):
         return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
 
     def described(self, names: tuple[str, str] | None = None) -> str:
-        """Describe the hypothesis; ``names`` are the names of the two sides, their ids without it."""
+        """Return a sentence with the hypothesis; ``names`` are the names of the two sides, by default their ids."""
         first, second = names or self.compared
         where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
@@ -438,7 +438,7 @@ class ExclusionRule(Table):
 
     @property
     def words(self) -> str:
-        """When the rule proposes a session."""
+        """The condition of the rule as text."""
         return RULES[self.rule].format(limit=self.limit)
 
 
@@ -587,7 +587,7 @@ class Protocol(Table):
 
     @property
     def steps(self) -> tuple[str, ...]:
-        """The pages, blocks and forms in the order of the session; of all groups and sessions where these differ."""
+        """The pages, blocks and forms in session order; those of all groups and sessions if these differ."""
         return every_step(self)
 
     @property

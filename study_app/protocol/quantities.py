@@ -86,7 +86,7 @@ QUANTITIES: Final = _OF_THE_SCENE | {it.name: it for effect in EFFECTS for it in
 
 
 def quantity(name: str) -> Parameter:
-    """Return the varied quantity: ``table.field``, or a field alone of the first table that has it."""
+    """Return the varied quantity: ``table.field``, or a field of the first table that has it."""
     for known, row in QUANTITIES.items():
         if name in {known, known.partition(".")[2]}:
             return row
@@ -101,7 +101,7 @@ def can_vary(name: str) -> bool:
 
 
 def quantity_words(name: str) -> str:
-    """Return the name of a quantity within a sentence, such as "viscosity" or "wake scaling"."""
+    """Return the name of a quantity for use within a sentence, such as "viscosity" or "wake scaling"."""
     row = quantity(name)
     effect = NAMED.get(_table_name(row.name))
     label = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"

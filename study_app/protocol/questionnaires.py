@@ -120,15 +120,15 @@ def instruments() -> tuple[str, ...]:
 
 @cache
 def instrument(name: str) -> Mapping[str, Any]:
-    """Return the file's content of a standard questionnaire (OSError if there is none)."""
+    """Return the file content of a standard questionnaire (OSError if there is none)."""
     table: Mapping[str, Any] = frozen(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
     return table
 
 
 def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a study's document with the known parts of standard questionnaires, and faults for missing parts.
+    """Return a study's document with standard questionnaires filled in, and faults for missing parts.
 
-    What the study writes replaces what is known, key by key, and texts language by language.
+    The study's own keys and texts override the known ones, key by key and language by language.
     """
     completed, faults = dict(document), list[Fault]()
     tables = document.get("questionnaires")
@@ -150,7 +150,7 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
 
 
 def instrument_tables(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the table and the scales that a study writes for an instrument: everything known if texts are missing."""
+    """Return the table and scales that a study needs for an instrument, in full if texts are missing."""
     table: dict[str, Any] = {"instrument": of}
     filled, lacking = _fill_in((), table, languages, {})
     if not lacking:
@@ -171,7 +171,7 @@ def scale_name(of: str, scale: str) -> str:
 def _fill_in(
     place: Path, table: Mapping[str, Any], languages: tuple[str, ...], scales: dict[str, Any]
 ) -> tuple[dict[str, Any], list[Fault]]:
-    """Return a questionnaire with the known parts of its instrument, and faults; adds its scales to ``scales``."""
+    """Return a questionnaire completed from its instrument, and faults; its scales are added to ``scales``."""
     of = str(table["instrument"])
     source = instrument(of)
     known = {item["id"]: item for item in source["items"]}
@@ -184,7 +184,7 @@ def _fill_in(
     unwritten = {language: list[tuple[str, str]]() for language in languages}  # the missing texts and their owners
 
     def ask(path: Path | None, thing: str, made: Mapping[str, Any], *keys: str) -> None:
-        """Note the languages that texts of a table lack: at its place in the study, if it is written there."""
+        """Record the languages in which texts of a table are missing, at the table's place in the study."""
         for key in keys:
             text = made.get(key, {})
             lacking = [code for code in languages if code not in text] if isinstance(text, Mapping) else []
@@ -273,7 +273,7 @@ def _tables_by_id(table: Mapping[str, Any], key: str) -> dict[str, tuple[Path, M
 
 
 def _unpublished_fault(path: Path, of: str, language: str, lacks: Sequence[tuple[str, str]]) -> Fault:
-    """Return the fault about texts in a language that neither program nor study has; it names each."""
+    """Return the fault that texts exist neither in the program nor in the study in a language."""
     keys: dict[str, list[str]] = {}
     for key, thing in dict.fromkeys(lacks):
         keys.setdefault(thing, []).append(key)

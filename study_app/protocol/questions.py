@@ -89,7 +89,7 @@ class ShowIf(Table):
 def shown_questions(items: Iterable[Question | ItemView], answers: Mapping[str, Value]) -> tuple[str, ...]:
     """Return the ids of the shown items in order; ``answers`` are those given so far.
 
-    Answers to items that are not shown count for nothing.
+    Answers to hidden items are ignored.
     """
     shown_ids: dict[str, None] = {}
     for item in items:
@@ -132,7 +132,7 @@ class ItemView:
 
     @property
     def keys(self) -> str:
-        """The keys that answer the question, as printed on the keyboard."""
+        """The keyboard keys that answer the question, as text."""
         raise NotImplementedError
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
@@ -140,13 +140,13 @@ class ItemView:
         raise NotImplementedError
 
     def nearby(self, answer: Value) -> Value:
-        """Return the first answer of a person who then changes it; the same one if there is no other."""
+        """Return the initial answer of a person who then changes it to ``answer``; the same if there is no other."""
         return answer
 
 
 @dataclass(frozen=True, slots=True)
 class Context:
-    """What a question is asked with: the protocol's scales, its questionnaire's own, and the participant's language."""
+    """The context of a question: the protocol's scales, its questionnaire's own, and the participant's language."""
 
     scales: Mapping[str, Scale]
     scale: str | None
@@ -196,11 +196,11 @@ class Question(Table):
 
     @property
     def names_several(self) -> bool:
-        """Whether a table holds several of `levels` in one answer, separated by spaces."""
+        """Whether one table cell contains several of `levels`, separated by spaces."""
         return False
 
     def counted(self, response: str) -> tuple[str, ...]:
-        """Return the `levels` for which a table's answer counts: for a ranking only the first, for example."""
+        """Return the `levels` that an answer counts for; for a ranking only the first, for example."""
         return tuple(response.split()) if self.names_several else (response,)
 
     def _shown(self, kind: type[V], number: int, context: Context, **own: Any) -> V:
@@ -209,7 +209,7 @@ class Question(Table):
 
 
 def plain_number(value: float) -> int | float:
-    """Return a number without the digits of binary fractions; whole numbers as integers."""
+    """Return a number without binary rounding digits; whole numbers as integers."""
     rounded = round(value, 9)
     return int(rounded) if rounded == int(rounded) else rounded
 
@@ -311,7 +311,7 @@ FEWEST_OPTIONS, MOST_OPTIONS = 2, 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChoiceView(ItemView):
-    """Options as shown: their ids and words; of ``several`` any number can be chosen."""
+    """Options as shown: their ids and texts; with ``several`` any number can be chosen."""
 
     widget: ClassVar[str] = "choice"
 
@@ -323,7 +323,7 @@ class ChoiceView(ItemView):
         return f"1–{min(len(self.options), 9)}"
 
     def simulated(self, opinion: float, draw: Draw) -> Value:
-        """Return an option by chance; of several, each with probability one half, and the first where none is."""
+        """Return a random option; with ``several``, each with probability ½, and the first if none is drawn."""
         if self.several:
             chosen = tuple(option for option, _ in self.options if draw() < 0.5)
             return chosen or (self.options[0][0],)
@@ -383,7 +383,7 @@ class Choice(Question):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class NumberView(ItemView):
-    """A field for a number as shown; ``least`` and ``most`` are None where nothing bounds it."""
+    """A number field as shown; ``least`` and ``most`` are None without a bound."""
 
     widget: ClassVar[str] = "number"
     keys: ClassVar[str] = "0–9"
@@ -530,7 +530,7 @@ _SIMULATED: Final = "Simulated answer."
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TextView(ItemView):
-    """A field for a text as shown: ``lines`` high, for at most ``longest`` characters."""
+    """A text field as shown: ``lines`` high, for at most ``longest`` characters."""
 
     widget: ClassVar[str] = "text"
     keys: ClassVar[str] = "A–Z"
@@ -626,7 +626,7 @@ else:
 def question_of(table: Mapping[str, Any]) -> Question:
     """Return a receipt's question (KeyError: unknown kind, ValueError: invalid for its kind).
 
-    One of a plug-in that is not here is a `RecordedQuestion`.
+    A question of a plug-in that is not installed is a `RecordedQuestion`.
     """
     kind = _kind_of(table)
     return (RecordedQuestion if ":" in kind and kind not in KINDS else KINDS[kind]).model_validate(table)

@@ -48,7 +48,7 @@ class SimulatedParticipants(Table):
     )
 
     def described(self) -> str:
-        """Return the values in words."""
+        """Return the values as text."""
         lapses = f", lapse rate {self.lapse_rate:g}" if self.lapse_rate else ""
         return f"SD of noise {self.noise_sd:g}, of response bias {self.bias_sd:g}, of slopes {self.slope_sd:g}{lapses}"
 
@@ -65,6 +65,6 @@ PUBLISHED: Final[Mapping[str, SimulatedParticipants]] = {
 
 
 def compared_kinds(stated: SimulatedParticipants | None) -> dict[str, SimulatedParticipants]:
-    """Return the kinds of people whose power is compared, the main kind first: as stated, otherwise typical."""
+    """Return the kinds of participants whose power is compared: the stated or typical one first."""
     first = {TYPICAL: PUBLISHED[TYPICAL]} if stated is None else {STATED: stated}
     return first | {kind: PUBLISHED[kind] for kind in (CONSISTENT, NOISY)}

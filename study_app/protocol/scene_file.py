@@ -17,9 +17,9 @@ _COMMENT_LETTERS: Final = 110
 
 
 def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[_Place, str] | None = None) -> str:
-    """Return a scene as a scene file; the file cannot state that velocities are given.
+    """Return a scene as a scene file; known velocities cannot be stated in it.
 
-    Paragraphs ``said`` stand above it as comments; ``notes`` are comments of single keys by their place, such as
+    Paragraphs ``said`` precede it as comments; ``notes`` are comments on single keys by their path, such as
     ``("liquids", "water", "density_kg_m3")``.
     """
     comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
@@ -34,12 +34,12 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[_Place,
 
 
 def with_default_estimator(scene: Scene) -> Scene:
-    """Return a scene as the program presents and writes it without a file: "kalman" in place of "ewma"."""
+    """Return a scene with the program's default estimator: "kalman" instead of "ewma"."""
     return scene.model_copy(update={"velocity": Kalman()}) if scene.velocity == Ewma() else scene
 
 
 def _liquid_table(liquid: Liquid) -> Mapping[str, Any]:
-    """Return a liquid's table for a scene file, without tables that have no effect and add nothing."""
+    """Return a liquid's table for a scene file, without tables that have no effect."""
     idle = {
         effect.name
         for effect in EFFECTS

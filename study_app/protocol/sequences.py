@@ -48,7 +48,7 @@ from study_app.protocol.streams import Draw, shuffle, study_stream
 
 @dataclass(frozen=True, slots=True)
 class Constraint:
-    """At most ``max_repeats`` of a kind in a row, at least ``min_distance`` from one to the next; None: any."""
+    """At most ``max_repeats`` of a kind in succession, at least ``min_distance`` between equal ones; None: any."""
 
     max_repeats: int | None = None
     min_distance: int | None = None
@@ -60,7 +60,7 @@ class Constraint:
         return not near and (self.max_repeats is None or longest_run(order) <= self.max_repeats)
 
     def impossible_key(self, codes: int, repetitions: int) -> tuple[str, str] | None:
-        """Return the key that makes every order impossible and a phrase with the possible values; None without one."""
+        """Return the key that makes every order impossible and a phrase with possible values, or None."""
         if repetitions == 1:
             return None
         if self.min_distance is not None and self.min_distance > codes:
@@ -82,7 +82,7 @@ def longest_run(order: Sequence[object]) -> int:
 
 
 def shortest_distance(order: Sequence[object]) -> int | None:
-    """Return the shortest distance between two of one kind [trials]; None if all differ."""
+    """Return the shortest distance between two trials of one kind [trials]; None if all differ."""
     latest: dict[object, int] = {}
     distances = []
     for index, code in enumerate(order):
@@ -96,7 +96,7 @@ Square: TypeAlias = Literal["williams", "latin"]
 
 
 def row_count(square: Square, codes: int) -> int:
-    """Return the number of rows of a square: so many participants complete a round."""
+    """Return the number of rows of a square, which is the number of participants in a complete round."""
     return 2 * codes if square == "williams" and codes % 2 and codes > 1 else codes
 
 
@@ -119,7 +119,7 @@ def row(square: Square, codes: int, number: int, repetitions: int = 1) -> tuple[
 
 
 def has_even_borders(codes: int, repetitions: int) -> bool:
-    """Return whether a Williams design's carry-over is even across the borders of its repetitions, too."""
+    """Return whether a Williams design's carry-over is also even across the borders of its repetitions."""
     period = (codes - 1) // 2 if codes % 2 else codes - 1
     return codes == 1 or (repetitions - 1) % period == 0
 
@@ -133,7 +133,7 @@ def enrolment_number(participant: str) -> int | None:
 def assigned_row(study: str, block: str, rows: int, participant: str, place: int | None = None) -> int:
     """Return the row (from 0) of a participant in a block of a study.
 
-    ``place`` is the number that assigns it (from 1); None: the number in the participant's id.
+    ``place`` is the number that assigns the row (from 1); None: the number in the participant's ID.
     """
     number = enrolment_number(participant) if place is None else place
     if number is None:
@@ -154,7 +154,7 @@ def draw_order(codes: Sequence[T], repetitions: int, constraint: Constraint, dra
     """Return every code ``repetitions`` times in a random order that satisfies a constraint.
 
     ``draw`` gives uniform numbers in [0, 1); at most (len(codes) · repetitions + 1) · ``PROPOSALS`` + len(codes) of
-    them are drawn. ValueError says that no order keeps the constraint.
+    them are drawn. ValueError is raised if no order satisfies the constraint.
     """
     if (impossible := constraint.impossible_key(len(codes), repetitions)) is not None:
         raise ValueError(" ".join(impossible))
@@ -167,7 +167,7 @@ def draw_order(codes: Sequence[T], repetitions: int, constraint: Constraint, dra
 
 
 def propose_order(codes: int, repetitions: int, constraint: Constraint, draw: Draw) -> _Proposal | None:
-    """Draw an order from left to right and return it with the inverse of its probability; None in a dead end."""
+    """Draw an order from left to right; return it with its inverse probability, or None in a dead end."""
     apart = max(constraint.min_distance or 1, 2 if constraint.max_repeats == 1 else 1)
     left = _Remaining(codes, repetitions, apart, constraint.max_repeats or codes * repetitions)
     steepness = _steepness(codes, repetitions, apart)
@@ -189,11 +189,11 @@ def propose_order(codes: int, repetitions: int, constraint: Constraint, draw: Dr
 
 
 def _steepness(codes: int, repetitions: int, apart: int) -> int:
-    """Return the exponent that weights the remaining codes; any is correct, a good one needs few proposals.
+    """Return the exponent that weights the remaining codes; any is correct, a good one needs fewer proposals.
 
-    The nearer the distance to the number of codes, the less may one code get ahead of another. In the long run the
-    ratio of the variances of a code's gaps, free to constrained, is n (n − 1) / ((n − d) (n − d + 1)); half way between
-    1 and that does best in blocks of usual length **[measured]**.
+    The closer the distance is to the number of codes, the less the counts of codes can differ. In the long run the
+    ratio of the variances of a code's gaps, free to constrained, is n (n − 1) / ((n − d) (n − d + 1)); the mean of that
+    and 1 works best in blocks of usual length **[measured]**.
     """
     room = (codes - apart) * (codes - apart + 1)
     if room <= 0:
@@ -202,7 +202,7 @@ def _steepness(codes: int, repetitions: int, apart: int) -> int:
 
 
 class _Remaining:
-    """What is left to come, and what of it may come next: ``apart`` trials after its like, ``run`` in a row."""
+    """The remaining codes and their constraints: ``apart`` trials between equal codes, ``run`` in succession."""
 
     def __init__(self, codes: int, repetitions: int, apart: int, run: int) -> None:
         self.count = [repetitions] * codes

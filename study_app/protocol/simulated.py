@@ -49,7 +49,7 @@ _Z_75: Final = 0.6745
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialFeatures:
-    """What reached the senses in one trial; all of it at the hand.
+    """The stimulus of one trial at the hand.
 
     Attributes
     ----------
@@ -84,10 +84,11 @@ NO_FEATURES: Final = TrialFeatures(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rater:
-    """How one simulated person differs from the next.
+    """The individual parameters of a simulated person.
 
-    ``leaning`` shifts every answer [points], ``noise`` is the spread between equal trials [points], ``strength`` is how
-    strong forces seem, 1 on average, and ``threshold_s`` the delay that is noticed half of the time [s].
+    ``leaning`` shifts every answer [points], ``noise`` is the standard deviation between equal trials [points],
+    ``strength`` scales perceived forces, 1 on average, and ``threshold_s`` is the delay that is noticed half of the
+    time [s].
     """
 
     leaning: float
@@ -102,7 +103,7 @@ LEAST_NOISE, NOISE_RANGE, MEAN_NOISE = 0.5, 0.3, 0.65
 def rater(draw: Draw, participants: SimulatedParticipants = REHEARSED) -> Rater:
     """Return one of the participants, drawn with ``draw`` (uniform numbers in [0, 1)).
 
-    Their noise is uniform from 77 % to 123 % of the mean.
+    Their noise is uniformly distributed from 77 % to 123 % of the mean.
     """
     return Rater(
         leaning=participants.bias_sd * normal(draw),
@@ -113,27 +114,27 @@ def rater(draw: Draw, participants: SimulatedParticipants = REHEARSED) -> Rater:
 
 
 def rate(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) -> dict[str, int]:
-    """Return an answer from 1 to 7 for each item id, in the order given."""
+    """Return an answer from 1 to 7 for each item id, in the given order."""
     judged = judgements(items, trial, person, draw)
     return {item: min(POINTS, max(1, math.floor(points + 0.5))) for item, points in judged.items()}
 
 
 def judgements(items: Iterable[str], trial: TrialFeatures, person: Rater, draw: Draw) -> dict[str, float]:
-    """Return what a person would answer to each item id, in the order given: from 1 to 7, or a little beyond."""
+    """Return a person's unrounded answer to each item id, in the given order: from 1 to 7, or slightly beyond."""
     asked = tuple(items)
     thought = zip(asked, _opinions(asked, trial, person), strict=True)
     return {item: opinion + person.leaning + person.noise * normal(draw) for item, opinion in thought}
 
 
 def _opinions(items: Iterable[str], trial: TrialFeatures, person: Rater) -> list[float]:
-    """Return what a person thinks of each item, from 1 to 7, before leaning and noise make an answer of it."""
+    """Return a person's opinion on each item, from 1 to 7, before response bias and noise are added."""
     impression = _impression(trial, person)
     return [OPINIONS[item](impression) if item in OPINIONS else _NO_OPINION for item in items]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Impression:
-    """The trial in the rater's own terms, each from 0 to 1."""
+    """The perceived qualities of a trial, each from 0 to 1."""
 
     present: float
     resisting: float
@@ -147,7 +148,7 @@ class _Impression:
 
 
 def _rise(value: float, middle: float, width: float) -> float:
-    """Return 0 … 1, one half at ``middle``, 0.15 and 0.85 one ``width`` away from it."""
+    """Return 0 … 1, one half at ``middle``, and 0.15 and 0.85 one ``width`` away from it."""
     x = (value - middle) / width
     return 0.5 + 0.5 * x / math.sqrt(1 + x * x)
 
@@ -193,7 +194,7 @@ OPINIONS: Final[dict[str, Callable[[_Impression], float]]] = {
 def simulate_ratings(
     items: Sequence[str], trials: Sequence[Sequence[TrialFeatures]], repetitions: int, person: Rater, random: Generator
 ) -> tuple[Floats, Floats]:
-    """Return what one person thinks of each item in a block, and the noise of the answers.
+    """Return one person's opinion on each item in a block, and the noise of the answers.
 
     Parameters
     ----------
@@ -224,7 +225,7 @@ def simulate_ratings(
 
 @dataclass(frozen=True, slots=True)
 class Observer:
-    """What a simulated participant can discriminate.
+    """The sensitivity of a simulated participant.
 
     Attributes
     ----------
@@ -246,12 +247,12 @@ class Observer:
 
     @property
     def resistance_noise(self) -> float:
-        """The standard deviation of what a resistance is taken for, as a share of it."""
+        """The standard deviation of a perceived resistance, relative to it."""
         return self.weber_fraction / (_Z_75 * math.sqrt(1 + (1 + self.weber_fraction) ** 2))
 
     @property
     def delay_noise_s(self) -> float:
-        """The standard deviation of what a delay is taken for [s]."""
+        """The standard deviation of a perceived delay [s]."""
         return self.delay_jnd_s / (math.sqrt(2) * _Z_75)
 
 
@@ -259,12 +260,12 @@ OBSERVER: Final = Observer()
 
 
 def observer_of(draw: Draw) -> Observer:
-    """Return the observer that a simulated participant is, one of people drawn at random."""
+    """Return a simulated participant's observer, drawn at random."""
     return Observer(person=drawn(draw))
 
 
 class Course(NamedTuple):
-    """How far an observer is in a block: the share of the trials that is done, and the last answer to its design."""
+    """An observer's progress in a block: the fraction of trials done, and the last answer to its design."""
 
     done: float = 0.5
     last: str | int | float | None = None
@@ -275,9 +276,9 @@ _MIDDLE: Final = Course()
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """What an observer attends to in a block, and whether the smaller one is asked for.
+    """The quantity that an observer compares in a block, and whether the smaller one is asked for.
 
-    These are delays, or resistances; of a force that is sent with jitter or loss how rough it is.
+    It is a delay, a resistance or, for a force link with jitter or loss, the roughness of the force.
     """
 
     delays: bool
@@ -287,7 +288,7 @@ class Comparison:
 
     @classmethod
     def of(cls, protocol: Protocol, block: Block, observer: Observer) -> Comparison:
-        """Return what the question of a block is about."""
+        """Return the comparison that a block's question requires."""
         if block.stimulus is not None:
             stimulus = stimulus_of(protocol, block)
             return cls(stimulus.vary in DELAYS, stimulus.direction == "down", observer, stimulus.vary)
@@ -295,7 +296,7 @@ class Comparison:
         return cls(len(delays) > 1, smallest=False, observer=observer)
 
     def sensed(self, trial: TrialFeatures) -> float:
-        """Return what is attended to: a delay [s], a roughness [N], or a resistance [N·s/m]."""
+        """Return the compared quantity of a trial: a delay [s], a roughness [N], or a resistance [N·s/m]."""
         if self.vary == FORCE_DELAY:
             return trial.force_delay_s
         if self.vary in OF_LINK:
@@ -303,19 +304,19 @@ class Comparison:
         return trial.delay_s if self.delays else trial.force_mean_n / max(trial.speed_rms_mps, _LEAST_SPEED_MPS)
 
     def noisy(self, sensed: float, draw: Draw) -> float:
-        """Return what the observer takes it for."""
+        """Return the perceived value with noise."""
         noise, observer = normal(draw), self.observer
         return (
             sensed + observer.delay_noise_s * noise if self.delays else sensed * (1 + observer.resistance_noise * noise)
         )
 
     def distinct(self, difference: float, about: float) -> bool:
-        """Return whether a difference is taken for one."""
+        """Return whether a difference is noticed."""
         observer = self.observer
         return abs(difference) > (observer.delay_jnd_s if self.delays else observer.weber_fraction * abs(about))
 
     def choose(self, design: Design, sensed: Sequence[float], mean: float, draw: Draw, course: Course = _MIDDLE) -> str:
-        """Return the answer of a design with choices to what was sensed; ``mean`` is that of the block so far."""
+        """Return the answer of a design with choices to the sensed values; ``mean`` is that of the block so far."""
         taken: Sequence[float] = [self.noisy(one, draw) for one in self._apart(sensed, course)]
         if draw() < self.observer.person.lapse:
             return design.answers[int(len(design.answers) * draw())]
@@ -324,7 +325,7 @@ class Comparison:
         return design.simulated(taken, mean, self)
 
     def _apart(self, sensed: Sequence[float], course: Course) -> Sequence[float]:
-        """Return what an observer of width one would sense in place of these intervals, of which one is the least."""
+        """Return the values that an observer of width one would sense, one of which is the least."""
         person, least = self.observer.person, (max if self.smallest else min)(sensed)
         if (person.width, person.change) == (1.0, 1.0) or (least == 0.0 and not self.delays):
             return sensed
@@ -333,7 +334,7 @@ class Comparison:
         return [least + threshold * math.copysign(person.sensed(abs(share), course.done), share) for share in shares]
 
     def _preferring(self, design: Design, taken: Sequence[float], course: Course) -> Sequence[float]:
-        """Return what intervals are taken for by who prefers the first one, and the one of the last answer."""
+        """Return the perceived values after biases towards the first interval and the last answer."""
         person, noise = self.observer.person, self.observer.delay_noise_s
         if not self.delays:
             noise = self.observer.resistance_noise * sum(taken) / len(taken)
@@ -352,9 +353,9 @@ class Comparison:
         draw: Draw,
         course: Course = _MIDDLE,
     ) -> str | int | float:
-        """Return the answer to a trial: one of the design's answers, a point of its scale, or a number.
+        """Return the answer to a trial: one of the design's answers, a scale point, or a number.
 
-        ``sensed`` is what was attended to in each interval, ``before`` the same of the block's trials before.
+        ``sensed`` is the compared quantity in each interval, ``before`` that in the block's previous trials.
         """
         known = [*before, *sensed]
         mean, first = sum(known) / len(known), known[0]
@@ -371,15 +372,15 @@ class Comparison:
         return _MODULUS * math.sqrt(max(taken / first if mean > 0 and first > 0 else 1.0, 0.0))
 
     def _taken(self, sensed: Sequence[float], draw: Draw) -> float:
-        """Return what the last interval is taken for; noise is drawn for every one."""
+        """Return the perceived value of the last interval; noise is drawn for every interval."""
         return [self.noisy(one, draw) for one in sensed][-1]
 
 
 class SimulatedTrial(NamedTuple):
-    """One answered trial of a block with a design; ``track`` is what its ``code`` stands for.
+    """One answered trial of a block with a design; ``track`` is the track of its ``code``.
 
-    ``level`` is in the unit of the stimulus' levels, None where conditions are compared; ``success`` is what the answer
-    counts as for a psychometric function.
+    ``level`` is in the unit of the stimulus' levels, None if conditions are compared; ``success`` tells whether the
+    answer is a success of the psychometric function.
     """
 
     participant: str
@@ -396,12 +397,12 @@ class SimulatedTrial(NamedTuple):
 
 
 def as_requested(presented: Stimulated) -> float:
-    """Return what is attended to where exactly the requested number is presented: a delay [s], or the number."""
+    """Return the compared quantity if the requested number is presented exactly: a delay [s], or the number."""
     return presented.value / 1000 if presented.vary in DELAYS else presented.value
 
 
 def courses_of(schedule: Schedule) -> dict[int, float]:
-    """Return by the number of each trial what share of its block is done then, from 0 to 1."""
+    """Return, by trial number, the fraction of its block that is done by then, from 0 to 1."""
     blocks: dict[str, list[int]] = {}
     for trial in schedule.trials:
         blocks.setdefault(trial.block, []).append(trial.number)
@@ -419,7 +420,7 @@ def simulate_study(
     study: str = "simulated",
     sense: Callable[[Stimulated], float] = as_requested,
 ) -> Iterator[SimulatedTrial]:
-    """Yield the answers of participants to the blocks of levels, as the methods of the protocol choose these.
+    """Yield the answers of participants to the blocks of levels, which the protocol's methods choose.
 
     Parameters
     ----------

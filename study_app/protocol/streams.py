@@ -33,12 +33,12 @@ def stream(seed: int, name: str) -> random.Random:
 
 
 def study_stream(study: str, name: str) -> random.Random:
-    """Return a stream that is the same in every session of a study, for any seed of the session."""
+    """Return a stream that is the same in every session of a study, regardless of the session's seed."""
     return stream(0, f"study/{study}/{name}")
 
 
 def shuffle(items: Iterable[T], draw: Draw) -> tuple[T, ...]:
-    """Return ``items`` in random order (Fisher–Yates, Durstenfeld's form), with len(items) − 1 calls of ``draw``.
+    """Return ``items`` in random order (Fisher–Yates, Durstenfeld's variant), with len(items) − 1 calls of ``draw``.
 
     ``draw`` gives uniform numbers in [0, 1), as ``stream(…).random`` does.
     """
@@ -53,8 +53,7 @@ def shuffle(items: Iterable[T], draw: Draw) -> tuple[T, ...]:
 class Key:
     """The opened key of a study; never printed.
 
-    ``codes`` is block → code → what the code stands for: a condition, or a track such as "8/1". Sub-keys are derived
-    from ``secret``, the nonce.
+    ``codes`` maps block → code → condition, or track such as "8/1". Sub-keys are derived from ``secret``, the nonce.
     """
 
     codes: Mapping[str, Mapping[str, str]]
@@ -87,9 +86,9 @@ def own_code(codes: Sequence[str], secret: bytes, participant: str, block: str, 
 
 
 def group_of(shares: Mapping[str, int], secret: bytes, entry: int) -> str:
-    """Return the group of participant ``entry`` of the folder, from 1.
+    """Return the group of participant number ``entry`` (from 1) in the folder.
 
-    ``shares`` say how often each group comes in a permuted block, in any order; ``secret`` is the nonce of the sealed
+    ``shares`` are the counts of each group in a permuted block, in any order; ``secret`` is the nonce of the sealed
     key.
     """
     return place_in_group(shares, secret, entry)[0]

@@ -51,13 +51,13 @@ _TAGS: Final = range(0xE0020, 0xE0080)  # that follow a flag
 
 
 def characters(text: str) -> list[str]:
-    """Return a text's characters as a person sees them: letters with accents, whole emoji.
+    """Return a text's user-perceived characters: letters with accents, whole emoji.
 
-    This is Unicode's rule for extended grapheme clusters without Korean letters written in parts.
+    This is Unicode's rule for extended grapheme clusters without decomposed Korean letters.
 
     Examples
     --------
-    >>> [len(characters(text)) for text in ("e\u0301t", "👨‍👩‍👧", "🇫🇷🇩🇪")]
+    >>> [len(characters(text)) for text in ("ét", "👨‍👩‍👧", "🇫🇷🇩🇪")]
     [2, 1, 2]
     """
     clusters: list[str] = []
@@ -96,7 +96,7 @@ def _checked_text(text: str) -> str:
 
 
 def unprintable_character(text: str, permitted: str = "") -> str | None:
-    """Return the first character that cannot be printed, hides or reorders others; ``permitted`` ones may."""
+    """Return the first character that cannot be printed, or that hides or reorders others, except ``permitted``."""
     hidden = (
         character for character in text if unicodedata.category(character) in UNPRINTABLE or character in DIRECTIONS
     )
@@ -104,7 +104,7 @@ def unprintable_character(text: str, permitted: str = "") -> str | None:
 
 
 def _check_printable(text: str) -> str:
-    """Return ``text`` if it is legible: something visible, and nothing that hides or reorders other characters."""
+    """Return ``text`` if it has visible characters and none that hides or reorders others."""
     if (letter := unprintable_character(text, "\t\n\r")) is not None:
         raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: remove it")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
@@ -189,7 +189,7 @@ class Table(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
-        """Return the schema with the pairs of which one is given, and the sections of its form."""
+        """Return the schema with the pairs of alternative keys, and the sections of its form."""
         node = handler(core_schema)
         stated: Any = ((ALTERNATIVES, cls.ONE_OF), (SECTIONS, cls.SECTIONS), (NOT_WITH, cls.NOT_WITH))
         handler.resolve_ref_schema(node).update((key, to_jsonable_python(value)) for key, value in stated if value)
@@ -202,16 +202,16 @@ RECORDED: Final = {"recorded": True}
 
 
 class OfKinds(Generic[K]):
-    """Annotates the union of the program's own kinds of a table; a kind with a colon is that of a plug-in.
+    """The annotation for the union of a table's built-in kinds; a kind with a colon belongs to a plug-in.
 
-    ``base`` is the class of all, ``stand_in`` holds a recorded table of a plug-in that is not here.
+    ``base`` is the common class, ``stand_in`` holds a recorded table of a plug-in that is not installed.
     """
 
     def __init__(self, registry: Registry[type[K]], base: type[K], stand_in: type[K]) -> None:
         self.registry, self.base, self.stand_in = registry, base, stand_in
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Return the schema of the union, with what is validated before it."""
+        """Return the schema of the union, preceded by its validation function."""
         written = core_schema.simple_ser_schema("any")  # each kind writes its own keys
         return core_schema.with_info_wrap_validator_function(self._validate, handler(source), serialization=written)
 

@@ -14,11 +14,11 @@ from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
 
 @dataclass(frozen=True, slots=True)
 class Track:
-    """Trials whose levels are chosen together, at most ``slots`` of them.
+    """A sequence of at most ``slots`` trials whose levels are chosen together.
 
     Its code stands for ``name``: the standard and a number ("8/1", "/1" without a standard), or a condition.
-    ``comparison`` is the condition that is compared with the block's standard, None where a number is varied,
-    ``number`` which of the tracks of its standard, from 1; ``catch`` has of each catch trial the slots, from 0, among
+    ``comparison`` is the condition that is compared with the block's standard, None if a number is varied; ``number``
+    counts the tracks of its standard from 1; ``catch`` has, for each catch trial, the range of slots (from 0) from
     which its own is drawn.
     """
 
@@ -53,7 +53,7 @@ def track_of(protocol: Protocol, block: Block, name: str) -> Track:
 
 
 def standards_of(protocol: Protocol, block: Block) -> tuple[float | None, ...]:
-    """Return the standards of a block; a single None if a level is the value of the only interval."""
+    """Return the standards of a block; a single None if the level is the value of the only interval."""
     stimulus = stimulus_of(protocol, block)
     if stimulus.level_kind == "value" and design_of(protocol, block).intervals == 1:
         return (None,)
@@ -82,7 +82,7 @@ def method_of(protocol: Protocol, block: Block) -> Method:
 
 
 def adjusting_of(protocol: Protocol, block: Block, standard: float | None, start: float) -> Adjusting | None:
-    """Return the setting that starts at a level; None if participants do not set levels."""
+    """Return the adjustment that starts at a level; None if participants do not set levels."""
     method = None if block.stimulus is None else method_of(protocol, block)
     if not isinstance(method, Adjustment):
         return None
@@ -92,8 +92,8 @@ def adjusting_of(protocol: Protocol, block: Block, standard: float | None, start
 def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:
     """Return whether answers can be correct.
 
-    A level that is a value may be above or below the standard: then an interval can still be the odd one, or the same
-    as another, but a forced choice between more and less has no correct answer.
+    A level that is a value may be above or below the standard: then an interval can still differ from the others, or be
+    the same as another, but a forced choice between more and less has no correct answer.
     """
     by_value = stimulus is not None and stimulus.level_kind == "value"
     return design.has_correct_answer and not (by_value and design.asks_for_more)

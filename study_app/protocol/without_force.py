@@ -23,7 +23,7 @@ _PATTERNS: Final = tuple(
 def without_force(protocol: Protocol) -> Protocol:
     """Return a study whose pages, introductions and instructions do not mention force.
 
-    It is to be shown, never to be kept or hashed.
+    It is for display only and must not be saved or hashed.
     """
     reworded = {"pages": "body", "questionnaires": "intro", "tasks": "instruction"}
     tables = {

@@ -37,7 +37,7 @@ _DROPPED: Final = 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Staircase:
-    """A rule.
+    """An up–down rule.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Staircase:
         return converges_to(self.down_after, self.ratio)
 
     def next(self, answers: Sequence[_Answer]) -> float:
-        """Return the next level: a step from the last one presented, or the same again."""
+        """Return the next level: one step from the last one presented, or the same level."""
         if not answers:
             return self.begin
         last = answers[-1][0]
@@ -122,7 +122,7 @@ _TIE_NATS: Final = 1e-9
 
 @dataclass(frozen=True)
 class Search:
-    """The parameters and levels among which QUEST+ chooses.
+    """The parameter grid and levels among which QUEST+ chooses.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class Search:
         return _weighted_entropy(succeeded, axis) + _weighted_entropy(before - succeeded, axis)
 
     def next_of(self, posteriors: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the index of the next level of each track, (tracks,): the lowest of equal ones."""
+        """Return the index of each track's next level, (tracks,); the lowest in case of a tie."""
         first = int(self.noise)
         entropy = self.expected_entropy(posteriors)[:, first:]
         return first + np.asarray((entropy <= entropy.min(axis=1, keepdims=True) + _TIE_NATS).argmax(axis=1), np.int64)
@@ -177,7 +177,7 @@ def _weighted_entropy(joint: NDArray[np.float64], axis: int) -> NDArray[np.float
 
 
 class Answers(NamedTuple):
-    """The levels presented and the answers.
+    """The presented levels and the answers.
 
     Attributes
     ----------
@@ -198,11 +198,11 @@ class Answers(NamedTuple):
     done: Floats
 
     def first(self, trials: int | None) -> Answers:
-        """Return the answers to the first trials of each track; None: to all."""
+        """Return the answers to the first trials of each track, or (None) to all."""
         return Answers(**{name: of_tracks[:, :trials] for name, of_tracks in self._asdict().items()})
 
     def given(self, places: Floats) -> list[Given]:
-        """Return the answers of each track, at the nearest of ``places``: levels in u, ascending."""
+        """Return the answers of each track, with levels in u rounded to the nearest of the ascending ``places``."""
         nearest, known = np.searchsorted((places[1:] + places[:-1]) / 2, self.levels), ~np.isnan(self.levels)
         of_tracks = {**self._asdict(), "places": nearest}
         return [
@@ -217,7 +217,7 @@ Choice: TypeAlias = Generator[tuple[Floats, NDArray[np.bool_]], NDArray[np.bool_
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Observers:
-    """The observers: one for each track.
+    """Simulated observers, one per track.
 
     Attributes
     ----------
@@ -253,7 +253,7 @@ class Observers:
     def probability(self, levels: ArrayLike, done: ArrayLike = 0.5) -> Floats:
         """Return the probability of a success at ``levels``, one for each track or one for all.
 
-        ``done`` is the share of the trials before, from 0 to 1.
+        ``done`` is the fraction of trials already done, from 0 to 1.
         """
         if self.presented is not None:
             levels = self.presented(np.asarray(levels, float))
@@ -261,7 +261,7 @@ class Observers:
         return success(self.family, levels, thresholds, self.width, self.guess, self.lapse)
 
     def answers(self, draws: Floats, chosen: Choice) -> Answers:
-        """Return the answers to levels that are chosen by the answers before, with uniform numbers (tracks, trials)."""
+        """Return the answers, using uniform numbers (tracks, trials); each level is chosen from the earlier answers."""
         tracks, trials = draws.shape
         levels, successes, before = np.full(draws.shape, np.nan), np.zeros(draws.shape, bool), np.zeros(draws.shape)
         towards = np.zeros(draws.shape) if self.towards is None else self.towards

@@ -29,7 +29,7 @@ _LEAST_SPEED_MPS: Final = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """A motion at even times.
+    """A motion at equally spaced times.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
 
 
 def share(sent_n: Vectors, model_n: Vectors) -> float | None:
-    """Return the share of the force model's force that was sent, Σ F_sent·F_model / Σ |F_model|²; None without force.
+    """Return the share of the model force that was sent, Σ F_sent·F_model / Σ |F_model|²; None without force.
 
     Parameters
     ----------
@@ -125,9 +125,9 @@ def share(sent_n: Vectors, model_n: Vectors) -> float | None:
 
 
 def lag(sent_n: Vectors, model_n: Vectors, most: int) -> float | None:
-    """Return the lag of the sent force behind the force model's [rows], by least squares; None without force.
+    """Return the lag of the sent force behind the model force [rows], by least squares; None without force.
 
-    Each lag of whole rows has the residual of F_sent = g F_model with the best share g; a parabola through the least
+    Each lag in whole rows has the residual of F_sent = g F_model with the best gain g; a parabola through the least
     residual and its neighbours gives the fraction.
 
     Parameters

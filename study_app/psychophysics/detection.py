@@ -160,13 +160,13 @@ def same_different(hits: float, differents: float, false_alarms: float, sames: f
 
 
 def different_rate(d_prime: float, k: float) -> float:
-    """Return P("different") of the differencing model for two that are d′ apart: |x₁ − x₂| > k."""
+    """Return P("different") of the differencing model for two stimuli that are d′ apart: |x₁ − x₂| > k."""
     root = math.sqrt(2.0)
     return NORMAL.cdf((d_prime - k) / root) + NORMAL.cdf((-d_prime - k) / root)
 
 
 def rating(noise: ArrayLike, signal: ArrayLike) -> Sensitivity | None:
-    """Return d_a = √2 z(AUC) from ratings; None if one of the two has none.
+    """Return d_a = √2 z(AUC) from ratings; None if there are no noise or no signal trials.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def _rule(low: float, high: float) -> tuple[Floats, Floats]:
 
 
 def _abx(d_prime: float, divisor: float) -> float:
-    """Return P(correct): both comparisons have the correct sign, or both the wrong sign."""
+    """Return P(correct): both comparisons have the correct sign, or both have the wrong one."""
     first, second = NORMAL.cdf(d_prime / math.sqrt(2.0)), NORMAL.cdf(d_prime / divisor)
     return first * second + (1.0 - first) * (1.0 - second)
 
@@ -217,7 +217,7 @@ def _oddity(d_prime: float) -> float:
 
 
 def _same_different_differencing(d_prime: float) -> float:
-    """Return P(correct) of the criterion k at which "same" is as often correct as "different"."""
+    """Return P(correct) for the criterion k at which "same" and "different" trials are equally often correct."""
     k = _inverse(lambda k: -different_rate(d_prime, k) - different_rate(0.0, k), -1.0)
     return 0.5 * (1.0 + different_rate(d_prime, k) - different_rate(0.0, k))
 

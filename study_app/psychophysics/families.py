@@ -32,7 +32,7 @@ def normal_cdf(x: Floats) -> Floats:
 
 
 def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -> Floats:
-    """Return F, the share of the way from the guess rate to one minus the lapse rate.
+    """Return F, the fraction of the range from the guess rate to one minus the lapse rate.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def rise(family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike) -
 
 
 def position(family: Family, share: float) -> float:
-    """Return how many widths above the threshold F reaches ``share``, which lies strictly between 0 and 1."""
+    """Return the distance from the threshold, in widths, at which F reaches ``share``, strictly between 0 and 1."""
     match family:
         case "weibull":
             return math.log10(-math.log1p(-share) / math.log(2.0)) / KAPPA
@@ -76,7 +76,7 @@ def position(family: Family, share: float) -> float:
 def success(
     family: Family, u: ArrayLike, threshold: ArrayLike, width: ArrayLike, guess: ArrayLike, lapse: ArrayLike
 ) -> Floats:
-    """Return ψ, the probability of success, of the shape to which the arguments broadcast."""
+    """Return ψ, the probability of success; the arguments are broadcast."""
     guess, lapse = np.asarray(guess, float), np.asarray(lapse, float)
     return np.asarray(guess + (1.0 - guess - lapse) * rise(family, u, threshold, width), float)
 

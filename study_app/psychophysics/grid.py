@@ -33,7 +33,7 @@ _OPEN_MASS: Final = 0.005
 
 @dataclass(frozen=True, kw_only=True)
 class Grid:
-    """The cells of a posterior, and their prior.
+    """The parameter grid of a posterior, with the prior.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Grid:
 
 
 class Others(NamedTuple):
-    """The parameters of a psychometric function beside its threshold."""
+    """The parameters of a psychometric function other than its threshold."""
 
     width: float
     guess: float
@@ -103,7 +103,7 @@ class Others(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """What the answers of one observer say about a psychometric function.
+    """The posterior of one observer's psychometric function.
 
     Attributes
     ----------
@@ -122,7 +122,7 @@ class Posterior:
         return np.asarray(np.einsum("abcd->a", self.weights), float)
 
     def reweighted(self, factors: NDArray[np.float64]) -> Posterior:
-        """Return the posterior whose prior differs from this one's by ``factors`` (widths, lapses)."""
+        """Return the posterior for a prior multiplied by ``factors`` (widths, lapses)."""
         weights = self.weights * factors[:, :, None]
         return Posterior(self.grid, weights / weights.sum())
 
@@ -150,7 +150,7 @@ class Posterior:
 
     @cached_property
     def session_sd(self) -> float:
-        """Standard deviation of the person's threshold about that of the answers [u]."""
+        """The standard deviation between the person's threshold and that of this session [u]."""
         constant, share = self.grid.session_sd
         return math.hypot(constant, share * self.threshold)
 
@@ -170,7 +170,7 @@ class Posterior:
         return Others(width=width, guess=guess, lapse=lapse)
 
     def success(self, levels: ArrayLike) -> NDArray[np.float64]:
-        """Return ψ at ``levels`` [u] of the function through all medians, clipped."""
+        """Return ψ at ``levels`` [u] of the function with all median parameters, clipped."""
         found = success(self.grid.family, levels, self.threshold, **self.others._asdict())
         return np.asarray(np.clip(found, CLIP, 1.0 - CLIP), float)
 
@@ -209,7 +209,7 @@ def fit(levels: ArrayLike, successes: ArrayLike, failures: ArrayLike, grid: Grid
 def log_likelihood(
     successes: ArrayLike, failures: ArrayLike, log_success: NDArray[np.float64], log_failure: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return that of each cell from counts of answers, shape (k,), and log ψ and log(1 − ψ) in each cell, (k, …)."""
+    """Return the log likelihood of each cell from counts of answers (k,) and log ψ and log(1 − ψ) (k, …)."""
     logarithms = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
     return np.asarray(logarithms + np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure), float)
 
@@ -241,9 +241,9 @@ GROUP_LAPSES: Final = (0.002, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12)
 
 
 def _lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
-    """Return the prior weight of each lapse rate of a person in a group of this mean: Erlang's distribution of order 2.
+    """Return the prior weight of each lapse rate in a group with this mean: Erlang's distribution of order 2.
 
-    ``lapses`` are ascending; each stands for those that are nearer to it than to the others.
+    ``lapses`` are ascending; each represents the rates that are nearest to it.
     """
     edges = 2 / mean * np.array([0.0, *(np.array(lapses[1:]) + lapses[:-1]) / 2, np.inf])
     beyond = np.append((1 + edges[:-1]) * np.exp(-edges[:-1]), 0.0)
@@ -251,19 +251,19 @@ def _lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
 
 
 def group_lapse_weights() -> NDArray[np.float64]:
-    """Return the prior weight of each of `GROUP_LAPSES`, which stand for the rates that are nearest to them."""
+    """Return the prior weight of each of `GROUP_LAPSES`, which represent the rates that are nearest to them."""
     edges = np.array([0.0, *(np.array(GROUP_LAPSES[1:]) + GROUP_LAPSES[:-1]) / 2, np.inf])
     return np.asarray(-np.diff(np.exp(-edges / MEAN_LAPSE)), float)
 
 
 def lapse_prior(lapses: Values) -> Values:
-    """Return the prior weight of each lapse rate of a person of whose group nothing is known."""
+    """Return the prior weight of each lapse rate for a person in an unknown group."""
     of_means = [_lapse_weights(lapses, mean) for mean in GROUP_LAPSES]
     return tuple((group_lapse_weights() @ np.array(of_means)).tolist())
 
 
 class GroupPriors(NamedTuple):
-    """What the answers of a group say about each of its people.
+    """The information that a group's answers provide about each of its members.
 
     Attributes
     ----------
@@ -282,12 +282,13 @@ class GroupPriors(NamedTuple):
 
 
 def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> GroupPriors:
-    """Return the prior of each person's width and lapse rate that follows from the answers of the others.
+    """Return each person's prior of width and lapse rate that follows from the answers of the others.
 
-    Widths of a group are log-normal about a centre, which is log-normal itself; lapse rates are about a mean, which is
-    exponential; thresholds are normal about a mean, all means being equally likely. Answers near a threshold say little
-    about a person's lapse rate, which moves the threshold: the answers of all say more, and what they leave open is an
-    error that all share. One person has `width_prior` and `lapse_prior`, but for their share beyond the grid.
+    Widths of a group are log-normal about a centre, which is itself log-normal; lapse rates are distributed about a
+    mean, which is exponential; thresholds are normal about a mean with a flat prior. Answers near a threshold contain
+    little information about a person's lapse rate, which shifts the threshold: the pooled answers contain more, and the
+    remaining uncertainty is an error that all share. A single person has `width_prior` and `lapse_prior`, except for
+    the part beyond the grid.
 
     Parameters
     ----------
@@ -333,12 +334,12 @@ def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
 
 
 def _median(values: Values, weights: NDArray[np.float64]) -> float:
-    """Return the median of a distribution over few values, interpolated between them."""
+    """Return the median of a discrete distribution, interpolated between its values."""
     return values[0] if len(values) == 1 else float(np.interp(0.5, np.cumsum(weights) - weights / 2, values))
 
 
 def quantile(centres: ArrayLike, weights: ArrayLike, share: float) -> float:
-    """Return a quantile of a distribution over cells, interpolated linearly between the cells' edges.
+    """Return a quantile of a distribution over cells, interpolated linearly between cell edges.
 
     Parameters
     ----------

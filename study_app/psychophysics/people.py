@@ -32,7 +32,7 @@ UNIFORM: Final = 12
 
 
 class Person(NamedTuple):
-    """A person as an observer.
+    """A simulated person as an observer.
 
     Attributes
     ----------
@@ -53,15 +53,15 @@ class Person(NamedTuple):
     change: float = 1.0
 
     def wrong(self, answers: int) -> float:
-        """Return the lapse rate: the share of answers that are wrong at any level, where one of so many is correct."""
+        """Return the lapse rate: the share of wrong answers at any level, with one correct answer among ``answers``."""
         return self.lapse * (1.0 - 1.0 / answers)
 
     def at(self, done: float) -> float:
-        """Return the threshold as a share of its mean, when a share of the block is ``done``."""
+        """Return the threshold relative to its mean after a fraction ``done`` of the block."""
         return float(self.change ** (done - 0.5))
 
     def sensed(self, level: float, done: float) -> float:
-        """Return what a level, as a share of the mean threshold, is to an observer of width one: 1 at the threshold."""
+        """Return a level's perceived intensity relative to the mean threshold: 1 at threshold, for unit width."""
         return float((level / self.at(done)) ** (1.0 / self.width))
 
 
@@ -85,12 +85,12 @@ MIXED: Final = "all of these"
 
 
 def normal(draw: Callable[[], float]) -> float:
-    """Return a nearly normal number, mean 0, deviation 1, from uniform ones in [0, 1)."""
+    """Return an approximately standard normal number from uniform numbers in [0, 1)."""
     return sum(draw() for _ in range(UNIFORM)) - UNIFORM / 2
 
 
 def drawn(draw: Callable[[], float]) -> Person:
-    """Return a person drawn at random, who may differ in every respect, from uniform numbers in [0, 1)."""
+    """Return a random person, who may differ in every parameter, using uniform numbers in [0, 1)."""
     low, high = _WIDTHS
     return Person(
         width=low * (high / low) ** draw(),
@@ -102,7 +102,7 @@ def drawn(draw: Callable[[], float]) -> Person:
 
 
 def of_kind(kind: str, draw: Callable[[], float]) -> Person:
-    """Return one of the people of a kind: of `KINDS`, or `MIXED`."""
+    """Return a person of a kind: of `KINDS`, or `MIXED`."""
     return drawn(draw) if kind == MIXED else KINDS[kind]
 
 
@@ -112,8 +112,7 @@ _COVERED: Final = 0.95
 class Estimates(NamedTuple):
     """Thresholds of many observers, (observers,) arrays [u]: medians, ends of 95 % intervals, variances.
 
-    ``shared``, (groups,), is the variance of a group's mean that is due to the width and the lapse rate that its people
-    share.
+    ``shared``, (groups,), is the variance of a group's mean due to the common width and lapse rate of its members.
     """
 
     medians: Floats
@@ -156,7 +155,7 @@ class Expected:
 
     @property
     def measured(self) -> bool:
-        """Whether there are estimates: levels are not clipped."""
+        """Whether there are estimates, because levels are not clipped."""
         return math.isfinite(self.worst[1])
 
     @property
@@ -171,11 +170,11 @@ class Expected:
 
     @property
     def worst(self) -> tuple[str, float]:
-        """The kind of people with the widest interval, and the median of half of it."""
+        """The kind of participants with the widest interval, and the median of its half width."""
         return max(((kind, float(np.median(halve))) for kind, halve in self.halves.items()), key=lambda one: one[1])
 
     def of_group(self, participants: int, trials: float | None = None) -> float:
-        """Return half the 95 % interval of a group's mean over all standards, as a share of the mean: median of kinds.
+        """Return the relative half width of the 95 % interval of a group's mean over all standards, median over kinds.
 
         Parameters
         ----------
@@ -201,20 +200,20 @@ class Expected:
         return 10.0**half - 1.0 if log else half / self.threshold
 
     def participants_for(self, precision: float, most: int = 1000) -> int | None:
-        """Return the fewest participants for half a group's interval within ``precision``; None: more than ``most``."""
+        """Return the fewest participants for a relative half width of ``precision``; None: more than ``most``."""
         sizes = range(2, most + 1)
         place = bisect_left(sizes, -precision, key=lambda n: -self.of_group(n))
         return sizes[place] if place < len(sizes) else None
 
     def trials_for(self, precision: float, participants: int, most: int = 1000) -> int | None:
-        """Return the fewest sufficient trials of each standard, in steps of ten; None: people differ by too much."""
+        """Return the fewest sufficient trials per standard, in steps of ten; None if participants differ too much."""
         found = (n for n in range(10, most + 1, 10) if self.of_group(participants, n) <= precision)
         return next(found, None)
 
 
 @cache
 def student_975(freedom: int) -> float:
-    """Return the 97.5 % quantile of Student's t, to 1e-6 of it; without scipy, which protocols do not load.
+    """Return the 97.5 % quantile of Student's t with a relative error of 1e-6, without importing scipy.
 
     With t = √ν tan θ the distribution function is the integral of cos^(ν−1) θ.
     """

@@ -99,7 +99,7 @@ class Given(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PersonFit:
-    """What the answers of a person say.
+    """The fit to a person's answers.
 
     Attributes
     ----------
@@ -123,12 +123,12 @@ class PersonFit:
     flat: Posterior
 
     def expected(self, fitted: Posterior) -> Floats:
-        """Return the share of successes that the function through all medians expects in each trial, (n,)."""
+        """Return the share of successes in each trial (n,) predicted by the function with all median parameters."""
         psi = fitted.success(self.given.levels)
         return preferred(psi[self.given.places], fitted.others.lapse, self.shifts)
 
     def after(self, n: int) -> Posterior:
-        """Return what the first n answers say, where preferences and change are those of all, as ``flat``."""
+        """Return the posterior from the first n answers, with preferences and change from all, like ``flat``."""
         if n == len(self.shifts):
             return self.flat
         grid = self.flat.grid
@@ -136,7 +136,7 @@ class PersonFit:
 
 
 def _likelihoods(given: Given, shifts: Floats, grid: Grid) -> dict[float, NDArray[np.float64]]:
-    """Return the logarithm of the likelihood of the answers before (−1), at (0) and after (1) the middle trial."""
+    """Return the log likelihood of the answers before (−1), at (0) and after (1) the middle trial."""
     flat, u, k = replace(grid, width_prior=None, session_sd=(0.0, 0.0)), tuple(given.levels.tolist()), len(given.levels)
     found, halves = dict.fromkeys((-1.0, 0.0, 1.0), np.zeros(grid.shape)), np.sign(given.done - 0.5)
     for half, shift in {*zip(halves.tolist(), shifts.tolist(), strict=True)}:
@@ -150,9 +150,9 @@ def _likelihoods(given: Given, shifts: Floats, grid: Grid) -> dict[float, NDArra
 def _posterior(
     parts: dict[float, NDArray[np.float64]], changes: Floats, grid: Grid, weights: ArrayLike = 1.0
 ) -> Posterior:
-    """Return the posterior of the threshold in the middle, where that of either half is the mean in it.
+    """Return the posterior of the threshold at the middle trial, where each half uses its own mean threshold.
 
-    It is a mean over ``changes`` of the threshold from the first trial to the last [u], with prior ``weights``.
+    It is averaged over ``changes`` of the threshold from the first trial to the last [u], with prior ``weights``.
     """
     cells = changes / 4 / (grid.thresholds[1] - grid.thresholds[0])
     flat = replace(grid, width_prior=None)
@@ -164,7 +164,7 @@ def _posterior(
 
 
 def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
-    """Return the values so many thresholds further, interpolated; beyond an end that of the end."""
+    """Return the values shifted by a number of threshold cells, interpolated; the end values are repeated."""
     last = len(values) - 1
     at = np.clip(np.arange(len(values)) + cells, 0, last)
     low = np.minimum(at.astype(np.int64), last - 1)
@@ -173,9 +173,9 @@ def _further(values: NDArray[np.float64], cells: float) -> NDArray[np.float64]:
 
 
 def _time_score(given: Given, fitted: Posterior, shifts: Floats, course: Floats) -> tuple[float, float]:
-    """Return score and information, at none, of a threshold that changes as ``course`` (n,) does [1/u, 1/u²].
+    """Return score and information, at zero change, for a threshold that changes like ``course`` (n,) [1/u, 1/u²].
 
-    ``found`` is of these answers, as if the threshold were constant, ``shifts`` (n,) are of the decisions [SD].
+    ``found`` is the fit of these answers for a constant threshold, ``shifts`` (n,) are those of the decisions [SD].
     """
     y, u, others = given.successes.astype(float), given.levels, fitted.others
     below, above, psi = (
@@ -191,10 +191,10 @@ def _time_score(given: Given, fitted: Posterior, shifts: Floats, course: Floats)
 
 
 def early_change(fits: Sequence[tuple[PersonFit, Posterior]]) -> float | None:
-    """Return by how many standard errors the thresholds of a group rise after the first trials; None: not known.
+    """Return the rise of a group's thresholds after the first trials in standard errors; None if unknown.
 
-    The time course fades exponentially over `EARLY_TRIALS`, as practice does; scores and information of all, each with
-    the posterior of the person, are summed.
+    The time course decays exponentially over `EARLY_TRIALS`, like practice; scores and information are summed over all
+    members, each with his or her own posterior.
     """
     scores = [
         _time_score(fit.given, found, fit.shifts, -np.exp(-np.arange(len(fit.shifts)) / EARLY_TRIALS))
@@ -206,24 +206,24 @@ def early_change(fits: Sequence[tuple[PersonFit, Posterior]]) -> float | None:
 
 @cache
 def _normal_table() -> tuple[Floats, Floats]:
-    """Return z and the normal distribution function there: interpolated, it is correct to 1e-7."""
+    """Return z and the normal distribution function; linear interpolation has an error of at most 1e-7."""
     z = np.linspace(-8.0, 8.0, 16001)
     return z, normal_cdf(z)
 
 
 def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
-    """Return shares of decisions, whose variable a preference moves by ``shift`` [SD]."""
+    """Return decision probabilities after a preference shifts the decision variable by ``shift`` [SD]."""
     z, of_z = _normal_table()
     deviates = np.asarray(np.interp(np.asarray(shares, float), of_z, z), float)
     return np.asarray(np.interp(deviates + np.asarray(shift, float), z, of_z), float)
 
 
 def preferences(given: Given, fitted: Posterior) -> Floats:
-    """Return how far preferences move each decision between two intervals towards the correct one (n,) [SD].
+    """Return the shift of each decision between two intervals towards the correct one due to preferences (n,) [SD].
 
-    A probit regression of the answers, with what the levels contribute fixed, has the preference for the first interval
-    and that for the answer before as coefficients, with a normal prior: removing preferences that are chance would make
-    thresholds too low. ``found`` is the posterior of these answers.
+    It is a probit regression of the answers, with the contribution of the levels fixed. Its coefficients are the
+    preference for the first interval and that for the previous answer, with a normal prior: removing chance preferences
+    would bias thresholds downwards. ``found`` is the posterior of these answers.
     """
     (z, of_z), first, lapse = _normal_table(), given.towards, fitted.others.lapse
     unbiased = ((fitted.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
@@ -239,7 +239,7 @@ def preferences(given: Given, fitted: Posterior) -> Floats:
 
 
 def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
-    """Return ψ of two intervals where a preference moves the decision by ``shift`` towards the correct one [SD]."""
+    """Return ψ for two intervals if a preference shifts the decision by ``shift`` towards the correct one [SD]."""
     psi, lapse = np.asarray(psi, float), np.asarray(lapse, float)
     if not np.any(shift):
         return psi
@@ -249,7 +249,7 @@ def preferred(psi: ArrayLike, lapse: ArrayLike, shift: ArrayLike) -> Floats:
 
 @lru_cache(maxsize=32)
 def _moved_tables(grid: Grid, levels: Values, shift: float) -> tuple[Floats, Floats]:
-    """Return log ψ and log(1 − ψ) at each level in each cell, of two intervals: the guess rate is one half."""
+    """Return log ψ and log(1 − ψ) at each level in each cell for two intervals, whose guess rate is one half."""
     unbiased = replace(grid, lapses=(0.0,), lapse_prior=(1.0,)).success(levels)
     lapses = np.array(grid.lapses)[:, None]
     psi = np.clip(lapses + (1.0 - 2.0 * lapses) * _moved(unbiased, shift), CLIP, 1.0 - CLIP)

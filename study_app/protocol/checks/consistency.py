@@ -51,7 +51,7 @@ _TABLES = ("liquids", "conditions", "tasks", "pages", "blocks")
 
 
 class Draft(BaseModel):
-    """The sound entries of a document; ``whole`` says that no block had to be left out."""
+    """The valid entries of a document; ``whole`` tells whether no block had to be omitted."""
 
     model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
 
@@ -97,7 +97,7 @@ def _sound_draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Pro
 
 
 def check(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Iterator[Fault]:
-    """Yield every problem between the tables of ``document``; its ``broken`` places are already known.
+    """Yield every inconsistency between the tables of ``document``; its ``broken`` places are already reported.
 
     ``valid`` is the validated document if nothing is broken, so that its tables are not validated again.
     """
@@ -156,7 +156,7 @@ def _check_targets(parts: Draft) -> Iterator[Fault]:
 
 
 def _check_liquids(parts: Draft) -> Iterator[Fault]:
-    """Check that a condition's liquids fit into a scene and have one ball, which meets each somewhere in the tank."""
+    """Check that a condition's liquids fit into a scene with one ball, which can reach each of them in the tank."""
     for name, condition in parts.conditions.items():
         place, known = (
             ("conditions", name, "liquids"),
@@ -226,9 +226,9 @@ def _check_conditions_differ(parts: Draft) -> Iterator[Fault]:
 
 
 def _check_comparisons(parts: Draft) -> Iterator[Fault]:
-    """Check that a main block's conditions differ in one thing, the one that the block states.
+    """Check that a main block's conditions differ only in the quantity that the block states.
 
-    Where it says views, delays may differ as well: those that make the views equally late.
+    In a block of views, delays may also differ if they equalise the latency of the views.
     """
     for name, block in parts.blocks.items():
         presented = [
@@ -264,7 +264,7 @@ def _check_blocks(parts: Draft) -> Iterator[Fault]:
 def _check_parts(parts: Draft) -> Iterator[Fault]:
     """Check that parts count 1, 2, … in the order of the sequence, and that at least one block is analysed.
 
-    Where sessions differ each numbers its parts anew (`own_protocol`).
+    If sessions differ, each one numbers its parts separately (`own_protocol`).
     """
     if not (parts.whole and parts.blocks):
         return
@@ -316,7 +316,7 @@ def _is_within_tank(liquid: Liquid, scene: SceneDefaults, device: DeviceNeeds) -
 
 
 def felt_numbers(liquid: Liquid) -> dict[str, Any]:
-    """Return the values that decide how a liquid feels: all but its name and the tables of unused effects."""
+    """Return the values that determine the force of a liquid: all except its name and the tables of unused effects."""
     said = liquid.model_dump(exclude={"id"})
     if liquid.effects != "auto":
         said["effects"] = sorted(liquid.effects)

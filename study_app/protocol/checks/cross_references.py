@@ -106,9 +106,9 @@ def check_references(document: Document) -> Iterator[Fault]:
 
 
 def check_sequences(document: Document) -> Iterator[Fault]:
-    """Check that each sequence names pages, blocks and forms, and that only break pages are left out.
+    """Check that each sequence names pages, blocks and forms, and that only break pages are omitted.
 
-    Blocks and forms come once in a sequence. `check_groups` checks that no block is left out of a study with groups.
+    Blocks and forms occur once in a sequence. `check_groups` checks that no block is omitted in a study with groups.
     """
     pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
     apart = "rename one of them: sequence cannot tell them apart"
@@ -178,9 +178,9 @@ def check_statements_differ(document: Document) -> Iterator[Fault]:
 
 
 def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
-    """Yield a fault for every text that reads like an earlier one; an entry may hold a text per language.
+    """Yield a fault for every text that looks like an earlier one; an entry may have a text per language.
 
-    People do not tell texts apart by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
+    Readers do not distinguish texts by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
     look the same.
     """
     seen: set[tuple[str, str]] = set()
@@ -198,7 +198,7 @@ _LOOKALIKES = str.maketrans("аеіјорсухѕһοαρνικ", "aeijopcyxshoa
 
 
 def visible_text(text: str) -> str:
-    """Return the visible content of a text: without marks of format, case, width and alphabet."""
+    """Return the visible content of a text, normalised for format marks, case, width and alphabet."""
     visible = "".join(letter for letter in text if unicodedata.category(letter) != "Cf")
     return " ".join(unicodedata.normalize("NFKC", visible).casefold().translate(_LOOKALIKES).split())
 
@@ -233,7 +233,7 @@ OWN = ("sequence", "sequences")
 
 
 def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Check that there are several groups, that each block is in a sequence of one, and that no sequence is unused."""
+    """Check that there are several groups, and that every block and every sequence is used."""
     if all(key in document for key in OWN):
         yield Fault(("sequences",), "give either sequence or sequences")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
@@ -256,7 +256,7 @@ def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
 
 
 def check_decisions(document: Document) -> Iterator[Fault]:
-    """Check that decisions name existing statements, each once, and that such items name the liquids."""
+    """Check that decisions name existing statements once each, and existing liquids."""
     questions = (item for _, item in entries(document, "questionnaires.*.items.*") if isinstance(item, Mapping))
     items = {item["id"] for item in questions if isinstance(item.get("id"), str) and "kind" not in item}
     decided = {key: list(entries(document, f"analysis.{key}.*")) for key in _DECIDED_LISTS}

@@ -40,7 +40,7 @@ _LEAST_SHARE: Final = 1e-6
 
 
 def check_kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
-    """Check that every block's design and method names a table, or a kind whose keys all have defaults."""
+    """Check that every block's design and method is a table, or a kind without required keys."""
     sections: tuple[tuple[str, str, Mapping[str, type[Table]]], ...] = (
         ("design", "designs", DESIGN_KINDS),
         ("method", "methods", METHOD_KINDS),
@@ -78,7 +78,7 @@ def check_designs(protocol: Protocol) -> Iterator[Fault]:
 
 
 def _missing_for(protocol: Protocol, rule: ExclusionRule) -> str | None:
-    """Return what the study lacks for a rule to apply."""
+    """Return the part that the study lacks for a rule to apply."""
     blocks = [block for block in protocol.main_blocks if block.design is not None]
     if rule.rule == "constant_answers":
         asked = filter(None, (protocol.questionnaire_of(block.id) for block in protocol.main_blocks))
@@ -279,7 +279,7 @@ def _standard_fault(
 
 
 def _out_of_range_fault(block: Block, stimulus: Stimulus, standard: float | None, level: float) -> Fault:
-    """Return a fault: a number of the condition, such as a visual delay, is out of range."""
+    """Return the fault that a number of the condition, such as a visual delay, is out of range."""
     place, value = ("stimuli", str(block.stimulus), "levels"), stimulus.comparison(standard, level)
     name, limit = stimulus.vary, OF_CONDITION[stimulus.vary]
     unit = " ms" if name.endswith("_ms") else ""
@@ -320,7 +320,7 @@ def _check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault
 
 
 def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
-    """Yield why a number cannot be adjusted while it is presented, or a standard not be matched."""
+    """Yield the reasons why a number cannot be adjusted during presentation, or a standard cannot be matched."""
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
     if not design.adjusts:
         return
@@ -345,9 +345,9 @@ def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
 
 
 def _can_change(protocol: Protocol, condition: str, vary: str, values: list[float]) -> bool:
-    """Return whether the servo can change between successive values and keep its state.
+    """Return whether the servo can change between successive values while keeping its state.
 
-    Of a force that is late it cannot: the forces on the way are those of the delay before.
+    It cannot if the force is delayed, since forces in transit belong to the previous delay.
     """
     from study_app.haptics.runtime.pack import is_built_alike  # noqa: PLC0415 - loads numpy
 

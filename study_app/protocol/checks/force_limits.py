@@ -51,9 +51,9 @@ _IS: Final = ("is", "are")
 
 
 def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Fault]:
-    """Yield the faults of tasks of kind "follow", and of hidden balls where the hand must aim.
+    """Yield the faults of tasks of kind "follow", and of hidden balls in tasks that require aiming.
 
-    The study is sound but for this; a force acts ``delay_ticks`` ticks late.
+    The study is valid otherwise; a force acts ``delay_ticks`` ticks late.
     """
     for block in protocol.blocks.values():
         for name in protocol.conditions_in(block.id) if isinstance(protocol.tasks[block.task], Reach) else ():
@@ -256,7 +256,7 @@ def _levels_with_verb(every: Sequence[Level], some: Sequence[Level], verbs: tupl
 
 
 def _level_ranges(every: Sequence[Level], some: Sequence[Level]) -> str:
-    """Return levels by standard; of many in a row only the first and the last."""
+    """Return levels by standard as text; long runs are abbreviated to the first and the last."""
     phrases = []
     for standard in dict.fromkeys(level.standard for level in some):
         own = [level for level in every if level.standard == standard]
@@ -277,15 +277,15 @@ def _level_ranges(every: Sequence[Level], some: Sequence[Level]) -> str:
 
 
 def passed_share(velocity: Velocity, rate_hz: float, frequency_hz: float) -> float:
-    """Return Re V/(jωX), the estimated over the true velocity in a swing of ``frequency_hz``, sampled evenly.
+    """Return Re V/(jωX), estimated over true velocity in an oscillation at ``frequency_hz``, evenly sampled.
 
-    Of "ewma" from the recursion, of "kalman" from its lag.
+    For "ewma" it follows from the recursion, for "kalman" from its lag.
     """
     return NAMED[velocity.kind].passed_share(velocity, 1 / rate_hz, 2 * math.pi * frequency_hz)
 
 
 def fastest_hz(velocity: Velocity, rate_hz: float, share: float) -> float:
-    """Return the highest frequency up to which an estimator passes this share [Hz], to 1 mHz; at most 20 Hz."""
+    """Return the highest frequency at which an estimator passes at least this share [Hz], to 1 mHz; at most 20 Hz."""
     mhz = range(1, 20_000)
     return (
         bisect_left(mhz, True, key=lambda frequency_mhz: passed_share(velocity, rate_hz, frequency_mhz / 1000) < share)

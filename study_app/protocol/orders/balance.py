@@ -27,10 +27,10 @@ _Table: TypeAlias = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Evenness:
-    """Orders of one set of codes, counted.
+    """Counts over the orders of one set of codes.
 
-    ``positions`` and ``follows`` say how often each code (column) came in each position (row), and right after each
-    code (row), breaks and borders of repetitions not minded. ``shortest_distance`` is None where each code came once.
+    ``positions`` count how often each code (column) has each position (row), ``follows`` how often it directly follows
+    each code (row), regardless of breaks and repetitions. ``shortest_distance`` is None if each code occurs once.
     """
 
     codes: tuple[str, ...]
@@ -42,12 +42,12 @@ class Evenness:
 
     @property
     def positions_even(self) -> bool:
-        """Whether each code comes in each position equally often."""
+        """Whether each code has each position equally often."""
         return len({count for line in self.positions for count in line}) <= 1
 
     @property
     def after_another(self) -> tuple[int, ...]:
-        """The counts of how often each code follows each other one."""
+        """The counts of how often each code follows each other code."""
         return tuple(count for at, line in enumerate(self.follows) for then, count in enumerate(line) if at != then)
 
     @property
@@ -63,7 +63,7 @@ class Evenness:
 
 @dataclass(frozen=True, slots=True)
 class _BlockBalance:
-    """A block's evenness, with what its order depends on; ``unnumbered`` are participants whose id has no number."""
+    """A block's evenness and order settings; ``unnumbered`` are participants whose ID has no number."""
 
     id: str
     title: str
@@ -75,7 +75,7 @@ class _BlockBalance:
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """The blocks with more than one code, in the order of the session; ``session`` is whose, where sessions differ."""
+    """The balance of blocks with more than one code in session order; ``session`` names the session if they differ."""
 
     study: str
     session: str
@@ -85,7 +85,7 @@ class Balance:
 
 
 def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
-    """Return so many participant ids from ``first`` on; StudyError if that does not end in a number."""
+    """Return ``count`` consecutive participant IDs from ``first``; StudyError if it does not end in a number."""
     match = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
     if match is None:
         raise StudyError(
@@ -95,7 +95,7 @@ def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
 
 
 def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
-    """Count the positions and successions in ``orders`` of ``codes``, planned or run, all of one length."""
+    """Count positions and successions in ``orders`` of ``codes``, planned or run, all of the same length."""
     place = {code: index for index, code in enumerate(codes)}
     shown = [[place[code] for code in order] for order in orders]
     positions = [[0] * len(place) for _ in range(max(map(len, shown), default=0))]
@@ -118,11 +118,11 @@ def evenness(codes: Sequence[str], orders: Iterable[Sequence[str]]) -> Evenness:
 def balance(
     protocol: Protocol, participants: Sequence[str], seed: int, session: str = "", *, in_group: bool = False
 ) -> Balance:
-    """Return how even the orders of ``participants`` (ids) are under ``seed``.
+    """Return how balanced the orders of ``participants`` (IDs) are for ``seed``.
 
-    In a study each session has a seed of its own; orders from a square do not depend on the seed. ``in_group`` says
-    that these are the participants of a group, whose places in it assign the rows of squares. Without participants it
-    raises StudyError.
+    In a real study each session has its own seed; orders from a square do not depend on the seed. With ``in_group`` the
+    participants are those of one group, whose number within the group assigns the rows of squares. Without participants
+    it raises StudyError.
     """
     if not participants:
         raise StudyError("a design needs at least one participant")
@@ -145,9 +145,9 @@ def balance(
 
 
 def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iterator[Balance]:
-    """Yield the balance of each kind of session, over the participants of its group (StudyError without any).
+    """Yield the balance of each kind of session over the participants of its group (StudyError without any).
 
-    Participants come into the groups that a rehearsal with this seed would give them; a group of none is left out.
+    Participants are assigned to groups as in a rehearsal with this seed; empty groups are omitted.
     """
     members: dict[str | None, list[str]] = {group: [] for group in protocol.groups or (None,)}
     secret = draw_secret(stream(seed, "blinding").random)
@@ -174,7 +174,7 @@ def planned_participants(protocol: Protocol, group: str | None) -> int | None:
 
 
 def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
-    """Return the order of the main blocks in each group; one entry "" if all groups are alike or there are none."""
+    """Return the order of the main blocks by group; a single entry "" if groups do not differ or do not exist."""
     orders_by_group = {
         variant.group or "": block_order_words(
             variant.protocol, planned_participants(protocol, variant.group), in_group=variant.group is not None
@@ -186,9 +186,9 @@ def block_orders_by_group(protocol: Protocol) -> dict[str, str]:
 
 
 def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool = False) -> str:
-    """Return the order of a session's main blocks and its evenness for so many ``planned`` participants.
+    """Return the order of a session's main blocks and its balance for ``planned`` participants, as text.
 
-    ``protocol`` is that of the session; ``in_group`` says that the planned participants are those of one group.
+    ``protocol`` is that of the session; with ``in_group`` the planned participants are those of one group.
     """
     orders = orders_of(protocol)
     blocks = sum(block.phase == "main" for block in orders.blocks)
@@ -271,7 +271,7 @@ def _verdict_lines(counted: Evenness) -> Iterator[str]:
 
 
 def _advice(block: _BlockBalance) -> Iterator[str]:
-    """Yield what the order guarantees, and how to improve it."""
+    """Yield the guarantees of the order, and possible improvements."""
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
         case "fixed":

@@ -18,9 +18,9 @@ CodeOrder: TypeAlias = Literal[Order, TrackOrder]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BlockOrder:
-    """A block as scheduling sees it: its codes, how they are ordered, and the ids of what is asked.
+    """The part of a block that scheduling needs: its codes, their order rule, and the ids of its questions.
 
-    ``slots`` says per code how long its track is; empty in a block without a design.
+    ``slots`` is the track length of each code; empty in a block without a design.
     """
 
     id: str
@@ -50,7 +50,7 @@ class BlockOrder:
 
 @dataclass(frozen=True, slots=True)
 class FormOrder:
-    """A form as scheduling sees it: the ids of what is asked."""
+    """The part of a form that scheduling needs: the ids of its questions."""
 
     id: str
     items: tuple[str, ...]
@@ -59,9 +59,9 @@ class FormOrder:
 
 @dataclass(frozen=True, slots=True)
 class Orders:
-    """A study as scheduling sees it: page ids, blocks and forms in the order of the session.
+    """The part of a study that scheduling needs: page ids, blocks and forms in session order.
 
-    ``block_order`` says how the main blocks take each other's places.
+    ``block_order`` is the rule by which the main blocks are permuted.
     """
 
     study: str
@@ -82,7 +82,7 @@ class Orders:
 
 
 def block_codes(protocol: Protocol, block: Block) -> tuple[str, ...]:
-    """Return the codes of a block's conditions or tracks: L1, L2, … in a main block, else the phase's name."""
+    """Return the codes of a block's conditions or tracks: L1, L2, … in a main block, otherwise the phase's name."""
     count = len(block.conditions) if block.design is None else len(tracks_of(protocol, block))
     if block.code_prefix is None and count == 1:
         return (block.phase,)
@@ -121,12 +121,12 @@ class _KeptSteps(BaseModel):
 
 
 def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the steps of all groups and sessions of a receipt's protocol, each once (ValueError: it has none)."""
+    """Return the unique steps of all groups and sessions in a receipt's protocol (ValueError: it has none)."""
     return tuple(dict.fromkeys(every_step(_KeptSteps.model_validate(protocol))))
 
 
 def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]:
-    """Return the same as `follows` for the protocol in a receipt."""
+    """Return the result of `follows` for the protocol in a receipt."""
     blocks = protocol["blocks"]
     main = [name for name, block in blocks.items() if block.get("phase", "main") == "main"]
     exchanged = main if protocol["study"].get("block_order", "fixed") != "fixed" else ()
@@ -134,7 +134,7 @@ def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]
 
 
 def _items(questions: Questionnaire | None) -> dict[str, Any]:
-    """Return the ids of the questions, and their order."""
+    """Return the ids of the questions, and their order rule."""
     if questions is None:
         return {"items": (), "item_order": "fixed"}
     return {"items": tuple(item.id for item in questions.items), "item_order": questions.item_order}

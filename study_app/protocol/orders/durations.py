@@ -16,8 +16,8 @@ from study_app.protocol.trials.tasks import AnyTask
 def own_protocol(protocol: Protocol, group: str | None, session: int) -> Protocol:
     """Return the protocol of one session of a participant in ``group``, with one sequence and no groups.
 
-    Parts are numbered in the order of this session. A study whose sessions do not differ is returned as it is.
-    StudyError says that the participant has fewer sessions.
+    Parts are numbered in the order of this session. A study whose sessions do not differ is returned unchanged.
+    StudyError is raised if the participant has fewer sessions.
     """
     if not sessions_differ(protocol):
         return protocol
@@ -32,7 +32,7 @@ def own_protocol(protocol: Protocol, group: str | None, session: int) -> Protoco
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One kind of session of a study: of a group (None: of everybody), with a number (None: any)."""
+    """One kind of session of a study: of a group (None: all participants), with a number (None: any)."""
 
     group: str | None
     session: int | None
@@ -40,13 +40,13 @@ class Variant:
 
     @property
     def name(self) -> str:
-        """The group and the session in words; empty where all sessions are alike."""
+        """The group and the session as text; "" if all sessions are alike."""
         named = [f"group {self.group}"] if self.group is not None else []
         return ", ".join([*named, f"session {self.session}"] if self.session is not None else named)
 
 
 def variants(protocol: Protocol) -> Iterator[Variant]:
-    """Yield each kind of session of a study; one where all sessions are alike."""
+    """Yield each kind of session of a study; a single one if all sessions are alike."""
     for group in protocol.groups or (None,):
         count = session_count(protocol, group)
         for session in range(1, (count or 1) + 1):
@@ -69,7 +69,7 @@ def expected_duration_s(protocol: Protocol) -> float:
 
 
 def duration_range_s(protocol: Protocol) -> tuple[float, float]:
-    """Return the shortest and the longest duration of a session [s]: tasks end early, or at their limit."""
+    """Return the shortest and the longest duration of a session [s], since tasks may end before their limit."""
 
     def session_s(own: Protocol, task_s: Callable[[AnyTask], float]) -> float:
         return sum(step_duration_s(own, step, own.study.languages[0], task_s) for step in own.steps)

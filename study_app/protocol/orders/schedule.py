@@ -78,16 +78,16 @@ class Trial:
     items: tuple[str, ...]
 
     def label(self, protocol: Protocol, language: str) -> str:
-        """Return the neutral name of the trial: "Liquid setting 1", or just "Practice" where a block has one trial."""
+        """Return the neutral name of the trial: "Liquid setting 1", or only "Practice" in a block with one trial."""
         name = protocol.text(protocol.blocks[self.block].setting_label, language)
         return name if self.phase != "main" and self.of == 1 else f"{name} {self.index}"
 
 
 @dataclass(frozen=True, slots=True)
 class FormStep:
-    """A questionnaire on its own; ``items`` are item ids in the order shown.
+    """A questionnaire outside blocks; ``items`` are item ids in the order shown.
 
-    ``after`` is the block before it, None before the first; ``time`` counts from 1 how often the session asks it.
+    ``after`` is the preceding block, None before the first; ``time`` counts its occurrences in the session from 1.
     """
 
     form: str
@@ -156,7 +156,7 @@ def build_schedule(protocol: Protocol | Orders, participant: str, seed: int, pla
 def _steps_in_order(
     orders: Orders, participant: str, seed: int, place: int | None
 ) -> tuple[str | BlockOrder | FormOrder, ...]:
-    """Return the steps with the main blocks in the participant's order; each takes the part number of its place."""
+    """Return the steps with the main blocks in the participant's order; part numbers stay at their positions."""
     places = [at for at, step in enumerate(orders.steps) if isinstance(step, BlockOrder) and step.phase == "main"]
     steps = list(orders.steps)
     for at, number in zip(places, blocks_in_order(orders, participant, seed, place), strict=True):
@@ -212,8 +212,8 @@ def _shuffled(step: BlockOrder | FormOrder, seed: int, name: str) -> tuple[str, 
 def draw_key(protocol: Protocol, draw: Draw) -> _Key:
     """Return block → code → condition or track, drawn with ``draw`` (uniform numbers in [0, 1)).
 
-    A block in fixed order keeps its order, as the protocol asks, so its codes name its conditions in the order written:
-    whoever reads the protocol can tell them.
+    A block in fixed order keeps it as the protocol requires, so that its codes follow the written order of its
+    conditions and readers of the protocol can identify them.
     """
     key: _Key = {}
     for block in protocol.blocks_in_order:
@@ -230,9 +230,9 @@ _TOLD = ("block", "phase", "part", "index", "of", "code")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedTrial:
-    """One attempt at a trial as a session recorded it; ``items`` in the order shown, None if nothing was answered.
+    """One recorded attempt at a trial; ``items`` in the order shown, None if nothing was answered.
 
-    ``may_hide`` says that answers may have hidden some of the items, which are then not recorded.
+    ``may_hide`` tells whether answers may have hidden some of the items, which are then not recorded.
     """
 
     number: int
@@ -255,10 +255,10 @@ def reproduce(
     complete: bool,
     place: int | None = None,
 ) -> tuple[str, ...]:
-    """Return the differences between the recorded trials and those that protocol, seed and participant give.
+    """Return the differences between the recorded trials and those that follow from protocol, seed and participant.
 
-    ``protocol`` is that of the session; ``recorded`` is what was run, in the order of time. A ``complete`` session went
-    to its end, so that no trial may be missing. ``place`` is that of `build_schedule`.
+    ``protocol`` is that of the session; ``recorded`` are the attempts in chronological order. A ``complete`` session
+    was run to its end, so no trial may be missing. ``place`` is that of `build_schedule`.
     """
     planned = {trial.number: trial for trial in build_schedule(protocol, participant, seed, place).trials}
     attempts = tuple(recorded)
@@ -290,9 +290,9 @@ def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[st
 def _progress_differences(
     numbers: list[int], planned: dict[int, Trial], *, complete: bool, blocks: bool
 ) -> Iterator[str]:
-    """Yield breaks in the order of trials and attempts.
+    """Yield errors in the order of trials and attempts.
 
-    With ``blocks`` a resumed session presents the block again that it was within, from its first trial.
+    With ``blocks`` a resumed session repeats the interrupted block from its first trial.
     """
     before = 0
     first = {trial.block: number for number, trial in reversed(planned.items())}

@@ -46,7 +46,7 @@ def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:
 
 
 def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
-    """Yield what is unusual about a condition's force link: delay [ms], jitter [ms], losses."""
+    """Yield phrases for a condition's unusual force link: delay [ms], jitter [ms], losses."""
     if delay_ms:
         yield f"force {delay_ms:g} ms late"
     if jitter_ms:
@@ -73,7 +73,7 @@ def delay_s_of(protocol: Protocol, presented: Stimulated) -> float:
 
 
 def longest_delay_s(protocol: Protocol, block: Block) -> float:
-    """Return the longest delay that a block can present [s]: the same in all its trials, so that it reveals none."""
+    """Return the longest delay that a block can present [s]; it is equal in all its trials, so that it reveals none."""
     if block.stimulus is not None and (stimulus := stimulus_of(protocol, block)).vary == DELAY:
         standards = standards_of(protocol, block)
         compared = [stimulus.comparison(standard, level) for standard in standards for level in stimulus.levels]
@@ -97,10 +97,10 @@ _STANDARD_ALONE: Final = 1
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Presentation:
-    """What a trial presents; never printed.
+    """The content of a trial; never printed.
 
-    ``level`` is 0 where only the standard is presented, None where conditions are compared; ``arrangement`` is which of
-    the design's, ``intervals`` what each of them presents. A ``catch`` trial presents the largest level.
+    ``level`` is 0 if only the standard is presented, None if conditions are compared; ``arrangement`` is the index
+    among the design's, ``intervals`` the content of each interval. A ``catch`` trial presents the largest level.
     """
 
     level: float | None
@@ -115,8 +115,8 @@ def next_level(
 ) -> Presentation | None:
     """Return a trial's presentation; None to skip it, after the end of its track or the criterion of its block.
 
-    The trial is of a block with a design; participant and seed of the schedule name the draws. Of the answered trials,
-    ``heard``, in any order, only earlier ones count.
+    The trial belongs to a block with a design; participant and seed of the schedule select the random streams. Of the
+    answered trials ``heard``, in any order, only earlier ones are used.
     """
     block = protocol.blocks[trial.block]
     track = track_of(protocol, block, key.codes[block.id][trial.code])
@@ -166,13 +166,13 @@ def is_criterion_met(block: Block, schedule: Schedule, heard: Sequence[TrialResu
 
 @dataclass(frozen=True, slots=True, repr=False)
 class _Draws:
-    """The secret draws of one track; each kind of draw has streams of its own, so that none moves another."""
+    """The secret random draws of one track; each kind of draw has separate streams and does not affect the others."""
 
     secret: bytes
     track: str
 
     def arrangement(self, design: Design, slot: int, among: str = "arrangement") -> int:
-        """Return the arrangement of a slot: each comes twice in every 2 × arrangements slots of its own stream."""
+        """Return the arrangement of a slot: each occurs twice in every 2 × arrangements slots of its own stream."""
         if design.has_noise:
             return 0  # the other arrangement is the standard alone
         count = len(design.arrangements)
@@ -218,7 +218,7 @@ def recorded_presentation(
 ) -> Presentation:
     """Return a recorded trial's presentation from its first journal line with opened sealed fields.
 
-    A line, or a key, that does not fit the study raises KeyError, ValueError (its arrangement) or StopIteration (its
+    A line or key that does not fit the study raises KeyError, ValueError (its arrangement) or StopIteration (its
     track).
     """
     block = protocol.blocks[started["block"]]
@@ -238,7 +238,7 @@ def trial_result(
     *,
     catch: bool = False,
 ) -> TrialResult:
-    """Return the answer to a trial of a block with a design, at the level (None: conditions are compared)."""
+    """Return the answer to a trial of a block with a design at a level (None: conditions are compared)."""
     design = design_of(protocol, block)
     stimulus = None if block.stimulus is None else stimulus_of(protocol, block)
     correct = design.is_correct(arrangement, answer) if has_correct_answer(design, stimulus) else None

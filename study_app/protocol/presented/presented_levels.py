@@ -33,11 +33,11 @@ _STEPS: Final = 2**32
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
-    """One level of one standard, None where the level is the value itself; ``comparison`` is what it stands for.
+    """One level of one standard (None if the level is the value itself); ``comparison`` is the varied number's value.
 
-    ``asked_n`` is the force of its drag at the task's fastest point, ``sent_n`` what limits leave of it [N], None for a
+    ``asked_n`` is its drag force at the task's fastest point, ``sent_n`` the part that limits permit [N], None for a
     number of the condition; ``clipped_by`` is the "norm" (``device.force_limit_n``) or the "slope" limit of the loop
-    (`haptics.model.slope_limits`), ``damping_nspm`` that of a linear law, 0 of others.
+    (`haptics.model.slope_limits`), ``damping_nspm`` that of a linear law, otherwise 0.
     """
 
     standard: float | None
@@ -51,9 +51,9 @@ class Level:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LevelLimits:
-    """The highest values of the varied number that two limits leave in full; None: beyond what is looked at.
+    """The highest unclipped values of the varied number for two limits; None: beyond the searched range.
 
-    ``force`` is of the force limit, ``loop`` of the slope limit, both for a hand at ``hand_mps`` [m/s].
+    ``force`` is for the force limit, ``loop`` for the slope limit, both for a hand at ``hand_mps`` [m/s].
     """
 
     force: float | None
@@ -68,11 +68,11 @@ class LevelLimits:
 
 @dataclass(frozen=True, slots=True)
 class Clipping:
-    """How limits clip what a block presents at one standard, None where the level is the value itself.
+    """The clipping of a block's levels at one standard (None if the level is the value itself).
 
-    ``limit`` is the value of the varied number that is presented instead of every higher one. Where the task is not
-    ``paced``, levels are clipped in fast motions alone, whose trials are repeated. ``others`` are the block's other
-    standards, which are lower.
+    ``limit`` is the value of the varied number that replaces every higher one. If the task is not ``paced``, levels are
+    clipped only in fast motions, whose trials are repeated. ``others`` are the block's other standards, which are
+    lower.
     """
 
     standard: float | None
@@ -86,17 +86,17 @@ class Clipping:
 
     @property
     def named(self) -> str:
-        """The standard as one of several: " 52"; "" if it is the only one."""
+        """The standard as a text after a noun: " 52"; "" if it is the only one."""
         return f" {self.standard:g}" if self.others else ""
 
     def highest(self, stimulus: Stimulus) -> float:
-        """Return the highest level that is presented in full; infinite if higher ones have less force."""
+        """Return the highest unclipped level; infinite if higher levels have less force."""
         if self.standard is not None and stimulus.level_kind != "value" and stimulus.direction == "down":
             return 0.0 if self.clips_standard else math.inf
         return stimulus.level_between(self.standard, self.limit)
 
     def presented(self, stimulus: Stimulus, levels: Floats) -> Floats:
-        """Return levels (n,) as presented: between the clipped standard and the clipped comparison."""
+        """Return levels (n,) after clipping, between the clipped standard and the clipped comparison."""
         standard = None if self.standard is None else min(self.standard, self.limit)
         comparisons = np.minimum(stimulus.comparison(self.standard, levels), self.limit)
         return stimulus.level_between(standard, comparisons)
@@ -118,7 +118,7 @@ def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
 
 
 def standard_level(protocol: Protocol, block_id: str, standard: float) -> Level:
-    """Return a standard of a block as its level 0."""
+    """Return a standard of a block as a level of 0."""
     block = protocol.blocks[block_id]
     stimulus = stimulus_of(protocol, block)
     scene = protocol.scene_for(condition_of(protocol, stimulus))
@@ -185,9 +185,9 @@ def _highest_within_limit(beyond: Callable[[float], bool], most: float) -> float
 
 
 def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None) -> Clipping | None:
-    """Return how limits clip a block's levels; None if they clip none, or levels do not follow from the limits.
+    """Return the clipping of a block's levels; None if none are clipped, or if limits do not determine them.
 
-    ``limits`` are those of `level_limits`, where they are known.
+    ``limits`` are those of `level_limits`, if they are known.
     """
     if block.stimulus is None:
         return None

@@ -36,7 +36,7 @@ def value_at(document: Any, path: Path) -> Any:
 
 
 def entries(document: Any, pattern: str) -> Iterator[tuple[Path, Any]]:
-    """Yield the values at the places of ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any."""
+    """Yield the values that match ``pattern`` with their paths: "blocks.*.conditions.*", where ``*`` is any key."""
     nodes: list[tuple[Path, Any]] = [((), document)]
     for step in pattern.split("."):
         nodes = [
@@ -86,11 +86,11 @@ Kind: TypeAlias = Literal["table", "array table", "key", "pair", "entry"]
 class Node(NamedTuple):
     """One header, key or array entry of a text; positions count characters from 0, ends are exclusive.
 
-    Its ``kind`` is "table" of a header ``[a.b]``, "array table" of ``[[a.b]]``, "key" of a key on lines of its own,
-    "pair" of a key of an inline table, "entry" of an entry of an array. The path is keys and, for entries of arrays,
-    indices from 0: ``("blocks", "liquids", "conditions", 2)``; ``parts`` say where each part of its key is written:
-    ``a`` and ``"b c"`` of ``a . "b c"``. Its value begins at ``value`` (of a header: its end); it ends without a comma
-    or comment.
+    Its ``kind`` is "table" for a header ``[a.b]``, "array table" for ``[[a.b]]``, "key" for a key on its own lines,
+    "pair" for a key of an inline table, "entry" for an entry of an array. The path consists of keys and, for array
+    entries, indices from 0: ``("blocks", "liquids", "conditions", 2)``; ``parts`` are the positions of the parts of its
+    key: ``a`` and ``"b c"`` of ``a . "b c"``. Its value begins at ``value`` (for a header: its end); it ends without a
+    comma or comment.
     """
 
     kind: Kind
@@ -143,7 +143,7 @@ class _Scan:
         return path
 
     def _within_arrays(self, keys: Path) -> Path:
-        """Return the path a header names: on the way, an array of tables stands for its latest entry."""
+        """Return the path that a header names; an array of tables on the way means its latest entry."""
         path: Path = ()
         for key in keys[:-1]:
             path = (*path, key)
@@ -152,7 +152,7 @@ class _Scan:
         return (*path, *keys[-1:])  # none while a header is typed
 
     def _read_assignment(self, table: Path, kind: Kind) -> Path:
-        """Read a key and its value; return the table that they belong to."""
+        """Read a key and its value; return the table to which they belong."""
         start = self._at
         keys: Path
         parts: tuple[tuple[int, int], ...]
@@ -237,7 +237,7 @@ class Places:
         return lines
 
     def line(self, path: Path) -> int | None:
-        """Return the line (from 1) of ``path``, or of the innermost table around it that is in the file."""
+        """Return the line (from 1) of ``path``, or of its innermost ancestor in the file."""
         for length in range(len(path), 0, -1):
             if (line := self._lines.get(path[:length])) is not None:
                 return line
@@ -246,5 +246,5 @@ class Places:
 
 @lru_cache(maxsize=2)
 def places_of(text: str) -> Places:
-    """Return the lines of a TOML text with any kind of line ends."""
+    """Return the lines of a TOML text with any kind of line endings."""
     return Places(text.replace("\r\n", "\n"))

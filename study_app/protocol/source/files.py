@@ -40,14 +40,14 @@ def without_byte_order_mark(content: bytes) -> bytes:
 
 
 def is_utf16(content: bytes) -> bool:
-    """Return whether a text file is in UTF-16: it begins with that mark, or with a null byte beside a letter."""
+    """Return whether a file is UTF-16 text: it starts with a byte order mark or with a letter and a null byte."""
     return content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in content[:2]
 
 
 def with_liquid_files(study: bytes, folder: Path) -> bytes:
-    """Return a study's source: its file without a byte order mark, and the files it names in ``folder``.
+    """Return a study's source: its file without a byte order mark, and the liquid files that it names in ``folder``.
 
-    One that cannot be read is left out; `load.parse` reports it. A source is returned as it is.
+    Unreadable files are omitted; `load.parse` reports them. A source is returned unchanged.
     """
     study = without_byte_order_mark(study)
     if _HEADER in study or _FOOTAGE_HEADER in study:
@@ -61,7 +61,8 @@ def bundle(
 ) -> bytes:
     """Return a study's file followed by the files that it names.
 
-    ``text_of`` gives the text of a liquid file, None if it is lost; ``hashes`` are the SHA-256 of its footage, by name.
+    ``text_of`` returns the text of a liquid file, None if it is missing; ``hashes`` are the SHA-256 of its footage by
+    name.
     """
     texts = {name: text for name in _section_texts(study, "liquids", "file") if (text := text_of(name)) is not None}
     return study + _table_bytes(_FOOTAGE_HEADER, hashes) + _table_bytes(_HEADER, texts)
@@ -124,13 +125,13 @@ def file_hash(path: Path) -> str | None:
 
 @lru_cache(maxsize=64)
 def _hash_of_file(path: Path, size: int, changed_ns: int) -> str:
-    """Return the hash; ``size`` and ``changed_ns`` make the cache miss after a change."""
+    """Return the hash; ``size`` and ``changed_ns`` are cache keys that change with the file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _section_texts(study: bytes, section: str, key: str) -> list[str]:
-    """Return the sorted texts under a key in a section's tables, each once; empty if the study is not TOML."""
+    """Return the sorted unique texts under a key in a section's tables; empty if the study is not TOML."""
     if not re.search(rf"""\b{key}["']?[ \t]*=""".encode(), study):
         return []
     try:
@@ -171,7 +172,7 @@ _SHIPPED = (
 
 
 def _shipped_folder() -> Path:
-    """Return the protocols' folder in an installed package, or beside the package in a checkout."""
+    """Return the protocols' folder in an installed package, or next to the package in a checkout."""
     inside = _PACKAGE / "protocols"
     return inside if inside.is_dir() else _PACKAGE.parent / "protocols"
 
@@ -230,7 +231,7 @@ def source_bytes(name_or_path: str | Path) -> bytes:
 
 
 def check_size(source: bytes, name: str) -> None:
-    """Reject a source that is larger than any study, before it is parsed."""
+    """Raise an error if a source is larger than any study, before it is parsed."""
     if len(source) > _MOST_BYTES:
         size = f"has {len(source) / 1e6:.1f} MB; a study has at most {_MOST_BYTES / 1e6:g} MB"
         raise ProtocolError(name, (Problem("file", size, hint="check that it is a study file"),))
@@ -242,7 +243,7 @@ def protocol_hash(source: bytes) -> str:
 
 
 def has_hash(source: bytes, digest: str) -> bool:
-    """Return whether a protocol's source has this hash, by any line endings: earlier versions hashed those it has."""
+    """Return whether a source has this hash with any line endings, since earlier versions did not normalise them."""
     unix = _with_line_feeds(source)
     return digest in {hashlib.sha256(text).hexdigest() for text in (source, unix, unix.replace(b"\n", b"\r\n"))}
 

@@ -29,9 +29,9 @@ the number of a part of the session; "" is anything else."""
 class Fault(NamedTuple):
     """A problem before its line is known; indices in ``path`` count from 0.
 
-    ``missing_language`` is the code of the language that a text lacks, "" where another thing is wrong. ``use`` is a
-    place and the value that may repair the fault there, for an unknown key the key that was meant; ``permitted`` are
-    the words for one that is none of them, and near none.
+    ``missing_language`` is the code of the language in which a text is missing, "" for other problems. ``use`` is a
+    place and a value that may repair the fault, for an unknown key the suggested key; ``permitted`` are the permitted
+    words if the value resembles none of them.
     """
 
     path: Path
@@ -48,7 +48,7 @@ class Fault(NamedTuple):
         return self.missing_language in ("", language) and not (self.kind == "one language" and language == first)
 
     def located(self, places: Places) -> Problem:
-        """Return the problem with its line; in the place that people read, entries count from 1."""
+        """Return the problem with its line; in the displayed place, entries count from 1."""
         place = ".".join(str(step + 1) if isinstance(step, int) else step for step in self.path)
         return Problem(place or "file", self.message, places.line(self.path), hint=self.hint)
 
@@ -90,7 +90,7 @@ _LENGTHS = {
 
 
 def shown_value(value: Any) -> str:
-    """Return a value as the file would write it, shortened."""
+    """Return a value in TOML, shortened."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
@@ -101,12 +101,12 @@ def shown_value(value: Any) -> str:
 
 
 def rule_of(pattern: str) -> str:
-    """Return the rule of a pattern in words."""
+    """Return the rule of a pattern as text."""
     return _PATTERNS.get(pattern, f"text that matches {pattern}")
 
 
 def did_you_mean(word: str, permitted: Iterable[str]) -> str:
-    """Return "did you mean …?" for the nearest permitted word, or the list of them if none is near."""
+    """Return "did you mean …?" for the nearest permitted word, or the list of words if none is near."""
     known = sorted(permitted)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     if near:
@@ -115,7 +115,7 @@ def did_you_mean(word: str, permitted: Iterable[str]) -> str:
 
 
 def unknown_name(path: Path, message: str, word: str, permitted: Iterable[str], cutoff: float = 0.0) -> Fault:
-    """Return the fault about an unknown name, with the nearest permitted one or the list of them."""
+    """Return the fault about an unknown name, with the nearest permitted name or the list of names."""
     known = sorted(permitted)
     nearest = difflib.get_close_matches(word, known, n=1, cutoff=cutoff)
     near = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
@@ -191,7 +191,7 @@ def _tag_key(context: Mapping[str, Any]) -> str:
 
 
 def _path_in(document: Any, loc: tuple[str | int, ...], *, keep_last: bool) -> Path:
-    """Return ``loc`` without parts that are not in the document: union tags and validator names."""
+    """Return ``loc`` without parts that are not in the document, such as union tags and validator names."""
     path: list[str | int] = []
     node = document
     tagged: Any = None

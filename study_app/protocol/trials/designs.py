@@ -32,7 +32,7 @@ ORDINALS: Final = ("first", "second", "third", "fourth")
 
 
 class Attention(Protocol):
-    """What a simulated observer attends to in the intervals of a trial."""
+    """The perception of a simulated observer in the intervals of a trial."""
 
     @property
     def smallest(self) -> bool:
@@ -52,12 +52,12 @@ class Modulus(Table):
 
 
 class Design(Table):
-    """How a trial is built and answered: the keys that all kinds share, and what each kind says of itself.
+    """The structure of a trial and its answer: the common keys, and the properties that each kind defines.
 
-    ``answers`` may be chosen, in temporal order, none where the reply is not a choice; all ``arrangements`` of standard
-    and comparison come equally often. ``guess_rate`` is the probability of a correct answer at chance, None where it is
-    free or no answer is correct. ``roving`` says that standards vary from trial to trial, so that intervals can only be
-    compared with each other.
+    ``answers`` can be chosen, in temporal order, empty if the reply is not a choice; all ``arrangements`` of standard
+    and comparison are equally frequent. ``guess_rate`` is the probability of a correct answer by chance, None if it is
+    a free parameter or no answer is correct. ``roving`` means that standards vary between trials, so that intervals can
+    only be compared with each other.
     """
 
     if TYPE_CHECKING:
@@ -118,15 +118,15 @@ class Design(Table):
         return len(self.arrangements[0])
 
     def noise(self, comparisons: int) -> int:
-        """Return the number of slots with the standard alone, in addition to so many comparisons."""
+        """Return the number of slots with only the standard, in addition to ``comparisons``."""
         return 0
 
     def correct(self, arrangement: int) -> str | None:
-        """Return the correct answer to an arrangement; None where no answer is correct."""
+        """Return the correct answer to an arrangement; None if no answer is correct."""
         return None
 
     def is_correct(self, arrangement: int, answer: str) -> bool | None:
-        """Return whether an answer to an arrangement is correct; None where no answer is."""
+        """Return whether an answer to an arrangement is correct; None if no answer can be."""
         correct = self.correct(arrangement)
         return None if correct is None else answer == correct
 
@@ -158,19 +158,19 @@ class Design(Table):
         raise NotImplementedError
 
     def shows_feedback(self, practice: bool) -> bool:
-        """Return whether participants see if an answer was correct."""
+        """Return whether participants see whether an answer was correct."""
         when = self.feedback or ("practice" if self.has_correct_answer else "never")
         return when == "always" or (when == "practice" and practice)
 
 
 def _counts(answers: _AnswerCounts, arrangements: Collection[int], answer: str) -> tuple[int, int]:
-    """Return how often an answer was given to some arrangements, and the number of their answers."""
+    """Return how often an answer was given to some arrangements, and the total number of answers to them."""
     counts = {pair: count for pair, count in answers.items() if pair[0] in arrangements}
     return sum(count for (_, given), count in counts.items() if given == answer), sum(counts.values())
 
 
 def _one_differs(count: int, *, among: bool) -> tuple[_Arrangement, ...]:
-    """Return the arrangements of ``count`` intervals in which exactly one is ``among``."""
+    """Return the arrangements of ``count`` intervals in which exactly one differs, as ``among``."""
     return tuple(tuple((at == odd) is among for at in range(count)) for odd in range(count))
 
 
@@ -295,7 +295,7 @@ class _YesNo(Design):
 
 
 class _JudgementDesign(Design):
-    """Designs whose reply is a scale point, a number or a setting."""
+    """Designs whose reply is a scale point, a number or an adjustment."""
 
     has_standard: ClassVar = False
     has_correct_answer: ClassVar = False
@@ -357,7 +357,7 @@ def default_design(kind: str) -> Design:
 
 
 def question_of(design: Design, languages: Sequence[str]) -> Questionnaire:
-    """Return the question of a design, in the program's own words if it has none."""
+    """Return the question of a design, with the program's own text if it has none."""
     text: Localised = design.question or {
         language: words(language).design_questions[design.wording] for language in languages
     }

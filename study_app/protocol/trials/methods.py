@@ -60,7 +60,7 @@ Answer: TypeAlias = tuple[float, bool]
 
 @dataclass(frozen=True, slots=True)
 class TrackSetting:
-    """What a method chooses levels for; ``number`` is which of the tracks of its standard, from 1."""
+    """The block setting for which a method chooses levels; ``number`` counts the tracks of its standard from 1."""
 
     stimulus: Stimulus
     design: Design
@@ -71,9 +71,9 @@ class TrackSetting:
 class TrialResult:
     """One answered trial: its last attempt, confirmed; never printed, since it reveals a level.
 
-    ``success`` is whether the answer was correct, for yes–no whether it was yes, "comparison chosen" where no answer is
-    correct, and None where the answer enters no psychometric function; ``correct`` is None where no answer is. No level
-    follows from the answer to a ``catch`` trial; a ``noise`` trial presented the standard alone.
+    ``success`` tells whether the answer was correct, for yes–no whether it was yes, "comparison chosen" if no answer is
+    correct, and None if the answer enters no psychometric function; ``correct`` is None if no answer is. The answer to
+    a ``catch`` trial does not affect the levels; a ``noise`` trial presented only the standard.
     """
 
     trial: int
@@ -86,7 +86,7 @@ class TrialResult:
 
 
 class Method(Table):
-    """How the levels of a track are chosen: the keys that all kinds share, and what each kind must say.
+    """The rule for choosing the levels of a track: the common keys, and the functions that each kind defines.
 
     A kind is a subclass whose ``kind`` is a ``Literal`` with a default, in `KINDS`.
     """
@@ -110,7 +110,7 @@ class Method(Table):
 
     @property
     def paper_name(self) -> str:
-        """Its name in a paper, with the source."""
+        """Its name in publications, with the source."""
         return self.kind
 
     @abstractmethod
@@ -119,7 +119,7 @@ class Method(Table):
 
     @abstractmethod
     def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
-        """Return levels that include the smallest and the largest it can present."""
+        """Return levels that include the smallest and the largest possible one."""
 
     @abstractmethod
     def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
@@ -146,9 +146,9 @@ class Method(Table):
         return iter(())
 
     def target(self, guess: float | None, success: str) -> str | None:
-        """Return the share of successes (such as "correct") at which its levels aim, in words; None without one.
+        """Return the targeted share of successes (such as "correct") as text; None without one.
 
-        ``guess`` is the share of successes by guessing, 0 where no answer is correct; None: it is free.
+        ``guess`` is the share of successes by guessing, 0 if no answer is correct; None: a free parameter.
         """
         return None
 
@@ -157,14 +157,14 @@ class Method(Table):
         return ()
 
     def reversal_mean(self, track: TrackSetting, answers: Sequence[Answer]) -> float | None:
-        """Return the classical estimate of a track, a level; None if there is none."""
+        """Return the classical estimate of a track as a level; None if there is none."""
         return None
 
     def simulated(self, track: TrackSetting, observers: Observers, random: Generator, noise: Floats | None) -> Answers:
         """Return the answers of simulated observers to one track each; its levels depend on the answers.
 
-        ``noise`` (tracks, noise trials) are the uniform numbers of the answers to noise trials. Levels are asked for
-        one after the other here, as a session does; a kind that can compute all tracks at once does so, much faster.
+        ``noise`` (tracks, noise trials) are the uniform numbers for the answers to noise trials. Levels are requested
+        one by one as in a session; kinds that can compute all tracks at once override this and are much faster.
         """
         stimulus = track.stimulus
         draws = random.random((len(observers.thresholds), self.presentations(stimulus)))
@@ -220,7 +220,7 @@ class _Adaptive(Method):
                 yield "begin", f"{level:g} is not within levels", hint
 
     def first(self, track: int) -> float | None:
-        """Return the first level of a track (from 1) as written; None: the method's own."""
+        """Return the first level of a track (from 1) as stated; None: the method's own."""
         return self.begin[track - 1] if isinstance(self.begin, tuple) else self.begin
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
@@ -228,7 +228,7 @@ class _Adaptive(Method):
 
     @abstractmethod
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
-        """Return the level after these answers."""
+        """Return the level that follows these answers."""
 
 
 _STEPS: Final = 40
@@ -268,7 +268,7 @@ class Adjustment(Method):
         return self.repetitions
 
     def level(self, track: TrackSetting, number: int, heard: Sequence[TrialResult], draws: Sequence[Draw]) -> float:
-        """Return the start level of setting ``number``: earlier settings do not matter."""
+        """Return the start level of adjustment ``number``, which does not depend on earlier ones."""
         low, high = track.stimulus.domain
         first_at_low = draws[0]() < 0.5
         away = _START_SHARE * (high - low) * draws[number]()
@@ -300,10 +300,10 @@ class Adjustment(Method):
 
 @dataclass(frozen=True, slots=True, repr=False, kw_only=True)
 class Adjusting:
-    """One setting: from which level it starts, and what its steps lead to; never printed, since it reveals the level.
+    """One adjustment: its start level and step; never printed, since it reveals the level.
 
-    A place is a number of steps from the ``start``, a level, above 0 towards more of the varied number. Places end with
-    the levels. ``step`` is what a step adds to u, below 0 where more of the number is a smaller level.
+    A place is a number of steps from the ``start``, positive towards more of the varied number, and is limited by the
+    range of levels. ``step`` is the change of u per step, negative if more of the number is a smaller level.
     """
 
     stimulus: Stimulus
@@ -312,7 +312,7 @@ class Adjusting:
     step: float
 
     def moved(self, place: int, steps: int) -> int:
-        """Return the place after steps: there is none beyond the first place at an end."""
+        """Return the place after steps, which does not go beyond an end of the range."""
         ends = [(end - self.stimulus.coordinate(self.start)) / self.step for end in self.stimulus.domain]
         least, most = math.floor(min(ends) + _ROUNDING), math.ceil(max(ends) - _ROUNDING)
         return min(max(place + steps, least), most)
@@ -327,7 +327,7 @@ class Adjusting:
         return self.stimulus.comparison(self.standard, self.level(place))
 
     def reached(self, steps: Iterable[int]) -> int:
-        """Return the place reached by these steps, in order."""
+        """Return the place after these steps in order."""
         place = 0
         for step in steps:
             place = self.moved(place, step)
@@ -429,7 +429,7 @@ class QuestPlus(_Adaptive):
         return ratio_in_u(track.stimulus, *interval) <= self.stop.ratio
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
-        """Return the level after these answers, whose order does not matter."""
+        """Return the level that follows these answers, whose order does not matter."""
         levels = _levels(track)
         if all(result.noise for result in heard) and (first := self.first(track.number)) is not None:
             return levels[_nearest(_coordinates(track), track.stimulus.coordinate(first))]
@@ -468,7 +468,7 @@ def _counts(
 
 
 def _levels(track: TrackSetting) -> tuple[float, ...]:
-    """Return the levels of a track's trials in ascending order: the grid, after 0 if there are noise trials."""
+    """Return the levels of a track's trials in ascending order: the grid, preceded by 0 if there are noise trials."""
     return (0.0, *track.stimulus.grid) if track.design.has_noise else track.stimulus.grid
 
 
@@ -555,7 +555,7 @@ class UpDown(_Adaptive):
         return len(answers) >= self.stop.after and len(reversals) >= self.stop.reversals
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
-        """Return the level after these answers: a step from the last one, or the same."""
+        """Return the level that follows these answers: one step from the last one, or the same."""
         low, high = track.stimulus.levels
         u = self.staircase(track.stimulus, track.number).next(_answers(track, heard))
         return min(max(track.stimulus.level_of(u), low), high)
@@ -589,7 +589,7 @@ class UpDown(_Adaptive):
 
 
 def _answers(track: TrackSetting, heard: Sequence[TrialResult]) -> list[Answer]:
-    """Return the answers to comparisons with levels in u: noise trials do not move a track."""
+    """Return the answers to comparisons with levels in u, without noise trials, which do not affect a track."""
     return _in_u(track.stimulus, [(result.level, bool(result.success)) for result in heard if not result.noise])
 
 
@@ -598,7 +598,7 @@ def _in_u(stimulus: Stimulus, answers: Sequence[Answer]) -> list[Answer]:
 
 
 class _RecordedMethod(Method):
-    """A method of a plug-in that is not here, as a key holds it: its levels were presented, and are not computed."""
+    """A method of a plug-in that is not installed, from a key: its levels were presented and are not computed."""
 
     model_config = ConfigDict(extra="allow")
 

@@ -204,9 +204,9 @@ class Stimulus(Table):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class Stimulated:
-    """What one interval presents: a condition with its varied number; never printed, since it reveals the level.
+    """The content of one interval: a condition with its varied number; never printed, since it reveals the level.
 
-    ``vary`` is None where the condition is presented as it is; ``value`` is in the unit that ends its name.
+    ``vary`` is None if the condition is presented unchanged; ``value`` is in the unit that ends its name.
     """
 
     condition: str
@@ -246,7 +246,7 @@ _BEYOND_SPANS: Final = 0.25
 
 @dataclass(frozen=True, slots=True)
 class Assumed:
-    """What is assumed about the psychometric function of a block.
+    """The assumptions about the psychometric function of a block.
 
     ``widths`` are the smallest and the largest width while levels are chosen, ``width_prior`` median and factor of the
     log-normal prior in the analysis, in u.
@@ -276,16 +276,16 @@ def _is_distance(stimulus: Stimulus) -> bool:
 
 
 def rises(stimulus: Stimulus, design: Design) -> bool:
-    """Return whether the share of successes only rises with the level, so that there is a threshold.
+    """Return whether the share of successes increases with the level, so that there is a threshold.
 
-    It does not where a level is a value and the odd or the repeated interval is asked for: that is noticed above the
-    standard and below it.
+    It does not if a level is a value and the odd or the repeated interval is asked for, since differences are noticed
+    above and below the standard.
     """
     return design.adaptive and (_is_distance(stimulus) or not design.has_standard or design.asks_for_more)
 
 
 def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
-    """Return the guess rates of a design; None if no answer is correct: the guess rate is the lapse rate."""
+    """Return the guess rates of a design; None if no answer is correct, so that it equals the lapse rate."""
     if design.has_standard and not _is_distance(stimulus):
         return None
     return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
@@ -294,8 +294,8 @@ def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
 def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
     """Return the grid for choosing levels during a session.
 
-    All widths are equally likely, so that levels are at the threshold however wide a person's function is: with levels
-    above it the threshold would depend on the prior.
+    All widths are equally likely, so that levels stay at the threshold for any width of a person's function; with
+    levels above it the threshold would depend on the prior.
     """
     return _running_grid(assumed.family, stimulus.domain, assumed.widths, lapses, guesses_of(stimulus, design))
 
@@ -316,9 +316,9 @@ def _running_grid(
 
 
 def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_sd: float = SESSION_SD) -> Grid:
-    """Return the grid for estimating thresholds: finer, and beyond both ends of the levels.
+    """Return the grid for estimating thresholds: finer, and extended beyond both ends of the levels.
 
-    ``session_sd`` is the standard deviation of a person's threshold about that of the answers [decades].
+    ``session_sd`` is the standard deviation of a person's threshold about that of the session [decades].
     """
     low, high = stimulus.domain
     log = stimulus.spacing == "log"

@@ -24,7 +24,7 @@ Point: TypeAlias = tuple[float, float, float]
 
 
 class Stroke(NamedTuple):
-    """A straight stroke to and fro: x = A cos 2πft in the hand frame."""
+    """A straight back-and-forth stroke: x = A cos 2πft in the hand frame."""
 
     frequency_hz: float
     amplitude_m: float
@@ -44,11 +44,11 @@ _SHAKE_M: Final = 0.03
 
 
 class Task(Table):
-    """What the hand does in an interval: what each kind says of itself.
+    """The hand's task in an interval, with the properties that each kind defines.
 
     A kind is a subclass whose ``kind`` is a ``Literal``, in `KINDS`, with a key ``instruction``. ``activity`` and
-    ``summary`` are words for those who read the study. ``tracker`` and ``hand`` name the class that follows the task
-    through the samples of a trial and the one that does it with a simulated hand, ``module:Class``.
+    ``summary`` are texts for readers of the study. ``tracker`` and ``hand`` name the class that follows the task
+    through the samples of a trial and the one that performs it with a simulated hand, ``module:Class``.
     """
 
     if TYPE_CHECKING:
@@ -78,7 +78,7 @@ class Task(Table):
     @property
     @abstractmethod
     def limit_s(self) -> float:
-        """The time after which it ends by itself [s]."""
+        """The time limit after which it ends by itself [s]."""
 
     @property
     def expected_s(self) -> float:
@@ -104,7 +104,7 @@ class Task(Table):
         return Stroke(_SHAKE_HZ, min(_SHAKE_M, workspace_m[0] / 2))
 
     def lasting(self, most_s: float) -> Self:
-        """Return the task ended by time alone: after ``most_s``, or at a target's first whole swing after that [s]."""
+        """Return the task ended only by time: after ``most_s``, or a target's first whole period after that [s]."""
         return self
 
 
@@ -199,7 +199,7 @@ class Follow(Task):
         return self.model_copy(update={"cycles": max(swings, self.cycles)})
 
     def target_m(self, t_s: float) -> Point:
-        """Return the target's position ``t_s`` after the task began, hand frame [m]; before it the middle."""
+        """Return the target's position ``t_s`` after the task began, hand frame [m]; before it the centre."""
         ramp = 1.0 if t_s >= self.lead_s else (1 - math.cos(math.pi * max(t_s, 0.0) / self.lead_s)) / 2
         return self.amplitude_m * ramp * math.sin(2 * math.pi * self.frequency_hz * t_s), 0.0, 0.0
 
@@ -302,7 +302,7 @@ class Reach(Task):
 
 
 class _RecordedTask(Task):
-    """A task of a plug-in that is not here, as a receipt holds it."""
+    """A task of a plug-in that is not installed, from a receipt."""
 
     model_config = ConfigDict(extra="allow")
 

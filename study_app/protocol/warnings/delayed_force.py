@@ -29,11 +29,11 @@ WITHHELD_PERCENT: Final = 5.0
 
 
 class Entry(NamedTuple):
-    """One line: a liquid of ``rek2024``, or of ``physical2`` as "physical2_water", in a hand.
+    """One row: a liquid of ``rek2024``, or of ``physical2`` as "physical2_water", with one hand.
 
-    The grip is "light", "middle" or "firm"; the force is late by ``delay_ms`` in addition to the device's delay.
-    ``left_percent`` is RMS of the force sent over RMS of the force asked for, ``withheld_percent`` the share of the
-    force that is withheld, as in a trial.
+    The grip is "light", "middle" or "firm"; the force is delayed by ``delay_ms`` in addition to the device's delay.
+    ``left_percent`` is the RMS of the force sent relative to that of the requested force, ``withheld_percent`` the
+    share of the force that is withheld, as in a trial.
     """
 
     liquid: str
@@ -86,7 +86,7 @@ _load: Final = cache(load)
 
 
 def delay_warnings(protocol: Protocol) -> Iterator[str]:
-    """Yield the conditions whose force delay exceeds what the passivity controller delivers."""
+    """Yield the conditions whose force delay is longer than the passivity controller can deliver."""
     presented = {name for block in protocol.blocks.values() for name in protocol.conditions_in(block.id)}
     for name, condition in protocol.conditions.items():
         delay_ms = 1000 * condition.link().mean_delay_s(protocol.device.rate_hz)
@@ -103,7 +103,7 @@ def delay_warnings(protocol: Protocol) -> Iterator[str]:
 
 
 def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
-    """Return the warning of the stored table for a shipped liquid and a light hand; None if little is withheld."""
+    """Return the stored table's warning about a shipped liquid and a light hand; None if little is withheld."""
     estimator = protocol.scene.velocity.kind if protocol.scene.velocity.kind == "kalman" else "ewma"
     most_ms = longest_delay_ms(liquid, estimator)
     if delay_ms <= most_ms:

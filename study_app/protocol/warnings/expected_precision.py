@@ -41,7 +41,7 @@ _MEAN_OBSERVERS: Final = 1000
 
 @dataclass(frozen=True)
 class SensitivityPlan:
-    """What decides how precise d′ is: of one compared condition, or of one standard (``of_each``).
+    """The parameters that determine the precision of d′, for one compared condition or standard (``of_each``).
 
     Answers to the design can be correct. If standards alternate (``roving``), intervals can only be compared with each
     other.
@@ -59,11 +59,11 @@ class SensitivityPlan:
     """The words for what the number of trials counts for."""
 
     def with_trials(self, trials: int) -> SensitivityPlan:
-        """Return the plan with so many trials, as near as they can be divided."""
+        """Return the plan with ``trials`` trials, rounded so that they can be divided."""
         return replace(self, trials=trials)
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
-        """Return d′ as the report estimates it, of unbiased observers with a true d′ each, both (observers,) arrays."""
+        """Return the d′ that the report would estimate for unbiased observers with these true d′, both (observers,)."""
         design, count = self.design, len(self.design.arrangements)
         trials = [self.trials // count + (place < self.trials % count) for place in range(count)]
         correct = [str(design.correct(place)) for place in range(count)]
@@ -80,9 +80,10 @@ class SensitivityPlan:
 
 @dataclass(frozen=True)
 class EstimationPlan:
-    """What decides how precise the exponent of magnitude estimation is; ``value`` is that of simulated participants.
+    """The parameters that determine the precision of the exponent of magnitude estimation.
 
-    The levels are above zero, each is presented ``repetitions`` times.
+    ``value`` is the exponent of simulated participants. The levels are above zero, each is presented ``repetitions``
+    times.
     """
 
     levels: tuple[float, ...]
@@ -97,7 +98,7 @@ class EstimationPlan:
         return replace(self, repetitions=max(1, round(trials / len(self.levels))))
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
-        """Return exponents as the report estimates them: least-squares slopes of mean ln answers on ln level."""
+        """Return the exponents that the report would estimate: least-squares slopes of mean ln answers on ln level."""
         x, noise = np.log(self.levels), ESTIMATE_NOISE / math.sqrt(self.repetitions)
         means = truth[:, None] * x + random.normal(0.0, noise, (len(truth), len(x)))
         return np.asarray((means @ (x - x.mean())) / ((x - x.mean()) ** 2).sum(), float)
@@ -105,7 +106,7 @@ class EstimationPlan:
 
 @dataclass(frozen=True)
 class RatingPlan:
-    """What decides how precise d_a is of one level against the lowest, each rated in so many trials."""
+    """The parameters that determine the precision of d_a of one level against the lowest, with equal trials."""
 
     points: int
     trials: int
@@ -118,7 +119,7 @@ class RatingPlan:
         return replace(self, trials=trials)
 
     def estimates(self, truth: Floats, random: Generator) -> Floats:
-        """Return d_a as the report estimates it, of observers who use all points of the scale about equally often.
+        """Return the d_a that the report would estimate for observers who use all scale points about equally often.
 
         A rating is the number of criteria that a normal observation exceeds. The criteria divide a normal distribution
         with the mean and the standard deviation of both levels' observations at `value` into equal shares.
@@ -138,7 +139,7 @@ MeanPlan: TypeAlias = SensitivityPlan | EstimationPlan | RatingPlan
 
 
 def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
-    """Return what decides how precise the d′, d_a or exponents of a block are; None where it has none of them."""
+    """Return the plan for the precision of a block's d′, d_a or exponents; None if it has none of them."""
     if block.design is None or block.phase != "main":
         return None
     design = design_of(protocol, block).model_copy(update={"question": None})  # a dictionary has no hash
@@ -165,7 +166,7 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
 
 
 def expected_mean(plan: MeanPlan) -> Expected:
-    """Return how precise the d′, d_a or exponent of one participant, and their mean, are expected to be."""
+    """Return the expected precision of one participant's d′, d_a or exponent, and of the mean."""
     found = plan.estimates(np.full(_MEAN_OBSERVERS, plan.value), np.random.default_rng(SEED))
     spread = float(found.std())
     return Expected(
@@ -196,9 +197,9 @@ _MOST_TRIALS: Final = 200
 
 @dataclass(frozen=True, eq=False)
 class ObserverAnswers:
-    """What observers answered in a block, one each: the ``tracks`` of one standard, and other trials.
+    """The answers of observers in a block: the ``tracks`` of one standard, and other trials.
 
-    ``catch`` trials present the highest level, ``noise`` trials the standard alone.
+    ``catch`` trials present the highest level, ``noise`` trials only the standard.
     """
 
     observers: Observers
@@ -209,10 +210,10 @@ class ObserverAnswers:
 
 @dataclass(frozen=True)
 class ThresholdPlan:
-    """What decides how precise the threshold of one standard is.
+    """The parameters that determine the precision of the threshold of one standard.
 
-    Each track has ``catch`` catch trials; the block has ``standards`` standards. ``clipping`` says how limits clip the
-    levels of the highest standard that observers answer to; None: they are presented in full.
+    Each track has ``catch`` catch trials; the block has ``standards`` standards. ``clipping`` describes how limits clip
+    the levels of the highest standard; None: they are not clipped.
     """
 
     stimulus: Stimulus
@@ -228,7 +229,7 @@ class ThresholdPlan:
     """Comparisons of each standard, at most."""
 
     def with_trials(self, trials: int) -> ThresholdPlan:
-        """Return the plan with so many trials for each standard, rounded to what its method divides them into."""
+        """Return the plan with ``trials`` trials per standard, rounded to what its method can divide."""
         method, stimulus = self.method, self.stimulus
         least = method.tracks * (1 if method.adaptive else len(method.levels_of(stimulus)))
         each = max(1, round(trials / least))
@@ -238,22 +239,22 @@ class ThresholdPlan:
 
     @property
     def two_intervals(self) -> bool:
-        """Whether one of two intervals is correct, so that people may prefer one."""
+        """Whether one of two intervals is correct, so that people may have a preference."""
         return self.design.kind == "2ifc" and has_correct_answer(self.design, self.stimulus)
 
     @property
     def kinds(self) -> Mapping[str, Person]:
-        """The people who are simulated."""
+        """The kinds of simulated participants."""
         return KINDS if self.two_intervals else ALONE
 
     @property
     def unit(self) -> str:
-        """That of a threshold, after a space."""
+        """The unit of a threshold with a leading space."""
         weber = self.stimulus.level_kind == "weber"
         return "" if weber else f" {quantity(self.stimulus.vary).unit}".rstrip()
 
     def each_standard(self) -> tuple[ThresholdPlan, ...]:
-        """Return the plan of each standard, the highest first, as limits clip it; this one where all are alike."""
+        """Return the plan of each standard with its clipping, the highest first; only this one if all are alike."""
         own = self.clipping
         if own is None or not own.others:
             return (self,)
@@ -261,16 +262,16 @@ class ThresholdPlan:
         return tuple(replace(self, clipping=one) for one in (own, *of_others))
 
     def measures(self, thresholds: Floats) -> NDArray[np.bool_]:
-        """Return which thresholds [u] are below the highest level that is presented in full; no other is measured."""
+        """Return which thresholds [u] are below the highest unclipped level; others cannot be measured."""
         return thresholds < self.stimulus.coordinate(self.highest)
 
     @property
     def highest(self) -> float:
-        """The highest level that is presented in full."""
+        """The highest unclipped level."""
         return math.inf if self.clipping is None else self.clipping.highest(self.stimulus)
 
     def presented(self, levels: Floats) -> Floats:
-        """Return levels as they are presented, both in u."""
+        """Return levels after clipping, both in u."""
         if self.clipping is None:
             return levels
         log = self.stimulus.spacing == "log"
@@ -279,7 +280,7 @@ class ThresholdPlan:
             return np.log10(np.maximum(found, 0.0)) if log else found
 
     def answers(self, thresholds: Floats, random: Generator, people: Sequence[Person] = (ASSUMED,)) -> ObserverAnswers:
-        """Return what observers with thresholds (n,) [u] answer: ``people``, one for each or one for all."""
+        """Return the answers of observers with thresholds (n,) [u]; ``people`` has one for each or one for all."""
         stimulus, design = self.stimulus, self.design
         assumed, guess = self.method.assumed(stimulus, design), design.guess_rate
         answers = len(design.answers)
@@ -320,9 +321,9 @@ class ThresholdPlan:
         return ObserverAnswers(observers, tuple(tracks), catch, noises)
 
     def fits(self, answered: ObserverAnswers, most: int | None = None) -> list[Posterior]:
-        """Return what answers say about each observer, all widths being equally likely, as in the report.
+        """Return the posterior of each observer with equally likely widths, as in the report.
 
-        Of each track the first ``most`` are taken, if that is given, without catch trials.
+        Only the first ``most`` trials of each track are used, if it is given, without catch trials.
         """
         low, high = self.stimulus.domain
         parts = [*(track.first(most) for track in answered.tracks), answered.noise, *([] if most else [answered.catch])]
@@ -335,11 +336,11 @@ class ThresholdPlan:
         return [it.fit(grid, two_intervals=self.two_intervals).flat for it in answers.given(presented)]
 
     def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
-        """Return what the analysis estimates from answers; see `fits` and `grouped`."""
+        """Return the analysis' estimates from answers; see `fits` and `grouped`."""
         return self.grouped(self.fits(answered, most), together)
 
     def grouped(self, fits: Sequence[Posterior], together: int = PEOPLE) -> Estimates:
-        """Return estimates from `fits`, of which so many consecutive ones ``together`` are the people of a study."""
+        """Return estimates from `fits`, of which ``together`` consecutive ones are the participants of one study."""
         prior = self.method.assumed(self.stimulus, self.design).width_prior
         found, of_groups = list[tuple[float, ...]](), list[float]()
         for first in range(0, len(fits), together):
@@ -354,12 +355,12 @@ class ThresholdPlan:
     def simulate(
         self, thresholds: Floats, random: Generator, people: Sequence[Person] = (ASSUMED,), together: int = PEOPLE
     ) -> Estimates:
-        """Return what the analysis estimates of observers with these thresholds [u], as in `answers`."""
+        """Return the analysis' estimates for observers with these thresholds [u]; see `answers`."""
         return self.estimates(self.answers(thresholds, random, people), together=together)
 
 
 def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
-    """Return what decides how precise a block's thresholds are; None where it has none."""
+    """Return the plan for the precision of a block's thresholds; None if it has none."""
     if block.stimulus is None or block.design is None or block.phase != "main":
         return None
     stimulus = stimulus_of(protocol, block)
@@ -374,10 +375,10 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
 
 @lru_cache(maxsize=32)
 def expected(plan: ThresholdPlan) -> Expected:
-    """Return how precise thresholds are expected to be, of each kind of people.
+    """Return the expected precision of thresholds for each kind of participants.
 
-    Only thresholds below the highest level that is presented in full have estimates; where those are not the larger
-    half of all, none is expected.
+    Only thresholds below the highest unclipped level have estimates; unless these are the majority, no precision is
+    expected.
     """
     cells = _CELLS * (6 if plan.design.has_noise else 1) * (30 if getattr(plan.method, "learn", "") == "all" else 1)
     per_trial = cells * plan.stimulus.steps
@@ -413,17 +414,17 @@ def expected(plan: ThresholdPlan) -> Expected:
 
 
 def precision_plan(protocol: Protocol, block: Block) -> ThresholdPlan | MeanPlan | None:
-    """Return what decides how precise a block's thresholds, d′, d_a or exponents are; None: it has none of them."""
+    """Return the plan for a block's thresholds, d′, d_a or exponents; None if it has none of them."""
     return threshold_plan(protocol, block) or mean_plan(protocol, block)
 
 
 def expected_of(plan: ThresholdPlan | MeanPlan) -> Expected:
-    """Return how precise results are expected to be."""
+    """Return the expected precision of results."""
     return expected(plan) if isinstance(plan, ThresholdPlan) else expected_mean(plan)
 
 
 def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]]:
-    """Yield the expected 95 % intervals of one participant and of the planned group, where any are expected."""
+    """Yield the expected 95 % intervals of one participant and of the planned group, if any are expected."""
     plan = precision_plan(protocol, block)
     if plan is None:
         return
@@ -445,7 +446,7 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
 
 
 def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield that the planned participants and trials do not reach the planned precision."""
+    """Yield warnings that planned participants and trials do not reach the planned precision."""
     plan, (people, precision) = precision_plan(protocol, block), _planned(protocol)
     if plan is None or people is None or precision is None:
         return
@@ -478,6 +479,6 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _planned(protocol: Protocol) -> tuple[int | None, float | None]:
-    """Return how many participants and which precision are planned."""
+    """Return the planned number of participants and the planned precision."""
     decided = protocol.analysis
     return (None, None) if decided is None else (decided.participants, decided.precision)

@@ -36,10 +36,10 @@ _NARROW = 1.3
 
 
 def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str = "") -> tuple[str, ...]:
-    """Return valid parts of a study that may be mistakes, a sentence each.
+    """Return warnings about valid parts of a study that may be mistakes, one sentence each.
 
-    ``simulates`` says whether what takes simulated observers, up to a second a block, is among it; ``without_force`` is
-    the name of the device that sessions use, if it gives no force.
+    ``simulates`` includes warnings that need simulated observers, up to a second per block; ``without_force`` is the
+    name of the sessions' device, if it has no force.
     """
     return (
         *liquid_warnings(protocol),
@@ -54,7 +54,7 @@ def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str =
 
 
 def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
-    """Return possible mistakes in the liquids, a sentence each."""
+    """Return warnings about possible mistakes in the liquids, one sentence each."""
     felt = {name: steady_force(protocol.scene_of(name)) for name in protocol.liquids}
     return (
         *_similar_liquids(protocol, felt),
@@ -81,7 +81,7 @@ def _similar_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[st
 
 
 def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
-    """Return the liquids of a block, each once."""
+    """Return the liquids of a block without duplicates."""
     conditions = (protocol.conditions[it] for it in protocol.conditions_in(block.id))
     return dict.fromkeys(name for condition in conditions for name in condition.liquid_ids)
 
@@ -97,7 +97,7 @@ def _clipped_liquids(felt: dict[str, Steady]) -> Iterator[str]:
 
 
 def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
-    """Yield liquids with a viscosity on which their drag does not depend, and the resulting error."""
+    """Yield liquids whose drag ignores their viscosity, and the resulting error."""
     for name in protocol.liquids:
         scene = protocol.scene_of(name)
         (liquid,) = scene.liquids
@@ -119,7 +119,7 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
 
 
 def _practised_liquids(protocol: Protocol) -> Iterator[str]:
-    """Yield liquids that are practised and judged in another block; levels are practised for their task."""
+    """Yield liquids that are used for practice and judged in another block, unless levels are practised."""
     used = {block.id: _liquids_of(protocol, block) for block in protocol.blocks_in_order}
     judged = {name: block.id for block in reversed(protocol.main_blocks) for name in used[block.id]}
     for block in protocol.blocks_in_order:
@@ -226,7 +226,7 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
 
 
 def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
-    """Yield why the study may not answer its question, regardless of the answers."""
+    """Yield reasons why the study may not answer its question, regardless of the answers."""
     decided = protocol.analysis
     for block in protocol.main_blocks:
         if block.order == "fixed" and block.design is None and len(block.conditions) > 1:
@@ -293,7 +293,7 @@ def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
 
 
 def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield conditions that cannot be told apart, or that a trial's name reveals."""
+    """Yield conditions that cannot be distinguished, or that a trial's name reveals."""
     conditions = [protocol.conditions[name] for name in block.conditions]
     alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
     if alone and len(protocol.main_blocks) > 1:
@@ -319,7 +319,7 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
 
 
 def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Iterator[str]:
-    """Yield conditions that differ from the standard in more than one way: either may be what participants notice."""
+    """Yield conditions that differ from the standard in several ways, any of which participants may notice."""
     ways = {
         "liquid": ("liquid_ids",),
         "view": ("seen",),
@@ -341,7 +341,7 @@ def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Itera
 
 
 def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
-    """Yield missing parts of a block of forced choices at levels."""
+    """Yield missing parts of a forced-choice block of levels."""
     if block.stimulus is None or block.design is None or block.method is None:
         return
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)

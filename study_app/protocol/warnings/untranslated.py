@@ -38,9 +38,10 @@ _OF_INSTRUMENTS: Final = ("title", "intro", "scales.*.labels", "scales.*.cannot_
 
 
 class UntranslatedText(NamedTuple):
-    """A text that should be in ``language`` and is in ``source``, the codes of two languages.
+    """A text that should be in ``language`` but is in ``source``, the codes of two languages.
 
-    It ``ships`` with the program in ``source``; otherwise it is the same as in another language or study.
+    A text that ``ships`` with the program exists there in ``source``; otherwise it equals that of another language or
+    study.
     """
 
     path: Path
@@ -120,7 +121,7 @@ def listed_places(texts: Sequence[UntranslatedText]) -> str:
 
 @lru_cache(maxsize=4096)  # the texts of a study are compared after each edit: 1 to 2 ms instead of 10 to 40
 def _text_parts(text: Any) -> tuple[str, ...]:
-    """Return a text's paragraphs or a scale's labels for comparison, without those that have no letter."""
+    """Return a text's paragraphs or a scale's labels for comparison, without those that contain no letters."""
     parts = text if isinstance(text, tuple) else _PARAGRAPHS.split(text) if isinstance(text, str) else ()
     read = (visible_text(part) for part in parts if isinstance(part, str))
     return tuple(part for part in read if any(map(str.isalpha, part)))

@@ -24,10 +24,10 @@ RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur",
 
 
 class Words:
-    """One language's words: an attribute for each key of its file, a text, or a template with the slots in its braces.
+    """One language's texts: an attribute for each key of its file, a text or a template with slots in braces.
 
-    ``small_numbers`` are the numbers from one as they begin a sentence; ``interval_coming`` is said in the rest before
-    the first interval, the second …; questions are by the kind of design, answers by their id.
+    ``small_numbers`` are the numbers from one at the start of a sentence; ``interval_coming`` are shown in the pause
+    before the first interval, the second …; questions are by the kind of design, answers by their id.
     """
 
     small_numbers: tuple[str, ...]
@@ -58,7 +58,7 @@ class Words:
         return joined
 
     def unclear_number(self, text: str) -> str:
-        """Return the sentence that asks again for an ambiguous number; "" if it is not."""
+        """Return the sentence that asks for clarification of an ambiguous number; "" if it is unambiguous."""
         numbers = readings_of(text, self.decimal_sign)
         if len(numbers) < 2:
             return ""
@@ -87,7 +87,7 @@ _ENGLISH: Final = tomllib.loads((_FOLDER / "en.toml").read_text(encoding="utf-8"
 
 
 def read_language(file: File) -> Words:
-    """Return the words in a file of one language.
+    """Return the texts in the file of one language.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str,
 
 
 def _wrong_slots(text: str, model: str) -> set[str]:
-    """Return the slots that only one of two texts has; a list may come without its count, as some grammars prefer."""
+    """Return the slots that only one of two texts has; a list may omit its count, as some grammars prefer."""
     slots, needed = _slots(text), _slots(model)
     return (slots - needed) | (needed - slots - ({"n"} if "list" in slots else set()))
 
@@ -146,7 +146,7 @@ def _slots(text: str) -> set[str]:
 
 
 def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
-    """Return the languages in a folder by code, and why the others are refused."""
+    """Return the languages in a folder by code, and why the others are rejected."""
     languages: dict[str, Words] = {}
     refused: dict[str, str] = {}
     try:
@@ -170,7 +170,7 @@ LANGUAGES: Final = SHIPPED | _OWN
 
 
 def language_template(code: str) -> str:
-    """Return a file of a language without its texts; the English ones are comments."""
+    """Return a language file without texts; the English ones are comments."""
     lines = (_FOLDER / "en.toml").read_text(encoding="utf-8").splitlines()[2:]
     text = "\n".join(re.sub(r'^(\w+) = ((?:".*?"|\[.*\]))(.*)$', _empty_line, line) for line in lines)
     return text.replace('language = ""', f'language = "{code}"', 1) + "\n"
