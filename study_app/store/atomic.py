@@ -364,7 +364,7 @@ def read_own(path: Path, root: Path) -> bytes:
 
 
 def read_own_if_there(path: Path, root: Path) -> bytes | None:
-    """Return the content of a file that must lie under ``root``, None where there is none."""
+    """Return the content of a file that must lie under ``root``; None if it does not exist."""
     return read_own(path, root) if os.path.lexists(path) else None
 
 
@@ -398,7 +398,7 @@ def _refuse_constant(constant: str) -> None:
 
 
 def study_root(path: Path) -> Path:
-    """Return the study folder that contains a session's file ``path``; for another file, the folder that it is in."""
+    """Return the study folder that contains a session's file ``path``; for other files, their own folder."""
     parents = path.absolute().parents
     return parents[3] if len(parents) > 3 and parents[2].name == "data" else parents[0]
 

@@ -65,7 +65,7 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool
     """Update the list for the ``rewritten`` files; return whether it changed.
 
     Other entries stay, so that the list only covers files as they were when the session ended; a missing or invalid
-    list is made again. Every change is noted in ``rebuilt.txt``, which is listed, too.
+    list is recreated. Every change is noted in ``rebuilt.txt``, which is also listed.
     """
     try:
         listed = read_checksums(session)
@@ -88,8 +88,8 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool
 def replace_checksums(session: SessionFolder, changes: Mapping[str, tuple[str, str]]) -> None:
     """Replace the SHA-256 of changed files if the list has the SHA-256 of their old contents.
 
-    ``changes`` are the old and the new by path in the session's folder. A file with another SHA-256 in the list was
-    changed since the session ended, which must stay visible.
+    ``changes`` are the old and the new SHA-256 by path in the session's folder. A file with another SHA-256 in the list
+    was changed after the session ended, which must remain visible.
     """
     listed = read_checksums(session)
     new = {name: after for name, (before, after) in changes.items() if listed.get(name) == before}
@@ -98,7 +98,7 @@ def replace_checksums(session: SessionFolder, changes: Mapping[str, tuple[str, s
 
 
 def note_rebuilt(session: SessionFolder, what: str) -> None:
-    """Record permanently which proofs `rebuild` made again: they prove nothing about earlier changes."""
+    """Record permanently which proofs `rebuild` recreated, since these prove nothing about earlier changes."""
     at = datetime.now().astimezone().isoformat(timespec="seconds")
     line = f"{at} liquid-study {study_app.__version__} rebuild: {what}\n"
     append_line(session.rebuilt, line.encode("utf-8", "replace"))
@@ -149,7 +149,7 @@ def _is_hidden(name: Path) -> bool:
 
 
 def is_system_file(name: Path) -> bool:
-    """Return whether a relative path is of an operating system, a program that shares files, or a copy they made."""
+    """Return whether a relative path belongs to the operating system or to a file-sharing program."""
     if _OWN.fullmatch(name.name) and len(name.parts) <= 2:
         return False
     return _is_hidden(name) or any(_SYSTEM.fullmatch(part) for part in name.parts)
@@ -171,10 +171,10 @@ def sha256(path: Path) -> str:
 
 
 def fingerprint(sums: Mapping[str, str], lines: Iterable[Event]) -> str:
-    """Return the fingerprint of a session with these ``lines`` whose files (by path in its folder) have these SHA-256.
+    """Return the fingerprint of a session from its ``lines`` and the SHA-256 of its files by path.
 
-    60 bits of the SHA-256 of their list, without tables and the note of `rebuild`, in the letters and digits of base32.
-    Recordings that were sealed are left out: the journal has their SHA-256, before and after they are opened.
+    It is 60 bits of the SHA-256 of their list in base32, without tables and the note of `rebuild`. Sealed recordings
+    are left out, since the journal has their SHA-256 before and after opening.
     """
     sealed = {
         name
@@ -218,7 +218,7 @@ def place_of(study: StudyFolder, session: SessionFolder) -> str:
 
 
 def read_list(path: Path) -> Proofs:
-    """Return fingerprint and session of each valid line of a list; an absent list is empty."""
+    """Return fingerprint and session of each valid line of a list; empty if there is no list."""
     return tuple((match[1], match[3]) for _, match in _matches(_list_text(path)) if match is not None)
 
 

@@ -98,7 +98,7 @@ PARTICIPANTS_2: tuple[Column, ...] = (
 
 
 def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
-    """Return the columns of sessions in a study with trials of intervals, in which trials may be missing."""
+    """Return the columns of sessions with interval trials, of which some may be missing."""
     with_level = (
         replace(column, levels=(*column.levels, _INCOMPLETE)) if column.name == "status" else column
         for column in columns
@@ -403,7 +403,7 @@ TABLES: dict[str, tuple[Column, ...]] = {"responses": RESPONSES, "trials": TRIAL
 
 
 def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
-    """Return the tables of a study whose protocol is of that format, by name."""
+    """Return the tables of a study by name, for this format of its protocol."""
     if protocol_format < 2:
         return TABLES
     return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}

@@ -63,11 +63,11 @@ _KINDS: Final[dict[Kind, _Cells]] = {
 class Column:
     """One column: its name, the kind of its cells, and their meaning.
 
-    ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values where
-    these are few, each with its meaning. Where ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can tell the
-    condition: no table has it before the study's key was opened. Earlier versions did not write a ``later`` column:
-    a table without it is read as if it held ``n/a``. A trial of intervals has the sum, maximum or mean of theirs,
-    ``of_trial``.
+    ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values, if they
+    are few, each with its meaning. With ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can reveal the
+    condition: no table has it before the study's key is opened. Earlier versions did not write a ``later`` column: a
+    table without it is read as if it contained ``n/a``. For a trial of intervals ``of_trial`` is the sum, maximum or
+    mean of its intervals.
     """
 
     name: str
@@ -227,8 +227,8 @@ def table_problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
 def align_columns(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
     """Return ``table`` limited to the columns that the existing table ``held`` must have, and these columns.
 
-    ``held`` may lack later columns, which its version did not write, and ``table`` those that are sealed. If ``held``
-    has the same texts without apostrophes, as earlier versions wrote them, ``held`` is returned.
+    ``held`` may lack later columns, which its version did not write, and ``table`` the sealed ones. If ``held`` has the
+    same texts without apostrophes, as earlier versions wrote them, ``held`` is returned.
     """
     names, ours = (content.partition(b"\n")[0].decode("utf-8", "replace").split(",") for content in (held, table))
     present = tuple(column for column in columns if column.name in ours)

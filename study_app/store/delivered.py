@@ -128,10 +128,10 @@ def delivered_values(
 def delivered_error(
     samples: Any, rate_hz: float, fade_s: float, law_n: Callable[[Times, Vectors, Vectors], Vectors]
 ) -> float | None:
-    """Return the error of the force sent: RMS of its difference from the law over the RMS of the law.
+    """Return the RMS difference between the force sent and the force law, relative to the RMS of the law.
 
-    The law is taken on the motion itself, as the positions before and after give it. None for a motion that is
-    too short, and where the law asks for no force that is felt.
+    The law is evaluated for the motion itself, from past and future positions. None for a motion that is too short, or
+    if the law gives no perceptible force.
 
     Parameters
     ----------
@@ -191,9 +191,9 @@ def _varies_damping(presented: Stimulated) -> bool:
 def broken_interval_limits(
     limits: Limits, presented: Stimulated, task: AnyTask, delivery: Delivered, *, adjusted: bool = False
 ) -> Iterator[str]:
-    """Yield the key of each limit in the study's file that an interval breaks.
+    """Yield the key of each limit in the study's file that an interval violates.
 
-    Of an ``adjusted`` interval the share of the force that was sent is judged, for any varied number.
+    For an ``adjusted`` interval the share of the force that was sent is judged for any varied number.
     """
     most = limits.level_error_percent
     if presented.vary is not None and presented.vary not in OF_CONDITION and most is not None:
@@ -213,7 +213,7 @@ def broken_interval_limits(
 def broken_trial_limits(
     limits: Limits, due: Presentation, holds: Sequence[bool], errors_ms: Sequence[float | None], rate_hz: float
 ) -> Iterator[str]:
-    """Yield the key of the limit that a trial breaks if the delays of its intervals do not differ as requested.
+    """Yield the key of the limit that a trial violates if the delays of its intervals do not differ as requested.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def is_within_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -
 
 
 def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[Broken, ...]:
-    """Return name, value and limit of each measured column of a trial that breaks its limit.
+    """Return name, value and limit of each measured column of a trial that violates its limit.
 
     Value and limit are in the limit's unit, ms or percent.
     """
@@ -260,7 +260,7 @@ def beyond_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> t
 
 
 def broken_limits(measured: Mapping[str, Any], limits: Mapping[str, float]) -> tuple[str, ...]:
-    """Return the limits that a trial's or an interval's measured columns break, by their keys in the protocol."""
+    """Return the limits that a trial's or an interval's measured columns violate, by their keys in the protocol."""
     keys = dict(_JUDGED) | {_LEAST: "targets_percent"}
     return tuple(dict.fromkeys(keys[measure] for measure, _, _ in beyond_limits(measured, limits)))
 

@@ -33,7 +33,7 @@ MISSING_RULE = "missing"
 class Exclusion:
     """An excluded session or trial; a row of ``exclusions.csv``.
 
-    ``key_open`` is whether the study's key was open at the decision, None where an earlier version wrote the row.
+    ``key_open`` tells whether the study's key was open at the decision; None in a row of an earlier version.
     """
 
     participant: str
@@ -148,8 +148,8 @@ def include(
 ) -> Exclusion:
     """Reverse the exclusion of a session, or of one of its trials; return that exclusion.
 
-    Its row is moved from ``exclusions.csv`` to ``exclusions_reversed.jsonl``, with who reversed it, when and why. A
-    call after an interrupted one completes it, and records nothing twice.
+    Its row is moved from ``exclusions.csv`` to ``exclusions_reversed.jsonl``, with person, time and reason. Repeating
+    an interrupted call completes it, and records nothing twice.
 
     Raises
     ------
@@ -179,7 +179,7 @@ def include(
 
 
 def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, reason: str) -> Exclusion:
-    """Decide that a session is analysed although it meets a planned rule; return the exclusion that this prevents.
+    """Decide to analyse a session although it meets a planned rule; return the exclusion that this prevents.
 
     Raises
     ------
@@ -208,7 +208,7 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
 
 
 def exclusions(folder: Path) -> tuple[Exclusion, ...]:
-    """Return the exclusions of the study in ``folder``, in the order in which they were decided.
+    """Return the exclusions of the study in ``folder`` in the order of the decisions.
 
     Raises
     ------

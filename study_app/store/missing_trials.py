@@ -28,7 +28,7 @@ _UNITS: Final = {"percent": "%", "ms": "ms", "n": "N"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MissingTrial:
-    """A main trial without an answer; ``broken`` has the keys of the limits that its presentations broke."""
+    """A main trial without an answer; ``broken`` are the keys of the limits that its presentations violated."""
 
     trial: int
     block: str
@@ -40,8 +40,8 @@ class MissingTrial:
 class MissingTrials:
     """The missing trials of a session, out of ``asked`` main trials of intervals that are over.
 
-    ``limits`` are the study's, as the session recorded them. One that an earlier version of the program recorded does
-    not state how many trials may be missing, and is never incomplete.
+    ``limits`` are the study's, as recorded by the session. A session of an earlier program version does not state the
+    permitted number of missing trials, and is never incomplete.
     """
 
     missing: tuple[MissingTrial, ...] = ()
@@ -61,7 +61,7 @@ class MissingTrials:
 
     @property
     def reasons(self) -> dict[str, int]:
-        """The number of missing trials that broke each limit, by its key, the most frequent first."""
+        """The number of missing trials that violated each limit, by its key, the most frequent first."""
         return dict(Counter(limit for trial in self.missing for limit in trial.broken).most_common())
 
     @property

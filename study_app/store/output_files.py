@@ -141,9 +141,9 @@ class Output:
 def write_output(
     study: Path, to: Path, files: Mapping[str, bytes | FileCopy], warn: Callable[[str], object] | None = None
 ) -> tuple[Path, ...]:
-    """Write ``files`` made from the results in ``study`` into the folder ``to``, as `write_files`, and list them.
+    """Write ``files`` made from the results in ``study`` into the folder ``to`` with `write_files`, and list them.
 
-    If they cannot be listed, ``warn`` receives a sentence: a withdrawal will not find them.
+    If the list cannot be updated, ``warn`` is called: a withdrawal would not find the files.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from study_app.store.missing_trials import MissingTrial, MissingTrials
 
 @dataclass(frozen=True, slots=True)
 class TrialAnswer:
-    """The answer to a trial of intervals, and how long it took [s]; None where that is not known."""
+    """The answer to a trial of intervals, and the response time [s]; None if it is unknown."""
 
     value: Any
     seconds: float | None
@@ -29,24 +29,24 @@ class Progress:
     """The progress of a session and its events, from the lines of its journal given to `process_line`.
 
     ``start`` is its first line: participant, session, seed, language and the rest. ``step`` is the index in the
-    schedule of the step to continue at: the first that was not left behind. ``page`` (or form) or ``trial`` names
-    it where it was begun: of a trial, ``attempt`` counts how often it was presented, ``task_done`` says that the last
-    time its task ran to the end (so only answers are missing, or, without a questionnaire, nothing), and ``answers``
-    holds what was chosen since; ``invalid`` counts its attempts that were not delivered as requested. ``presented``
-    says of each trial by number how often it was, ``steps`` which step it is. ``ended`` is the status of a finished
-    session. ``t_s`` is the latest moment on its clock, ``language`` the participant's.
+    schedule of the step to continue at: the first unfinished one. ``page`` (or form) or ``trial`` names it if it was
+    begun: for a trial, ``attempt`` counts its presentations, ``task_done`` tells that its last task ran to the end (so
+    that only answers, if any, are missing), and ``answers`` holds the choices since then; ``invalid`` counts its
+    attempts that were not delivered as requested. ``presented`` maps trial numbers to their presentations, ``steps`` to
+    their steps. ``ended`` is the status of a finished session. ``t_s`` is the latest time on its clock, ``language``
+    the participant's.
 
-    ``here`` is the index of the step that was shown last (−1 before the first), ``durations_s`` how long the steps left
-    behind were shown, ``away_s`` how long no program held the session, which no duration counts. ``targets`` counts
-    those reached in the latest trial; it began at ``trial_since_s``, None while a page is shown or after a gap, and its
-    task took ``trial_lasted_s``, None until it ended. ``answered`` counts the answers to each main trial and form, of
-    a trial's last attempt; ``broken`` has for each trial done the limits that it broke: column, value and limit.
-    ``lost`` says why a trial's recording could not be kept, ``lacking`` how many samples it lacks; ``outlets_lost`` why
-    an outlet to other programs failed since the session began or was resumed.
+    ``here`` is the index of the last step shown (−1 before the first), ``durations_s`` are the durations of finished
+    steps, ``away_s`` is the time without a program, which no duration includes. ``targets`` counts those reached in the
+    latest trial; it began at ``trial_since_s``, None while a page is shown or after a gap, and its task took
+    ``trial_lasted_s``, None until it ended. ``answered`` counts the answers to each main trial and form, for a trial's
+    last attempt; ``broken`` has the violated limits of each finished trial: column, value and limit. ``lost`` gives the
+    reason if a trial's recording could not be kept, ``lacking`` its number of missing samples; ``outlets_lost`` why an
+    outlet to other programs failed since the session began or was resumed.
 
     ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
-    ``repeated`` says of each why it was presented again, ``undelivered`` names the limits that its intervals broke, in
-    every attempt that was not delivered as requested.
+    ``repeated`` gives the reason for each repeated presentation, ``undelivered`` names the limits that intervals
+    violated in every attempt that was not delivered as requested.
     """
 
     start: events.SessionStarted | None = None
@@ -284,7 +284,7 @@ def progress_of(lines: Sequence[events.Event]) -> Progress:
 
 
 def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[TrialResult, ...]:
-    """Return the answered trials, each at the level that was presented, by number; the last answer counts.
+    """Return the answered trials at their presented levels, by number; the last answer counts.
 
     Lines that do not fit the study, or whose sealed fields are not opened, raise KeyError or ValueError.
     """

@@ -158,7 +158,7 @@ def began_at(receipt: Mapping[str, Any]) -> str | None:
 
 
 def has_other_format(receipt: Mapping[str, Any], start: SessionStarted) -> bool:
-    """Return whether the journal that begins with ``start`` has another format than its receipt."""
+    """Return whether the format of a journal that begins with ``start`` differs from that of its receipt."""
     return bool(receipt.get("format", 1) != (start.format or 1))
 
 

@@ -294,7 +294,7 @@ class Recorder:
 
 
 def recorded_event(which: Which, samples: Written, frames: Written, dropped: int) -> Recorded:
-    """Return the journal's event for a complete recording; files are given by their path in the session's folder."""
+    """Return the journal's event for a complete recording, with paths relative to the session's folder."""
     trial, attempt, interval = which
     return Recorded(
         trial=trial,

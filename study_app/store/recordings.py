@@ -100,7 +100,7 @@ class SealedRecording(StoreError):
 
 @dataclass(frozen=True, slots=True)
 class Checks:
-    """CRC-32 of the float64 forces (little-endian, x y z a row): of every ``rows`` rows, and of the rest at the end."""
+    """CRC-32 of the float64 forces (little-endian, x y z per row): of every ``rows`` rows, and of the remainder."""
 
     rows: int
     device_force: tuple[int, ...]
@@ -182,7 +182,7 @@ def read_checks(path: Path, secret: bytes | None = None) -> Checks:
 
 
 def crcs(forces: NDArray[np.float64], rows: int) -> list[int]:
-    """Return the CRC-32 of every ``rows`` forces (n, 3) [N], and of those left at the end."""
+    """Return the CRC-32 of every ``rows`` forces (n, 3) [N], and of the remainder."""
     exact = np.ascontiguousarray(forces, "<f8")
     return [zlib.crc32(exact[first : first + rows].tobytes()) for first in range(0, len(exact), rows)]
 
@@ -365,7 +365,7 @@ def _round_values(values: NDArray[Any], step: float) -> NDArray[Any]:
 
 
 class _Half:
-    """A Parquet file in memory until it is complete: half an hour takes 60 MB."""
+    """A Parquet file that is kept in memory until it is complete; half an hour takes 60 MB."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         self._path = path

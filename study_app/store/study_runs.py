@@ -60,7 +60,7 @@ class Run:
 def runs_of_study(results: Path, study: str) -> tuple[Run, ...]:
     """Return the contents of a study's file with which sessions were run, the newest last.
 
-    Nothing is read but receipts; no sealed key. A receipt that cannot be read is left out (`verify` reports it).
+    Only receipts are read, no sealed key. An unreadable receipt is omitted (`verify` reports it).
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def runs_of_study(results: Path, study: str) -> tuple[Run, ...]:
 
 
 def run_of(path: Path) -> Run | None:
-    """Return the content with which the session of a receipt was run; None if the receipt cannot be read."""
+    """Return the content used in the session of a receipt; None if the receipt cannot be read."""
     try:
         return _read_run(path, path.stat().st_mtime_ns)
     except (StoreError, OSError):
@@ -184,13 +184,13 @@ def recorded_items(known: Iterable[Run]) -> dict[tuple[str, str], int]:
 
 
 def source_of(run: Run) -> str | None:
-    """Return the text with which sessions were run, including its liquid files; None if no copy is stored."""
+    """Return the text used in sessions, including its liquid files; None if no copy is stored."""
     content = kept_content(run.hash)
     return None if content is None else content.decode("utf-8", "replace")
 
 
 def keep_run_content(file: Path, known: Iterable[Run]) -> None:
-    """Store the file's content if sessions were run with it, before another program can change it.
+    """Store the file's content if it was used in sessions, before another program can change it.
 
     Raises
     ------

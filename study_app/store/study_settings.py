@@ -22,7 +22,7 @@ def kept_original(file: Path) -> str:
 
 
 def keep_original(file: Path, copy_of: str = "") -> None:
-    """Store the study that a new file is a copy of, "" for none; ignore it if it cannot be written."""
+    """Store the name of the study from which a new file was copied ("" for none); ignore write errors."""
     with contextlib.suppress(StoreError, OSError):
         if copy_of:
             write_whole(_kept_file(file), json.dumps({"file": str(file.resolve()), "copy_of": copy_of}).encode())

@@ -69,7 +69,7 @@ def _parts(diagnosis: str) -> Iterator[tuple[str, str]]:
 
 
 def _settings(settings: workstation.MachineSettings) -> dict[str, object]:
-    """Return the settings; private ones only as whether they are set."""
+    """Return the settings; for private ones only whether they are set."""
     held = settings.model_dump(mode="json", exclude={"benches": {"__all__": {"report"}}})
     return {name: bool(value) if name in _PRIVATE else value for name, value in held.items()}
 

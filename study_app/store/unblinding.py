@@ -89,8 +89,8 @@ class Unblinded:
 def unblind(folder: Path, by: str, reason: str, progress: ReportProgress | None = None) -> Unblinded:
     """Open a study's key, record who opened it and why, and write the sealed columns into its tables.
 
-    A table that differs from its journal is not changed, nor is a session that runs or cannot be read. Unblinding again
-    completes an interrupted unblinding. ``progress`` is called with what is being done and the share that is done.
+    A table that differs from its journal is not changed, nor is a running or unreadable session. Repeating it completes
+    an interrupted unblinding. ``progress`` is called with the current step and the fraction done.
 
     Raises
     ------
@@ -305,7 +305,7 @@ def _is_behind(held: bytes, path: Path, place: Place, lines: list[Event], key: K
 
 
 def _recordings(place: Place, lines: list[Event], key: Key) -> Iterator[tuple[Path, tuple[str, str]]]:
-    """Yield each file that was recorded sealed, with its SHA-256 before and after it is opened."""
+    """Yield each file that was recorded sealed, with its SHA-256 before and after opening."""
     for line in open_events(lines, key):
         if isinstance(line, Recorded) and line.opened_sha256 and line.opened_frames_sha256:
             yield place.folder.path / line.recording, (line.sha256, line.opened_sha256)

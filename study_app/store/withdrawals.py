@@ -58,7 +58,7 @@ class ErasedSession:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tombstone:
-    """One withdrawal; a line of ``withdrawals.jsonl``. ``at`` is when the data were erased from that folder."""
+    """One withdrawal; a line of ``withdrawals.jsonl``. ``at`` is the time at which that folder's data were erased."""
 
     participant: str
     at: str
@@ -187,7 +187,7 @@ def tombstones(study: StudyFolder) -> dict[str, Tombstone]:
 
 
 def unerased_files(study: StudyFolder, participant: str) -> Iterator[Path]:
-    """Yield what an interrupted withdrawal left of a participant: the folder, and lists with the participant's rows."""
+    """Yield the remains of an interrupted withdrawal: the participant's folder, and lists with rows."""
     if is_there(person := study.data / f"sub-{participant}"):
         yield person
     if any(row.participant == participant for row in exclusions(study.path)):
@@ -370,7 +370,7 @@ def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
 def _remaining_mentions(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str]:
     """Yield the paths that still name the participant, except tombstone, allocation entry and recordings.
 
-    Where ``folders`` are given, they alone are searched: in the footage of an export an ID may occur by chance.
+    If ``folders`` are given, only these are searched, since an ID may occur by chance in the footage of an export.
     """
     word = re.compile(rb"(?<![A-Za-z0-9])" + re.escape(participant.encode()) + rb"(?![A-Za-z0-9])")
     for path in (path for folder in folders or (study.path,) for path in paths_in(folder)):

@@ -49,7 +49,8 @@ class _Strict(BaseModel):
 class DisplayOffset(_Strict):
     """The delay from painting to light on a screen [ms]: ``mean_ms`` ± ``spread_ms``.
 
-    ``measured`` is the day, ``screen`` the name of the screen it was measured on: it holds for no other.
+    ``measured`` is the day, ``screen`` the name of the screen on which it was measured, the only one to which it
+    applies.
     """
 
     mean_ms: Annotated[float, Field(ge=OFFSET_MS[0], le=OFFSET_MS[1])]
@@ -62,10 +63,10 @@ class DisplayOffset(_Strict):
 class DeviceBench(_Strict):
     """The bench measurements of a device on the day ``measured``, for x, y and z.
 
-    ``mass_kg``, ``damping_nspm`` and ``friction_n`` are the device's own, ``stable_nspm`` the greatest stable damping,
-    ``delay_ms`` how late a force acts, ``gain`` newtons on a scale for each newton sent (None without a scale),
+    ``mass_kg``, ``damping_nspm`` and ``friction_n`` are the device's own, ``stable_nspm`` is the greatest stable
+    damping, ``delay_ms`` the delay of a force, ``gain`` the measured force per requested force (None without a scale),
     ``count_m`` the encoder count [m] that explains the noise of positions in motion (None: it moved too little). A
-    device is known by ``name`` and ``serial``, "" where it has none. ``report`` is the path of bench.md.
+    device is identified by ``name`` and ``serial``, "" if it has none. ``report`` is the path of bench.md.
     """
 
     name: Annotated[str, Field(pattern=rf"^{NAME_PATTERN}$")]
@@ -89,16 +90,15 @@ class DeviceBench(_Strict):
 class MachineSettings(_Strict):
     """The settings of this computer.
 
-    ``screen`` is the participant's by its name, ``screen_number`` tells screens of one name apart and counts from 1;
-    ``viewing_distance_mm`` and ``screen_width_mm`` are None until they are measured. ``firmware`` is the file
-    of a device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
-    ``recent`` are the protocol files outside it that were opened last, newest first; ``operator`` are the initials that
-    were given last; ``photodiode`` is whether the tank has a corner that a photodiode looks at; ``camera`` is the one
-    that conditions show (see `video.sources`), "" for the usual one of the system; ``benches`` are the latest
-    measurements of devices. ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none)
-    are what sessions send to other programs. ``proofs`` is the folder into which the proof of a study is written when
-    a session ends, ``stamps`` a server of time stamps (RFC 3161), ``stamp_root`` its root certificate (PEM). Whether
-    ``device`` is known is for those to say who open it.
+    ``screen`` is the name of the participant's screen, ``screen_number`` distinguishes screens of the same name, from
+    1; ``viewing_distance_mm`` and ``screen_width_mm`` are None until they are measured. ``firmware`` is the file of a
+    device's program, ``workspace`` the folder of protocols and results (None: not chosen: `study_app.workspace`);
+    ``recent`` are recently opened protocol files outside it, newest first; ``operator`` are the last initials;
+    ``photodiode`` tells whether the tank has a corner for a photodiode; ``camera`` is the camera of video conditions
+    (see `video.sources`), "" for the system's default; ``benches`` are the latest measurements of devices.
+    ``lsl_markers``, ``lsl_samples`` and ``triggers`` (the address of a port, "": none) are the outlets of sessions.
+    ``proofs`` is the folder for a study's proof at the end of a session, ``stamps`` a time-stamp server (RFC 3161),
+    ``stamp_root`` its root certificate (PEM). Whether ``device`` is known is checked when it is opened.
     """
 
     screen: str = ""
@@ -167,8 +167,8 @@ class MachineSettings(_Strict):
     def text_scale(self, width_px: float, system_mm: float) -> float:
         """Return the factor that enlarges text so that an x spans 0.4° at the viewing distance.
 
-        ``width_px`` is the screen's width in logical pixels, ``system_mm`` the width that the system tells, used until
-        it is corrected. 1 where distance or width is not known; never smaller.
+        ``width_px`` is the screen's width in logical pixels, ``system_mm`` the width that the system reports, which is
+        used until it is corrected. 1 if distance or width is unknown; never smaller.
         """
         height_deg = self.x_height_deg(width_px, system_mm)
         return 1.0 if height_deg is None else max(1.0, LEAST_X_HEIGHT_DEG / height_deg)

@@ -49,8 +49,8 @@ _STEM: Final = re.compile(r"(?:[a-z0-9_]+-)?[0-9]{3,}(?:-[A-Za-z0-9]+)?")
 class Allocation:
     """A participant's entry and group; ``sealed`` is the group as stored in journal and file, "" if pre-existing.
 
-    ``replaces`` is the participant whose entry it was; ``place_in_group`` says that the place in the group assigns rows
-    of squares.
+    ``replaces`` is the participant whose entry it was; ``place_in_group`` tells whether the place in the group assigns
+    rows of squares.
     """
 
     entry: int
@@ -69,7 +69,7 @@ class Allocation:
 class Claim:
     """The content of an entry's file; ``participant`` is empty if the program ended before it was written.
 
-    ``group`` is that of a pre-existing one, otherwise None.
+    ``group`` is a pre-existing group, otherwise None.
     """
 
     path: Path
@@ -82,7 +82,7 @@ class Claim:
 
 
 class Begun(NamedTuple):
-    """A participant's entry, pre-existing group and replaced participant, as the first line of a journal has them."""
+    """A participant's entry, pre-existing group and replaced participant from the first line of a journal."""
 
     entry: int
     group: str | None
@@ -103,7 +103,7 @@ class Entries:
 
     @cached_property
     def begun(self) -> dict[str, Begun]:
-        """The entries in the journals, when they were first needed."""
+        """The entries in the journals, read on first use."""
         return entries_begun(self._study)
 
     @cached_property
@@ -120,9 +120,9 @@ class Entries:
         return self._by_participant.get(participant) if participant else None
 
     def last(self, group: str | None) -> int:
-        """Return the last entry of a pre-existing group, or without ``group`` the last one of all; 0 if there is none.
+        """Return the last entry of a pre-existing group or (without ``group``) the last one of all; 0 if there is none.
 
-        Without ``group`` those in the journals count, too.
+        Without ``group`` the entries in journals are included.
         """
         if group is not None:
             return self._last.get(group, 0)
@@ -142,7 +142,7 @@ def allocate(
     """Return the allocation of a participant, claiming an entry if there is none yet; None in a study without groups.
 
     ``group`` is a new participant's pre-existing group, ``row_of`` the participant who is replaced; both were checked
-    (`check_choice`). ``entries`` are those that were read before, to which a new claim is added.
+    (`check_choice`). A new claim is added to ``entries``, the entries read before.
     """
     if not key.groups and group is None and not is_there(study.allocated):
         return None
@@ -275,7 +275,7 @@ def simulated_groups(
 ) -> dict[str, str | None]:
     """Return the group of each new simulated participant: ``group``, or pre-existing groups in equal numbers.
 
-    StudyError rejects a ``group`` that the study cannot take (`check_choice`).
+    StudyError rejects an impossible ``group`` (`check_choice`).
     """
     held = claims(study)
     by_participant = {claim.participant: claim for claim in reversed(held)}
@@ -311,7 +311,7 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
 
 
 def claims(study: StudyFolder) -> list[Claim]:
-    """Return the contents of all entries' files, by group and entry; replacements after the participant replaced."""
+    """Return the contents of all entries' files by group and entry; replacements follow the replaced participant."""
     paths = [path for path in study.allocated.glob("*.json") if _STEM.fullmatch(path.stem)]
     all_claims = [_read_claim(study, path) for path in paths]
     return sorted(
@@ -320,7 +320,7 @@ def claims(study: StudyFolder) -> list[Claim]:
 
 
 def _has_counted_places(held: Iterable[Claim]) -> bool:
-    """Return whether places in groups assign rows of squares: not in folders with claims of an earlier version."""
+    """Return whether places in groups assign rows of squares, which claims of an earlier version rule out."""
     return all(claim.place_in_group for claim in held if claim.participant)
 
 

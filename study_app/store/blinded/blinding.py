@@ -65,10 +65,10 @@ class Key:
     """The opened key. Never print, log or show its content before it was revealed.
 
     ``codes`` is block → code → condition id, or track of a block with a design; ``tables`` holds the protocol's tables
-    ``conditions`` and ``liquids``, of a study with designs also ``stimuli``, ``designs``, ``methods`` and
-    what ``blocks`` present, ``files`` the texts of its liquid files by their names;
-    ``groups`` is group → share, if participants are randomised to groups; ``drawn`` says where its randomness came
-    from; ``hash`` is the SHA-256 of the sealed file; ``nonce`` is as secret as the codes.
+    ``conditions`` and ``liquids``, for studies with designs also ``stimuli``, ``designs``, ``methods`` and the
+    presented values of ``blocks``; ``files`` are the texts of its liquid files by name; ``groups`` is group → share, if
+    participants are randomised to groups; ``drawn`` names the source of its randomness; ``hash`` is the SHA-256 of the
+    sealed file; ``nonce`` is as secret as the codes.
     """
 
     hash: str
@@ -81,7 +81,7 @@ class Key:
     groups: dict[str, int] = field(repr=False, default_factory=dict)
 
     def condition(self, block: str, code: str) -> str:
-        """Return the id of the condition that ``code`` of ``block`` stands for."""
+        """Return the condition id of ``code`` in ``block``."""
         try:
             return self.codes[block][code]
         except KeyError:
@@ -192,7 +192,7 @@ def reveals(folder: Path) -> tuple[dict[str, str], ...]:
 
 
 def unreadable_reveals(folder: Path) -> tuple[tuple[int, bool], ...]:
-    """Return the number of each line that is not a reveal, with whether a power cut may have truncated it."""
+    """Return the number of each invalid line, and whether a power cut may have truncated it."""
     lines = [(number, line, record) for number, line, record in _reveal_lines(folder) if record is None]
     begins = b'{"at": "'
     return tuple((number, line[:8] == begins[: len(line)] and not line.endswith(b"}")) for number, line, _ in lines)
@@ -255,7 +255,7 @@ def _sealed_tables(protocol: Protocol) -> dict[str, Any]:
 
 
 def _tables_hash(protocol: Protocol) -> str:
-    """Return the hash of the conditions as their author wrote them (a later version's new defaults change nothing)."""
+    """Return the hash of the conditions as written by their author, without defaults of later versions."""
     written = {
         **protocol.model_dump(
             mode="json", include={"conditions", "liquids", "stimuli", "designs", "methods"}, exclude_unset=True
@@ -296,7 +296,7 @@ def _published_hash(session: SessionFolder) -> str | None:
 
 
 def read_key(folder: Path) -> Key:
-    """Open the key without checking that it is the one the sessions ran under. Never print its content.
+    """Open the key without comparing its hash with that in the sessions. Never print its content.
 
     Raises
     ------
@@ -424,8 +424,8 @@ def participant_group(start: events.SessionStarted, key: Key) -> str | None:
 def place_number(start: events.SessionStarted, key: Key) -> int | None:
     """Return the number that assigns a session its rows of squares, or None to use the number in the participant's id.
 
-    It is the participant's place in the group. Without groups, and where a study with groups began under a version that
-    did not count places, it is the number in the id of the participant who is replaced.
+    It is the participant's place in the group. Without groups, and in studies with groups that began under a version
+    that did not count places, it is the number in the id of the replaced participant.
     """
     if start.place_in_group and start.entry is not None:
         return place_in_group(key.groups, key.nonce, start.entry)[1] if key.groups else start.entry

@@ -35,7 +35,7 @@ _LENGTH_BYTES = 8
 def seal_values(whose: Sequence[object], values: Mapping[str, Any], secret: bytes, block_bytes: int = 1024) -> str:
     """Return values as a sealed text; ``whose`` identifies their owner, and is needed to open it.
 
-    The text is filled up to a multiple of ``block_bytes``, so that its length does not depend on the values.
+    The text is padded to a multiple of ``block_bytes``, so that its length does not depend on the values.
     """
     said = json.dumps(events.plain_json(values), allow_nan=False, separators=(",", ":")).encode()
     said = said.ljust(-(-len(said) // block_bytes) * block_bytes)
@@ -59,7 +59,7 @@ def open_text(whose: Sequence[object], text: str, secret: bytes, names: frozense
 
 
 def sealed_bytes(seconds: float, bytes_per_s: float) -> int:
-    """Return the size in bytes of a sealed recording of so many seconds; it is constant for up to twice the time."""
+    """Return the size in bytes of a sealed recording of this duration; it is constant for up to twice the time."""
     return _FACTS_BYTES + round(bytes_per_s * 2.0 ** math.ceil(math.log2(max(seconds, 1.0))))
 
 
@@ -77,7 +77,7 @@ def seal_file(content: bytes, size: int, secret: bytes) -> bytearray:
 
 
 def open_file(sealed: bytes, secret: bytes) -> bytes | None:
-    """Return the content that `seal_file` sealed; None if it was changed, or was sealed with another secret."""
+    """Return the content that `seal_file` sealed; None if it was changed or sealed with another secret."""
     start = len(MARK) + _TAG_BYTES
     tag = sealed[len(MARK) : start]
     said = memoryview(bytearray(sealed))[start:]

@@ -53,12 +53,12 @@ RETRY_S = 1.0
 
 
 def as_written(content: bytes) -> bytes:
-    """Return the content of a text file as this program writes it, with LF and without a byte order mark."""
+    """Return the content of a text file in this program's notation, with LF and without a byte order mark."""
     return without_byte_order_mark(content).replace(b"\r\n", b"\n")
 
 
 def notation_change(content: bytes) -> str:
-    """Return how the notation of a file was changed whose text is `as_written`."""
+    """Return a phrase on how the notation of a file differs from `as_written`."""
     return _OTHER_LINE_ENDINGS if b"\r\n" in content else _BYTE_ORDER_MARK
 
 
@@ -101,11 +101,10 @@ class SessionClock:
 class Contents:
     """The contents of a journal: its complete lines, where they end, and any damage after them.
 
-    ``torn_bytes`` counts what follows the last newline: the torn tail of a program that was killed while writing.
-    ``damage`` is the sentence about anything worse (a broken line, a number missing or doubled, a field of another type
-    than its event has, a line before which others stand than when it was written), else None. Every line of ``lines``
-    has the fields of its event, each of its kind, and was not changed since the next was written. ``hash`` is the
-    SHA-256 of the complete lines, with which the next line continues.
+    ``torn_bytes`` counts the bytes after the last newline: an incomplete line of a program that was killed while
+    writing. ``damage`` is a sentence about anything worse (a broken line, a missing or duplicate number, a field of the
+    wrong type, a line whose predecessors were changed), else None. Every line of ``lines`` has valid fields for its
+    event and is unchanged. ``hash`` is the SHA-256 of the complete lines, with which the next line continues.
     """
 
     lines: list[Event]
@@ -183,10 +182,10 @@ def scan(path: Path) -> Contents:
 
 
 def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str | None:
-    """Return how a line contradicts the lines before it, whose SHA-256 is ``before``; None if it does not.
+    """Return how a line contradicts the previous lines, whose SHA-256 is ``before``; None if it does not.
 
-    ``chained`` tells whether the line before has ``previous``: then this one must have it. The first line of a journal
-    has it since format 2; a journal of format 1 gets it where it was resumed by a later version.
+    ``chained`` tells whether the previous line has ``previous``: then this one must have it. The first line of a
+    journal has it since format 2; a journal of format 1 gets it where it was resumed by a later version.
     """
     first, hash_before = line["n"] == 1, line.get("previous")
     if first and line.get("format", 1) > FORMAT:
@@ -204,9 +203,9 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
 
 
 def line_of(event: Event, number: int, clock: SessionClock, t_s: float | None, *, previous: str) -> dict[str, Any]:
-    """Return the line of an event; ``t_s`` is when it happened, by default now on ``clock``.
+    """Return the line of an event; ``t_s`` is its time, by default now on ``clock``.
 
-    ``previous`` is the SHA-256 of all lines before it, as `line_bytes` gives them.
+    ``previous`` is the SHA-256 of all previous lines in the form of `line_bytes`.
     """
     moment = clock.seconds() if t_s is None else t_s
     return replace(event, n=number, t_s=round(moment, 6), at=clock.at(moment), previous=previous).line()
@@ -296,10 +295,11 @@ class Journal:
         return journal
 
     def append(self, event: Event, *, t_s: float | None = None, waits: bool = True) -> Event:
-        """Write one line and wait for the disk; return the event as readers get it.
+        """Write one line and wait for the disk; return the event as it will be read.
 
-        Without ``waits`` it returns when the system has the line, and the line is flushed in the background.
-        ``t_s`` is when it happened, by default now. Infinite and undefined numbers become null, numpy numbers plain.
+        Without ``waits`` it returns when the system has the line, and the line is flushed in the background. ``t_s`` is
+        the time of the event, by default now. Infinite and undefined numbers become null, and numpy numbers plain
+        numbers.
 
         Raises
         ------

@@ -149,10 +149,10 @@ Which: TypeAlias = tuple[int, int, int | None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """How a question was answered so far; times are seconds on the session's clock, None before the event.
+    """The answer to a question so far; times are seconds on the session's clock, None before the event.
 
-    ``value`` None after the first choice means "cannot judge"; ``last_s`` is when the value changed last, ``changes``
-    how often it did after the first choice.
+    ``value`` None after the first choice means "cannot judge"; ``last_s`` is the time of the last change, ``changes``
+    the number of changes after the first choice.
     """
 
     onset_s: Number | None = None
@@ -163,11 +163,11 @@ class Answer:
 
     @property
     def given(self) -> bool:
-        """Whether anything was chosen."""
+        """Whether any answer was chosen."""
         return self.first_s is not None
 
     def shown(self, at_s: float) -> "Answer":
-        """Return the answer after its question was shown, perhaps again."""
+        """Return the answer after its question was shown, possibly again."""
         return self if self.onset_s is not None else dataclasses.replace(self, onset_s=at_s)
 
     def chosen(self, at_s: float, value: Any) -> "Answer":
@@ -396,11 +396,11 @@ class TrialStarted(OfAttempt):
 
     @property
     def has_intervals(self) -> bool:
-        """Whether it is a trial of intervals, whose contents the line lists."""
+        """Whether it is a trial of intervals, whose contents are listed in the line."""
         return self.sealed is not None or self.arrangement is not None
 
     def fields(self) -> dict[str, Any]:
-        """Return the event's own fields in the order in which they are written: without a level null stands for it."""
+        """Return the event's own fields in the order in which they are written; a missing level is null."""
         fields = super().fields()
         if self.arrangement is None:
             return fields
@@ -548,7 +548,7 @@ class FormAnswered(Event):
 
 
 class _OfPerson(Event, group=True):
-    """Something that a person, or the program, did."""
+    """An action of a person or of the program."""
 
     by: Text
 

@@ -114,8 +114,8 @@ def begin_session(
 ) -> SessionStore:
     """Claim a session in the study folder ``results`` and write all files needed before the first trial.
 
-    The folder is created exclusively: of two programs that want one id, one gets it. A folder claimed by a program that
-    ended before it wrote a line is taken over. On any failure the claimed folder is removed.
+    The folder is created exclusively: if two programs request one id, only one gets it. A folder claimed by a program
+    that ended before writing a line is taken over. On any failure the claimed folder is removed.
 
     Parameters
     ----------
@@ -274,10 +274,10 @@ def session_environment(
 
 @dataclass(frozen=True, slots=True)
 class UsedIds:
-    """The sessions of a study's folder at one time, so that ids and numbers are checked without reading the disk.
+    """A snapshot of the sessions in a study's folder, for checking ids and numbers without reading the disk.
 
-    ``held`` are participant and number of the sessions that were begun, or are claimed by a program that runs; ``ids``
-    the ids of all folders; ``withdrawn`` are those of participants whose data were erased.
+    ``held`` are participant and number of the sessions that were begun, or are claimed by a running program; ``ids``
+    the ids of all folders; ``withdrawn`` those of participants whose data were erased.
     """
 
     path: Path
@@ -298,7 +298,7 @@ class UsedIds:
     def check_unused(self, participant: str, number: int) -> None:
         """Reject an existing session, or a new id that other programs would change or that differs only in case.
 
-        A session that was claimed by an ended program, and never begun, can be begun.
+        A session that was claimed by an ended program, but never begun, is accepted.
 
         Raises
         ------

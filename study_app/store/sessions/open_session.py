@@ -118,7 +118,8 @@ class SessionStore:
         """Add an event to the journal; with ``waits`` it is on the disk when this returns, else soon after.
 
         ``t_s`` is its time [s since the clock's origin], by default now. Fields that reveal a condition are sealed;
-        while measures are sealed, a reached target sends its marker at once and is written at the end of its task.
+        while measures are sealed, a reached target only sends its marker at once, and is written at the end of its
+        task.
 
         Raises
         ------
@@ -242,7 +243,7 @@ class SessionStore:
 
     @property
     def missing_trials(self) -> MissingTrials:
-        """The main trials so far that were not delivered."""
+        """The undelivered main trials so far."""
         return progress_of(self._lines).missing_trials
 
     def _exclude_if_incomplete(self) -> None:

@@ -269,7 +269,7 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
 
 
 def _count_rows(path: Path, root: Path) -> int:
-    """Return the number of rows of a table; 0 if it is not a table, since nothing is lost by making it again."""
+    """Return the number of rows of a table; 0 if it is not a table, which can be recreated without loss."""
     try:
         text = read_own(path, root).decode("utf-8", "replace")
         names, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
@@ -330,7 +330,7 @@ def refuse_finished(folder: SessionFolder, done: Progress) -> None:
 def _same_protocol(
     place: Place, first: Mapping[str, Any], start: events.SessionStarted, protocol: Protocol, source: bytes
 ) -> None:
-    """Raise an error that lists the differences if the protocol's file is not the one that the session began with."""
+    """Raise an error that lists the differences if the protocol differs from that of the session's start."""
     if has_hash(source, start.protocol_hash):
         return
     changes = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))

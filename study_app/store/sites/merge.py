@@ -49,8 +49,8 @@ _LEFT_BEHIND: Final = shutil.ignore_patterns(".open-*.json", ".*.tmp")
 class _Source:
     """A results folder that is, or will be, a site of a merged study.
 
-    ``protocol_hash`` is empty and ``pilot`` None where all participants withdrew; ``begun`` are the sessions' folders
-    by the SHA-256 of their journals' first lines. ``state`` is what changes when a file does, from before the reading.
+    ``protocol_hash`` is empty and ``pilot`` None if all participants withdrew; ``begun`` are the sessions' folders by
+    the SHA-256 of their journals' first lines. ``state`` changes if a file changes, and was read before its contents.
     """
 
     name: str
@@ -188,7 +188,7 @@ def _read_source(name: str, path: Path) -> _Source:
 
 
 def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
-    """Raise an error for sites of different protocols, or rehearsals or pilots mixed with participants."""
+    """Raise an error for sites with different protocols, or rehearsals or pilots mixed with participants."""
     first = next((source for source in sources if source.protocol_hash), sources[0])
     for other in sources:
         if other.study != first.study or other.protocol_hash not in ("", protocol_hash):
@@ -209,7 +209,7 @@ def _kind(source: _Source) -> str:
 
 
 def _check_sessions(sources: tuple[_Source, ...]) -> None:
-    """Raise an error for a session that is in two sites: it would count twice."""
+    """Raise an error for a session that is in two sites and would count twice."""
     seen: dict[str, Path] = {}
     for source in sources:
         for begun, path in source.begun.items():
@@ -249,7 +249,7 @@ def _create_merged(merged: Merged, sources: tuple[_Source, ...], progress: Repor
 
 
 def _add_sites(merged: Merged, sources: tuple[_Source, ...], progress: ReportProgress | None) -> None:
-    """Copy further sites into the folder; they count once they are listed."""
+    """Copy further sites into the folder; they take effect once they are listed."""
     place = merged.path / FOLDER
     remove_temporary_files(place)
     copies: list[Path] = []
@@ -312,6 +312,6 @@ def stray_entries(merged: Merged) -> tuple[Path, ...]:
 
 
 def _entries(folder: Path) -> list[Path]:
-    """Return what is in a folder, if it exists, without files of operating systems and sharing programs."""
+    """Return the entries of a folder, if it exists, without files of operating systems and sharing programs."""
     paths = sorted(folder.iterdir()) if folder.is_dir() else []
     return [path for path in paths if not is_system_file(Path(path.name))]

@@ -77,7 +77,7 @@ def _row_of(session: SessionFolder, key: Key | None) -> list[csv_files.Row]:
 
 
 def opened_or_none(folder: StudyFolder) -> Key | None:
-    """Return the study's key if it was opened and can be read, else None: a lost key must not hide sessions."""
+    """Return the study's key if it was opened and can be read, else None, so that a lost key does not hide sessions."""
     with contextlib.suppress(StoreError):
         return opened_key(folder)
     return None
@@ -104,7 +104,7 @@ def row_from(session: SessionFolder, contents: journal.Contents, key: Key | None
 
 
 def _damaged_row(session: SessionFolder, start: Mapping[str, Any]) -> csv_files.Row:
-    """Return the row of a session whose journal gives none, from its folder, first line and receipt."""
+    """Return the row of a session with a damaged journal, from its folder, first line and receipt."""
     if not start:
         with contextlib.suppress(StoreError):
             held = receipt.read(session.receipt)
@@ -170,8 +170,8 @@ def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Colu
 def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:
     """Return the description of ``study``, with the same bytes on every machine.
 
-    ``sealed`` says that no table has the sealed columns, except the group if it is pre-existing; ``protocol_format`` is
-    the format of the study's file, ``intervals`` whether it has blocks with a design.
+    With ``sealed`` no table has the sealed columns, except a pre-existing group; ``protocol_format`` is the format of
+    the study's file, ``intervals`` tells whether it has blocks with a design.
     """
     title = text_in(study.title, study.languages[0])
     hidden = {column.name for column in every_column(protocol_format, intervals=intervals) if sealed and column.sealed}
@@ -196,8 +196,8 @@ def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 
 def is_same_description(content: bytes, expected: bytes) -> bool:
     """Return whether two descriptions agree on the study and on all columns except `LATER`.
 
-    Earlier versions of the program lack columns, describe others in other words, and add a pattern of the cells, which
-    is no property of schema.org's PropertyValue; units and ranges are the same in all.
+    Earlier versions of the program lack columns, describe others differently, and add a pattern of the cells, which is
+    no property of schema.org's PropertyValue; units and ranges are the same in all.
     """
     try:
         description, wanted = parse_json(content), parse_json(expected)

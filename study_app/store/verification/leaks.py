@@ -81,9 +81,9 @@ def presented_numbers(protocol: Protocol) -> frozenset[float]:
 
 
 def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[float]:
-    """Return every level and comparison that the opened lines of a journal present: methods may choose any level.
+    """Return every level and comparison presented according to the opened lines of a journal.
 
-    Those that a participant set, step by step, are among them.
+    Methods may choose any level; levels that a participant set step by step are included.
     """
     numbers: set[float] = set()
     setting, place = None, 0
@@ -156,7 +156,7 @@ def _cells(content: str) -> Iterator[tuple[str, str]]:
 
 
 def _parsed(text: str, place: str) -> Iterator[tuple[str, str]]:
-    """Yield the texts in a JSON document with their places; any other text is yielded itself."""
+    """Yield the texts in a JSON document with their places, or a text itself if it is not JSON."""
     try:
         value = parse_json(text)
     except ValueError:
@@ -206,7 +206,7 @@ def _all_spelled(values: Iterable[float]) -> set[str]:
 
 
 def _spelled(value: float) -> Iterator[str]:
-    """Yield the notations of a number: as it is and, since it may be in milliseconds, in s, µs and ns."""
+    """Yield the notations of a number: unchanged and, since it may be in milliseconds, in s, µs and ns."""
     for scaled in (value, value / 1000, value * 1000, value * 1_000_000):
         yield repr(scaled)
         if float(scaled).is_integer():

@@ -30,7 +30,7 @@ _STORE: Final = ("liquid-study", "signing key of the lab")
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """A stored proof: its lines, with a text about who signed them and when they were time-stamped."""
+    """A stored proof: its lines, with a text about its signature and time stamp."""
 
     lines: Proofs
     told: tuple[str, ...] = ()

@@ -134,7 +134,7 @@ def _texts(stream: Mapping[str, Any]) -> list[str]:
 
 
 def _error_ms(session: SessionFolder, stream: Mapping[str, Any], at: Mapping[str, int]) -> float:
-    """Return the largest deviation of markers' stamps from the journal's times, less each start's median [ms]."""
+    """Return the largest deviation of marker stamps from journal times, minus the median of each start [ms]."""
     parts: list[list[float]] = [[]]
     for line in journal.read(session.journal):
         marker = marker_of(line.event, line.t_s, 0, line.fields())

@@ -98,7 +98,7 @@ def _compare_levels(
 
 
 class _Compared:
-    """Compares trials of intervals in order; ``trials`` has by block and number whether they agree."""
+    """Compares trials of intervals in order; ``trials`` maps block and number to whether they agree."""
 
     def __init__(self, protocol: Protocol, key: Key, schedule: Schedule) -> None:
         self.differences: list[str] = []
@@ -174,9 +174,9 @@ class _Compared:
 
 
 def recorded_trials(lines: Iterable[events.Event]) -> tuple[RecordedTrial | int, ...]:
-    """Return every attempt at a trial in the lines of a journal, in order of time.
+    """Return every attempt at a trial in a journal's lines in chronological order.
 
-    A trial that was passed over is its number alone. KeyError says that a line answers a trial that never started.
+    A skipped trial is only its number. KeyError is raised if a line answers a trial that never started.
     """
     attempts: list[RecordedTrial | int] = []
     place: dict[tuple[int, int], tuple[int, RecordedTrial]] = {}

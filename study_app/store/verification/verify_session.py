@@ -48,7 +48,7 @@ _COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify -
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A problem and its path in the study folder; ``shares`` says that it matters for sharing only."""
+    """A problem and its path in the study folder; ``shares`` limits it to sharing."""
 
     place: str
     message: str
@@ -62,7 +62,7 @@ class Finding:
 class Findings:
     """The problems in a study's ``folder``, with its number of sessions and the ``plug_ins`` named in receipts.
 
-    ``errors`` are about files that cannot be trusted, ``warnings`` about other facts to know.
+    ``errors`` are about files that cannot be trusted, ``warnings`` about other facts.
     """
 
     folder: Path
@@ -111,9 +111,9 @@ class Findings:
 class CheckedSession:
     """The data of one session with which the study's own files are compared.
 
-    ``row`` is its row of the participants table: None where it has not begun, or its journal cannot be read
-    (``readable`` is False). ``running`` says that a program has it open, ``chained`` that its journal's lines tell what
-    was before them. ``trials`` are their numbers. ``fingerprint`` is that of a session whose journal has its end.
+    ``row`` is its row of the participants table: None if it has not begun, or its journal cannot be read (``readable``
+    is False). ``running`` means that a program has it open, ``chained`` that each line of its journal has the hash of
+    the previous ones. ``trials`` are their numbers. ``fingerprint`` is that of a session whose journal has its end.
     """
 
     place: Place
@@ -128,7 +128,7 @@ class CheckedSession:
 def check_session(place: Place, key: Key | None, findings: Findings, *, recordings: bool = True) -> CheckedSession:
     """Check one session; repeat the check if there are errors and a program has opened it in the meantime.
 
-    Without ``recordings`` these are not read, which takes a while.
+    Without ``recordings`` these are not read, which would take a while.
     """
     errors = Findings(findings.folder)
     checked = CheckedSession(place=place, running=is_open(place.folder.path))
@@ -411,7 +411,7 @@ def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *
 
 
 def _sealed_tables(place: Place, lines: Sequence[events.Event]) -> dict[Path, bytes]:
-    """Return the tables of a session that `unblind` opens, as they were before; empty while the key is sealed."""
+    """Return a session's tables as they were before `unblind`; empty while the key is sealed."""
     if opened_or_none(place.study_folder) is None or not events.start_of(lines).measures_sealed:
         return {}
     return dict(table_files(place, lines, None))
@@ -422,8 +422,8 @@ def check_table(
 ) -> None:
     """Compare a table with the one made from the journals, and its cells with the column dictionary.
 
-    ``may_differ`` says of a line's number whether it is of a session that has not ended, whose tables follow its
-    journal with the next page or when it is rebuilt: a difference there is only a warning.
+    ``may_differ`` tells for a line number whether its session has not ended, so that its tables are updated with the
+    next page or when it is rebuilt: a difference there is only a warning.
     """
     try:
         content = read_regular(path)
@@ -597,10 +597,9 @@ class Discrepancy:
 def session_discrepancies(place: Place) -> tuple[Discrepancy, ...]:
     """Return the discrepancies of a session's journal, receipt, tables and checksums.
 
-    Once the session has ended they are compared with their checksums: files that keep these are as they were when the
-    tables were made from the journal. Where one does not, the session is checked as by `check_session`, and the first
-    error of each file is returned, or of the journal alone. A session that is open in a program is not judged: its
-    tables follow.
+    After the session's end its files are compared with their checksums, which were made when the tables agreed with the
+    journal. If any differs, the session is checked by `check_session`, and the first error of each file is returned, or
+    only that of the journal. A session that is open in a program is not judged, since its tables are still updated.
     """
     folder = place.folder
     if is_open(folder.path):

@@ -167,7 +167,7 @@ def _check_contents(study: StudyFolder, findings: Findings) -> None:
 def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], findings: Findings) -> None:
     """Check that every participant with a session has one unchanged entry, the one in the journals.
 
-    Those of the participants who have ``withdrawn`` stay used.
+    Entries of participants who have ``withdrawn`` remain used.
     """
     if key is None:
         return
@@ -233,8 +233,8 @@ def _check_withdrawals(study: StudyFolder, findings: Findings) -> tuple[dict[str
 def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findings: Findings) -> None:
     """Check the participants table if the journals of all sessions could be read.
 
-    Lines of sessions that have not ended may be behind their journals. The table is not judged where a program writes
-    it when it ends: it has the study open, or has had a session open since the check began.
+    Lines of sessions that have not ended may be behind their journals. The table is not judged if a program has the
+    study open or has had a session open since the check began, because it updates the table at its end.
     """
     if is_open(study.path) or not all(session.readable for session in sessions):
         return
@@ -258,8 +258,8 @@ def _check_fingerprints(
 ) -> None:
     """Compare the sessions with the study's own list, read before they were checked.
 
-    A program lists a session once its files are final, just before it lets go of it: a listed one is judged even where
-    it is open.
+    A program lists a session once its files are final, just before closing it: a listed session is judged even while it
+    is open.
     """
     path = study.fingerprints
     for number in unreadable_lines(path):
@@ -422,7 +422,7 @@ def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> N
 
 
 def _check_blinding(study: StudyFolder, key: Key | None, findings: Findings) -> None:
-    """Report where a condition is revealed although the key is sealed, without naming it."""
+    """Report files that reveal a condition although the key is sealed, without naming it."""
     published = next(_published_protocols(study), None)
     if key is None or blinding.reveals(study.path) or published is None:
         return
