@@ -12,11 +12,11 @@ from study_app.protocol.trials.tasks import AnyTask
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Progress:
-    """The progress shown: part ``part`` of ``parts``, and in it setting ``index`` of ``of`` with a neutral label.
+    """The progress shown: part ``part`` of ``parts``, and setting ``index`` of ``of`` in it, with a neutral label.
 
-    ``part`` is None outside the parts, as in a practice; a page to read has no label, but for a break among trials of
-    intervals, and the settings before ``index`` are done, all of them where it is ``of + 1``. ``at_most`` says that the
-    block may end before ``of``.
+    ``part`` is None outside the parts, as in practice. A text page has no label, except for a break among trials of
+    intervals; the settings before ``index`` are done, and all of them if it is ``of + 1``. With ``at_most`` the block
+    may end before ``of``.
     """
 
     part: int | None
@@ -29,7 +29,7 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Interval:
-    """The interval of a trial that is presented, or follows the rest: ``number`` (from 1) of ``of``.
+    """The current or next interval of a trial: ``number`` (from 1) of ``of``.
 
     ``announced`` is its name or, in the rest, the announcement of the interval or of a repeated trial.
     """
@@ -42,13 +42,12 @@ class Interval:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TaskPage:
-    """The page of the tank, in which the ball is moved. It reveals nothing of the condition, not even the delay.
+    """The page with the tank, in which the ball is moved. It reveals nothing about the condition, not even the delay.
 
-    ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's middle; ``interval`` is None
-    in a trial without a design. ``question`` is what the participant sets an interval to, "" where nothing is set;
-    ``adjusts`` says that this interval is the one, so that the question stands in place of the instruction. ``video``
-    is whether a video is seen and not the drawn tank, ``overlay`` whether ball and targets are drawn over it; never
-    printed.
+    ``workspace_m`` holds the full sizes of the tank along x, y, z, centred on the device's centre; ``interval`` is None
+    in a trial without a design. ``question`` is the instruction for an adjustment, "" if there is none; ``adjusts``
+    means that this interval is adjusted, so that the question replaces the instruction. ``video`` tells whether a video
+    replaces the drawn tank, ``overlay`` whether ball and targets are drawn over it; never printed.
     """
 
     trial: int
@@ -73,9 +72,9 @@ class TaskPage:
 class TextPage:
     """A text with a button to continue: consent, instructions, announcements, breaks, the debrief.
 
-    ``language`` is the one all pages are in from here on; ``languages`` are those that may be chosen instead, with it
-    among them, none where there is no choice. ``stays_until_s`` is when the page may be left at the earliest [s,
-    session's clock], None at once. ``coming`` is the next task, so that it can be made ready while one reads.
+    ``language`` is the language of all pages from here on; ``languages`` are those that can be chosen, including it,
+    empty without a choice. ``stays_until_s`` is the earliest time at which the page can be left [s, session's clock],
+    None at once. ``coming`` is the next task, which can be prepared in the meantime.
     """
 
     id: str
@@ -94,9 +93,9 @@ class TextPage:
 class QuestionnairePage:
     """The questions about one setting, or a separate form.
 
-    Where all are statements, ``labels`` name the points of their scale, lowest first; otherwise there are none.
-    ``chosen`` holds (item id, value) of the choices already made, when the page comes back after a pause. ``trial`` is
-    None where the page is a ``form``, which is its name, asked for the ``time``-th time.
+    If all are statements, ``labels`` name the points of their scale, lowest first; otherwise it is empty. ``chosen``
+    holds (item id, value) of earlier choices if the page is shown again after a pause. ``trial`` is None if the page is
+    a ``form``, which is its name, asked for the ``time``-th time.
     """
 
     trial: int | None
@@ -130,7 +129,7 @@ class DesignPage:
 
     @property
     def items(self) -> tuple[ItemView, ...]:
-        """The question."""
+        """The question as a tuple."""
         return (self.item,)
 
     @property
@@ -162,10 +161,10 @@ class FeedbackPage:
 
 @dataclass(frozen=True, slots=True)
 class PausePage:
-    """The page of a pause; ``force_off`` says that the force was stopped and fades in only on request.
+    """The page of a pause; ``force_off`` means that the force was stopped and fades in only on request.
 
-    ``held`` says what only the operator resumes, a pause or the force; then there is nothing to press. ``coming`` is
-    the task that may come after it, so that it can be made ready.
+    ``held`` means that only the operator can resume; then there is no button. ``coming`` is the task that may follow,
+    so that it can be prepared.
     """
 
     force_off: bool

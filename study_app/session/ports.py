@@ -64,9 +64,8 @@ class Ports:
     """The side effects of a session: ``present`` shows a page, ``clock`` gives seconds since the session's origin.
 
     ``recorder`` is None in a session without recordings. Without ``paints`` there is no window: the first frame of a
-    trial is reported, and a later one need not come. ``settled`` says whether all recordings are on the disk, so that
-    the session's end waits for none: until then it is put off. ``video`` gives the source of a condition's view, None
-    where videos are not shown.
+    trial is reported, and later ones are optional. ``settled`` tells whether all recordings are on the disk; until then
+    the session's end is postponed. ``video`` returns the source of a condition's view, None if videos are not shown.
     """
 
     servo: ServoPort

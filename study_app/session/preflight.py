@@ -74,7 +74,7 @@ class PredictedDelivery:
     """The predicted loss of main trials because the safety layer withholds too much force.
 
     ``missing`` of the ``asked`` trials of intervals would not be delivered, ``out`` of the ``judged`` other trials
-    would be out of limits. The limit on the force withheld is ``limit_percent`` [%].
+    would violate limits. The limit on the force withheld is ``limit_percent`` [%].
     """
 
     missing: int
@@ -96,19 +96,19 @@ class PredictedDelivery:
 class Measurements:
     """The measurements before a session.
 
-    ``fresh_share`` is the share of the servo's ticks in which the device had a new sample, ``sample_age_s`` how old the
-    newest sample was when somebody looked (95th percentile). ``probe_s`` is how long a file took to be on the disk of
-    the results, None where it could not be written for the reason ``probe_fault``; ``free_bytes`` None where unknown.
-    ``tick_s`` is the time of a tick with the most expensive scene of the study, None if not measured; ``key_hash`` that
-    of the study's sealed key, None before its first session. ``lateness_ns`` (n,) is that of every tick [ns], ``grant``
-    what the system lets the servo's thread do. ``dynamics`` are the device's, with its measured delay, ``delay_ticks``
-    is the delay that the servo uses now. ``withheld`` is the share of the force that limits and passivity controller
-    are expected to withhold in the fastest stroke of a task, by liquid; None where it was not computed. ``delivery`` is
-    what a simulated participant would lose, None where it was not computed. ``velocity_errors`` are the relative error
-    of the velocity and what it would be if all of the device's dynamics were known; None where all is. ``outlets`` are
-    the streams and ports to other programs; ``video`` is the state of the study's videos, None without any.
-    ``ran_otherwise`` is a participant with whom the same version of the study ran from another file; ``untranslated``
-    are texts of the pages that are still in another language.
+    ``fresh_share`` is the share of the servo's ticks in which the device had a new sample, ``sample_age_s`` the age of
+    the newest sample when read (95th percentile). ``probe_s`` is the time to write a file to the disk of the results,
+    None if that failed for the reason ``probe_fault``; ``free_bytes`` is None if unknown. ``tick_s`` is the time of a
+    tick with the most expensive scene of the study, None if not measured; ``key_hash`` that of the study's sealed key,
+    None before its first session. ``lateness_ns`` (n,) is the lateness of every tick [ns], ``grant`` the priority that
+    the system grants the servo's thread. ``dynamics`` are the device's, with its measured delay, ``delay_ticks`` is the
+    delay that the servo uses now. ``withheld`` is the share of the force that limits and passivity controller are
+    expected to withhold in the fastest stroke of a task, by liquid; None if it was not computed. ``delivery`` is the
+    predicted loss of a simulated participant, None if it was not computed. ``velocity_errors`` are the relative error
+    of the velocity and its value for fully known device dynamics; None if all are known. ``outlets`` are the streams
+    and ports to other programs; ``video`` is the state of the study's videos, None without any. ``ran_otherwise`` is a
+    participant whose session used the same version of the study from a different file; ``untranslated`` are texts of
+    the pages that are still in another language.
     """
 
     device: str
@@ -140,8 +140,8 @@ class Measurements:
 class Check:
     """One result of the pre-flight: the verdict, the value, and an explanation.
 
-    ``share`` is the measured value as a share of its limit, None without a limit. ``advice`` says in a sentence what to
-    do, or, for a failure, why no session can begin.
+    ``share`` is the measured value as a share of its limit, None without a limit. ``advice`` is a sentence with the
+    remedy or, for a failure, the reason why no session can begin.
     """
 
     name: str

@@ -62,7 +62,7 @@ def _scene_presented(
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A step of a setting: the number of its scene in telemetry, and the scene."""
+    """One step of an adjustment: the number of its scene in telemetry, and the scene."""
 
     serial: int
     scene: Scene
@@ -327,8 +327,8 @@ def _copy_forces(known: Any, out: Any) -> None:
 def _set_safety_state(safety: Any, out: Any) -> None:
     """Set the state of the safety layer to the first of the samples ``out``, which is recorded exactly.
 
-    Of a running fade only its length matters, since no force is felt before the trial's own scene, which restarts the
-    fade. The start's fade is over where a later sample before the next scene shows no fade.
+    Only the length of a running fade matters, since no force is felt before the trial's own scene, which restarts the
+    fade. The start's fade has ended if a later sample before the next scene shows no fade.
     """
     other = np.flatnonzero(out.scene != out.scene[0])
     lead = out[: other[0]] if other.size else out[:1]
@@ -349,7 +349,7 @@ def _run_steps(
     steps: Sequence[tuple[int, Scene]],
     device: _Device,
 ) -> None:
-    """Run the models over ``out`` from ``first`` on, changing the scene's numbers at each step."""
+    """Run the models over ``out`` from ``first`` onwards, changing the scene's parameters at each step."""
     for place, scene in steps:
         recompute_scenes(*models, *serials, safety, out[:place], first)
         adjust_into(models[-1], scene, dynamics=device.dynamics, rules=device.rules)
@@ -399,7 +399,7 @@ def _differing_sums(checks: recordings.Checks, again: Any) -> dict[str, list[int
 def _differing_columns(checks: recordings.Checks, samples: Any, again: Any) -> dict[str, list[int]]:
     """Return, for each column, the seconds in which recorded and recomputed values differ by more than rounding.
 
-    Of the samples before the trial's own scene nothing but the forces is known.
+    For the samples before the trial's own scene only the forces are known.
     """
     seconds_of = {}
     own = samples.scene == samples.scene[-1]
@@ -432,8 +432,8 @@ def _recorded_presentations(
 ) -> Iterator[tuple[events.TrialStarted, events.Which, events.Recorded | events.RecordingLost | None, str | None]]:
     """Yield the start of each trial or interval with an expected recording, its numbers, and the recording's event.
 
-    In the order of presentation, each with the time at which the session had been resumed, or its device connected
-    again, last; None before that.
+    They are in order of presentation, each with the time at which the session was last resumed or its device
+    reconnected; None before that.
     """
     ends = {line.which: line for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     if not lines or not events.start_of(lines).recordings:

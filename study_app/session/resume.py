@@ -47,10 +47,10 @@ def resume_at(
     The levels of answered trials are those of the journal, opened with the study's ``key``; without it `Start.heard` is
     empty.
 
-    A trial whose answers are not all confirmed is presented again as its next attempt, so that no answer is about what
-    was felt before the gap; a completed trial without questions is over. With ``resume = "block"`` the whole block is
-    presented again, unless the session continues ``exactly`` at the interrupted step. SessionError says that the
-    journal is not of this schedule.
+    A trial with unconfirmed answers is presented again as its next attempt, so that no answer refers to a percept
+    before the gap; a completed trial without questions is over. With ``resume = "block"`` the whole block is presented
+    again, unless the session continues ``exactly`` at the interrupted step. SessionError is raised if the journal does
+    not fit this schedule.
     """
     lines = list(lines)
     progress = progress_of(lines)
@@ -87,10 +87,10 @@ def source_to_resume(session_folder: Path, name: str) -> bytes:
 def find_protocol(
     start: SessionStarted, candidates: Iterable[str] | None = None, read: Callable[[str], bytes] = source_bytes
 ) -> str:
-    """Return the file or name of the protocol that a session began with, from its journal's first line.
+    """Return the file or name of the protocol of a session, from its journal's first line.
 
-    It is looked for among ``candidates``, by default those in the workspace, those that ship, and recent ones; ``read``
-    returns the bytes of one. SessionError says that none is of that study.
+    It is searched for among ``candidates``, by default the protocols in the workspace, shipped ones, and recent ones;
+    ``read`` returns the content of one. SessionError is raised if none of them belongs to that study.
     """
     names = dict.fromkeys((*known_protocols(), *recent_protocols()) if candidates is None else candidates)
     sources: dict[str, bytes] = {}

@@ -84,7 +84,7 @@ class Runner:
 
     @property
     def ending(self) -> bool:
-        """Whether the session's end waits until its recordings are on the disk."""
+        """Whether the session's end is waiting for its recordings to be on the disk."""
         return self._ending is not None
 
     @property

@@ -52,11 +52,11 @@ _PLAYED_MEASURED_S = 0.5  # the same before a session played from the designer [
 class NewSession:
     """The choices of the operator; ``results`` is the study's folder, ``screen`` counts from 1 (None: the last).
 
-    ``resumes`` is the folder of the session to resume, None for a new one; ``device_options`` are the values
-    of the device's options, by name. ``row_of`` is the id of the participant who is replaced, ``group`` the
-    participant's pre-existing group; None: no one, or as in the participant's first session.
-    ``played`` says that it is played from the designer: exactly from where it was left, without an operator's window.
-    ``footage`` is the folder of the study's footage, None: that of its file.
+    ``resumes`` is the folder of the session to resume, None for a new one; ``device_options`` are the values of the
+    device's options, by name. ``row_of`` is the id of the replaced participant, ``group`` the participant's
+    pre-existing group; None: none, or as in the participant's first session. ``played`` means that it is played from
+    the designer: it continues exactly at the interrupted step and has no operator's window. ``footage`` is the folder
+    of the study's footage, None: that of its file.
     """
 
     source: str

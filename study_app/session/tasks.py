@@ -30,9 +30,9 @@ _NS = 1_000_000_000
 class TaskView:
     """The view of a task at one time.
 
-    ``lit`` is the index of the lit target or None, ``reached`` how many were reached and ``of`` how many there are to
-    reach (None where time ends the task), ``dwell`` the closed share of the ring in 0 … 1, ``elapsed_s`` the time since
-    the task began. ``target_m`` is where a moving target is [m, hand frame]; None where targets stand still.
+    ``lit`` is the index of the lit target or None, ``reached`` the number of reached targets out of ``of`` (None if
+    time ends the task), ``dwell`` the closed fraction of the ring, 0 … 1, ``elapsed_s`` the time since the task began.
+    ``target_m`` is the position of a moving target [m, hand frame]; None for static targets.
     """
 
     lit: int | None
@@ -47,7 +47,7 @@ class TaskView:
 class TankView:
     """The view of the tank: the proxy's position (3,) [m, hand frame], the task, and the time of both [ns].
 
-    ``ball_hidden`` is whether the proxy is not drawn; ``video`` is the frame of a video behind it, None without one.
+    With ``ball_hidden`` the proxy is not drawn; ``video`` is the frame of a video behind it, None without one.
     """
 
     position_m: NDArray[np.float64]
@@ -66,7 +66,7 @@ class TargetReached:
 
 
 class Tracker:
-    """Track one task through the samples of its trial; `new_tracker` makes the right tracker.
+    """Tracks one task through the samples of its trial; `new_tracker` chooses the subclass.
 
     ``outcome`` and ``end_ns`` (time of the sample that ended the task) are None while the task runs.
     """
@@ -101,7 +101,7 @@ class Tracker:
         return reached
 
     def leave(self) -> bool:
-        """End the task at the participant's request; return whether it may end already."""
+        """End the task at the participant's request if that is allowed; return whether it was."""
         return False
 
     def finish(self, least_s: float) -> bool:
@@ -158,7 +158,7 @@ class TimedTracker(Tracker):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Mark:
-    """The state from one time on: number of targets reached, the lit one, and when the proxy entered it [ns]."""
+    """The state from one time onwards: number of targets reached, the lit one, and when the proxy entered it [ns]."""
 
     reached: int
     lit: int | None

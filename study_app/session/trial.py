@@ -38,7 +38,7 @@ _FROZEN_S = 1.0
 
 
 class Recording:
-    """Pass samples and frames of trials to the recorder; without a recorder do nothing."""
+    """Passes samples and frames of trials to the recorder; without a recorder it does nothing."""
 
     def __init__(self, recorder: RecorderPort | None, rate_hz: float) -> None:
         self._recorder = recorder
@@ -255,7 +255,7 @@ class RunningTrial:
         return None if scene is None else self._servo.adjust(scene)
 
     def leave(self) -> None:
-        """End the task because the participant wants to go on, if it may end so already."""
+        """End the task at the participant's request, if that is allowed."""
         if self.command.adjusts:
             self._tracker.finish(self.command.task.judged_from_s + _LEAST_SET_S)
         else:

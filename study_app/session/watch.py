@@ -59,8 +59,8 @@ class Watched:
     """A recorded trial, or one of its ``intervals`` (0: it has none); times are since its task began [s].
 
     ``presented`` is the condition or the interval's contents, "" while the study is ``blinded``: then forces and delay
-    are not shown either. ``samples`` (n,), at ``times_s``, have positions that are believed. Frames were painted at
-    ``painted_s`` (k,) and showed the hand of ``shown_s`` (k,); ``lacking`` says why they cannot be read, if so.
+    are hidden, too. ``samples`` (n,), at ``times_s``, have valid positions. Frames were painted at ``painted_s`` (k,)
+    and showed the hand at ``shown_s`` (k,); ``lacking`` is the reason if they cannot be read.
     """
 
     page: TaskPage
@@ -219,7 +219,7 @@ def _marks(own: Sequence[events.Event], begun: events.Event, ended: Any, until_s
 
 
 def _target_marks(ended: events.EndOfTask | None, task: Task) -> Iterator[Mark]:
-    """Yield the marks of targets whose times were sealed until the study was unblinded; they light up in turn."""
+    """Yield the marks of targets whose times were sealed until unblinding, in the order in which they lit up."""
     for number, at_s in enumerate((ended.reached_s if ended is not None else None) or ()):
         yield Mark(at_s, "target", f"target {number % len(task.targets_m) + 1} reached")
 

@@ -304,7 +304,7 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
 
 @dataclass
 class _Lines:
-    """A store that keeps the lines before a given step."""
+    """A store that keeps only the lines before a given step."""
 
     kept: list[tuple[Line, float]] = field(default_factory=list)
     reason: str = ""

@@ -55,7 +55,7 @@ _SAMPLE = np.dtype([("time_ns", np.int64), ("position_m", np.float64, 3)])
 class SensedTrial:
     """The forces felt and frames seen in one trial; ``scale`` is scene metres per hand metre.
 
-    ``period_s`` is the time between two ticks [s] in studies that delay the force, else None.
+    ``period_s`` is the time between two ticks [s] in studies with a delayed force, else None.
     """
 
     scale: float
@@ -66,7 +66,7 @@ class SensedTrial:
     ages_s: list[float] = field(default_factory=list)
 
     def feel(self, samples: Any) -> None:
-        """Add samples felt by the hand (recarray of ``layout.SAMPLE``), if there was a liquid."""
+        """Add samples felt by the hand (recarray of ``layout.SAMPLE``) if a liquid was present."""
         wet = samples[samples["scene"] != 0]
         self.forces_n.append(wet["device_force_n"])
         self.velocities_mps.append(wet["velocity_mps"])
@@ -122,7 +122,7 @@ def exploration(draw: Draw, half_m: tuple[float, float, float], duration_s: floa
 
 
 def _strokes(along: int, aside: int, sides: tuple[int, ...]) -> _Figure:
-    """Return a figure that moves to and fro along one axis at random positions on another."""
+    """Return a figure that moves back and forth along one axis at random positions on another."""
 
     def figure(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
         ends_m = np.zeros((len(sides), 3))
@@ -143,7 +143,7 @@ def _zigzag(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
 
 
 def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
-    """Return the path of stirring: three circles about the middle, begun and ended at full speed."""
+    """Return a stirring path: three circles about the centre, at full speed from beginning to end."""
     radius_m = min(reach_m[0], reach_m[2]) * _draw_between(draw, 0.6, 1.0)
     pace_mps = _draw_between(draw, *_PACE_MPS)
     first = np.array([radius_m, 0.0, 0.0])
@@ -159,7 +159,7 @@ def _circles(draw: Draw, reach_m: Floats, start_m: Floats) -> list[Floats]:
 
 
 def _path_through(draw: Draw, start_m: Floats, places_m: list[Floats]) -> list[Floats]:
-    """Return the path through places, each stroke with its own speed."""
+    """Return the path through positions, each stroke with its own speed."""
     return [
         _stroke(begin, end, _draw_between(draw, *_PACE_MPS))
         for begin, end in zip([start_m, *places_m[:-1]], places_m, strict=True)
@@ -292,7 +292,8 @@ def _target_path(task: Task, times_s: Floats) -> Floats:
 def rest_hand(task: Task, device: HandOrders) -> None:
     """Move a simulated hand after a task to the start of the next interval: a fixed position, or the middle.
 
-    A hand that stayed would jump there as the next trial begins, which asks for forces that no person feels.
+    Otherwise it ``returns`` to the centre, where an exploration begins, or it stays and jumps there when the next trial
+    begins, which causes forces that a person would not feel.
     """
     if task.start_m is not None:
         device.reach_to(*task.start_m)
@@ -302,7 +303,7 @@ def rest_hand(task: Task, device: HandOrders) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """``value`` for ``item``, ``after_s`` after the choice before."""
+    """The choice of ``value`` for ``item``, ``after_s`` after the previous choice."""
 
     item: str
     value: Value

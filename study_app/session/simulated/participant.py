@@ -31,7 +31,7 @@ _MOST_LOOKS: Final = 60
 class AdjustingObserver:
     """An observer that perceives standard and adjusted level with noise and adjusts until the two cross.
 
-    The noise of a setting is drawn once, so that settings scatter as the difference of two single impressions does.
+    The noise of a setting is drawn once, so that settings vary like the difference of two single percepts.
     """
 
     def __init__(self, attended: Comparison, draw: Draw) -> None:
@@ -136,7 +136,7 @@ class SimulatedParticipant(ABC):
         self._post(Submitted(self._seconds()))
 
     def _answers_to(self, page: QuestionnairePage | DesignPage) -> list[Choice]:
-        """Return how a page is answered by what was felt."""
+        """Return the choices that answer a page, according to the percept."""
         draw, trial = self._stream(page.stream), page.trial
         block = None if trial is None else self._study.blocks[self._trials[trial].block]
         if trial is not None and block is not None and block.design is not None:
@@ -150,7 +150,7 @@ class SimulatedParticipant(ABC):
         return fill_in_page(page, self._features_felt(trial), self._person, draw)
 
     def _design_answer(self, block: Block, trial: int, draw: Draw) -> str | int | float:
-        """Return the answer to a trial of a block with a design; earlier ones of a resumed session are given again."""
+        """Return the answer to a trial with a design; a resumed session repeats its earlier answers."""
         sensed, design = self._sensed_magnitudes(block), design_of(self._study, block)
         before: list[float] = []
         last: str | int | float | None = None
@@ -168,7 +168,6 @@ class SimulatedParticipant(ABC):
     def _notice_questions(
         self, page: QuestionnairePage | DesignPage, answers: Mapping[str, Value], seen: Collection[str]
     ) -> tuple[str, ...]:
-        """Notice the questions that appeared; return them."""
         appeared = newly_shown_questions(page, answers, seen)
         for item in appeared:
             self._post(ItemShown(self._seconds(), item))

@@ -115,7 +115,7 @@ def _withheld_shares(
 
 
 class _FailingScenes:
-    """Cached fractions of simulated motions that break the limit, by scene and task."""
+    """Cached fractions of simulated motions that violate the limit, by scene and task."""
 
     def __init__(self, protocol: Protocol, rig: Rig) -> None:
         self._protocol, self._rig = protocol, rig
@@ -132,7 +132,7 @@ class _FailingScenes:
 
 
 def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> float:
-    """Return the probability that a trial of a block is missing or, without intervals, out of limits."""
+    """Return the probability that a trial of a block is missing or, without intervals, violates limits."""
 
     def failing(scene: Scene) -> float:
         return scenes.share(scene, block.task)

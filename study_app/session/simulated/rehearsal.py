@@ -106,9 +106,9 @@ REHEARSED_PEOPLE: Final = 4
 
 @dataclass(frozen=True, slots=True)
 class Question:
-    """The page of a question, and the features of each interval of its trial: none for a separate form.
+    """The page of a question, and the features of each interval of its trial; empty for a separate form.
 
-    For a setting the page is its task, and the last features are those of the set level since the last steps.
+    For an adjustment the page is its task, and the last features are those of the current level since the last steps.
     """
 
     page: QuestionnairePage | DesignPage | TaskPage
@@ -130,10 +130,10 @@ def _plain_answer(value: Any) -> Any:
 
 
 class _HeldSignals:
-    """Hold signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
+    """Hold back signals that end the program, such as Ctrl+C, until `obey`, which a session calls between its writes.
 
-    An exception in the midst of a write could leave a line that the journal does not count. A second signal ends the
-    program at once. Only the main thread gets signals; elsewhere nothing is held.
+    An exception during a write could leave a line that the journal does not count. A second signal ends the program at
+    once. Only the main thread receives signals; in other threads this has no effect.
     """
 
     def __init__(self) -> None:
@@ -154,7 +154,7 @@ class _HeldSignals:
             self.obey()
 
     def obey(self) -> None:
-        """Act on a held signal."""
+        """Act on a signal that was held back."""
         if self._came is None:
             return
         number, self._came = self._came, None
@@ -305,7 +305,7 @@ class RehearsedSession(SimulatedParticipant):
         self.page = page
 
     def _wait(self, seconds: float) -> None:
-        """Let time pass while nothing is done."""
+        """Let time pass without any action."""
         end_s = self._now_s() + seconds
         page = self.page
         while self._now_s() < end_s and page is self.page:
@@ -320,7 +320,7 @@ class RehearsedSession(SimulatedParticipant):
             raise SessionError("another program stopped the rehearsal")
 
     def _perform_task(self, page: TaskPage) -> None:
-        """Perform a task until its page is left, with every frame seen and every tick felt."""
+        """Perform a task until its page is left, observing every frame and every tick."""
         interval = page.interval
         named = str(page.trial) if interval is None else f"{page.trial}/{interval.number}"
         arm, draw = self._hand, self._stream(f"{named}/behaviour")
@@ -458,7 +458,7 @@ def condition_features(
 
 
 def _presented_conditions(protocol: Protocol, key: LevelKey, schedule: Schedule, trial: Trial) -> tuple[Where, ...]:
-    """Return block and condition of each interval of a trial, none if it is passed over for any answers."""
+    """Return block and condition of each interval of a trial, empty if it is skipped for all possible answers."""
     if protocol.blocks[trial.block].design is None:
         return ((trial.block, key.codes[trial.block][trial.code]),)
     due = next_level(protocol, key, schedule, trial, ())
@@ -545,7 +545,7 @@ def finish_session(
     results: Path,
     progress: Callable[[str], object] | None = None,
 ) -> None:
-    """Complete a participant's first session: begin it, or resume what an earlier call or killed program left.
+    """Complete a participant's first session: begin it, or resume it after an interruption.
 
     An interrupted session is resumed with its own seed and device. Finished sessions are not changed, and none is begun
     for a withdrawn participant.
@@ -682,7 +682,7 @@ def open_session(
 
 @contextmanager
 def _updated_tables(store: SessionStore) -> Iterator[None]:
-    """Update the tables of a session that is left before its end."""
+    """Update the tables of a session that is left unfinished."""
     try:
         yield
     finally:

@@ -34,12 +34,12 @@ class ShowPage(Command):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StartTrial(Command):
-    """Prepare a trial, or one of its intervals: what is ``presented`` is loaded with its tank's first painted frame.
+    """Prepare a trial or one of its intervals: ``presented`` is loaded with the tank's first painted frame.
 
-    The tank stays for ``linger_s`` after the task, so that its end is seen. That goes by the longest delay of the
-    block, the same for all its trials: neither the participant nor any time on the disk can tell the delay from it.
-    ``interval`` counts from 1, None in a trial without a design; with ``adjusts`` the participant sets what it
-    presents, and ends it. What is presented and delays are never printed.
+    The tank remains visible for ``linger_s`` after the task, so that its end is seen. This is the longest delay of the
+    block, equal for all its trials, so that neither the participant nor any time on the disk reveals the delay.
+    ``interval`` counts from 1, None in a trial without a design; with ``adjusts`` the participant sets its level and
+    ends it. Contents and delays are never printed.
     """
 
     trial: int
@@ -56,7 +56,7 @@ class StartTrial(Command):
 class Adjust(Command):
     """Change the varied number within the current interval, and write the event of its steps.
 
-    The force continues from its value; the event has the scene's new number in recordings.
+    The force continues from its value; the event contains the scene's new number in recordings.
     """
 
     presented: Stimulated = field(repr=False)
@@ -66,7 +66,7 @@ class Adjust(Command):
 
 @dataclass(frozen=True, slots=True)
 class LeaveTask(Command):
-    """End the task at the participant's request, if it may end already."""
+    """End the task at the participant's request, if that is allowed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,14 +122,14 @@ class Finish(Command):
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """An event at ``at_s``."""
+    """An event at time ``at_s``."""
 
     at_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class Begin(Event):
-    """All devices and files are open; show the first page."""
+    """Start with the first page; all devices and files are open."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,7 +148,7 @@ class LanguageChosen(Event):
 class TaskDone(Event):
     """The task of the running trial is over; ``summary`` has the columns of its row (see ``store.columns``).
 
-    ``invalid`` names the limits that an interval breaks, so that it was not delivered as requested.
+    ``invalid`` names the limits that an interval violated, so that it was not delivered as requested.
     """
 
     outcome: Literal["complete", "timeout"]
@@ -204,7 +204,7 @@ class PauseRequested(Event):
 
 @dataclass(frozen=True, slots=True)
 class ResumeRequested(Event):
-    """The pause ends; an interrupted trial starts again. Only the operator ends what a person stopped."""
+    """The end of a pause; an interrupted trial starts again. Only the operator ends a pause by a person."""
 
     by: Literal["participant", "operator"]
 
@@ -226,7 +226,7 @@ class Note(Event):
 
 @dataclass(frozen=True, slots=True)
 class RepeatRequested(Event):
-    """The operator wants the running trial again, with a reason."""
+    """The operator requests to repeat the running trial, with a reason."""
 
     reason: str
 
@@ -259,7 +259,7 @@ class Reconnected(Event):
 
 @dataclass(frozen=True, slots=True)
 class WriteFailed(Event):
-    """Writing failed, for a reason; the failed command and those after it, of time ``at_s``, are ``left``."""
+    """Writing failed for a reason; ``left`` are the failed command and the later ones, of time ``at_s``."""
 
     reason: str
     left: tuple[Command, ...]

@@ -298,14 +298,14 @@ def recover_from_stall(state: SessionState, event: WriteCompleted) -> Result:
 
 
 def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
-    """Record a stop of the force while stalled; afterwards only the operator resumes."""
+    """Record a stop of the force during a stall; afterwards only the operator resumes."""
     if event.by != "program":
         state = replace(state, stall=replace(_stall(state), by=event.by))
     return state, (StopForce(),)
 
 
 def end_stalled_session(state: SessionState, _event: EndRequested) -> Result:
-    """End without a line in the journal: the session stays unfinished, and pending writes are still tried."""
+    """End without a line in the journal: the session stays unfinished; pending writes are still tried."""
     if state.over:
         raise SessionError("the session is over; its last lines are still to be written to the disk")
     ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))

@@ -244,8 +244,8 @@ class Preview:
 def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -> Preview:
     """Return the first session of a study folder that begins with this seed and participant.
 
-    All its randomness comes from the seed, the codes too; the number in the participant's id determines the row of a
-    square.
+    All its randomness, including the codes, follows from the seed; the number in the participant's id determines the
+    row of a square.
     """
     draw = stream(seed, "blinding").random
     secret = draw_secret(draw)

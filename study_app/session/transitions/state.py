@@ -46,7 +46,7 @@ class Plan:
     """The constant data of a session, except the language, which the participant may choose at its beginning.
 
     ``key`` (block → code → condition or track) and ``secret``, from which levels are drawn, are blinded and never
-    printed. ``start`` is where it begins: not at the first step where it was interrupted before.
+    printed. ``start`` is its starting step, which is not the first one after an interruption.
     """
 
     protocol: Protocol = field(repr=False)
@@ -57,7 +57,7 @@ class Plan:
     secret: bytes = field(default=b"", repr=False)
 
     def due(self, trial: Trial, heard: Sequence[TrialResult]) -> Presentation | None:
-        """Return the presentation of a trial of a block with a design; None if it is passed over."""
+        """Return the presentation of a trial of a block with a design; None if it is skipped."""
         return next_level(self.protocol, Key(self.key, self.secret), self.schedule, trial, heard)
 
     def condition(self, trial: Trial) -> str:
@@ -67,9 +67,9 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Stall:
-    """A failed write: its reason, and the commands of time ``at_s`` that are still to be executed.
+    """A failed write: its reason, and the pending commands of time ``at_s``.
 
-    ``before`` is the phase that the session goes back to, ``by`` who stops its force then.
+    ``before`` is the phase to which the session returns, ``by`` the person who stopped its force during the stall.
     """
 
     reason: str
@@ -84,16 +84,15 @@ class SessionState:
     """The state of a session at one time.
 
     ``index`` counts the schedule's steps (−1 before the first, their number after the last), ``attempt`` the
-    presentations of the present trial from 1. ``answers`` holds the statements of the present questionnaire that were
-    shown or answered. ``interrupted`` is the phase that a pause, or the failure of a device, goes back to.
-    ``force_off`` says that the force was stopped and has not been faded in again, ``held`` what only the
-    operator resumes: a pause, or a force that a person stopped. ``stall`` is set while the disk takes nothing.
-    ``since_s`` is when the present step was entered [s, session's clock].
-    Of trials with a design ``heard`` holds those answered so far, ``due`` what the present one presents, ``interval``
-    which interval it is at (from 1), and ``until_s`` when a rest or a feedback is over [s, session's clock].
-    ``errors_ms`` is the mean error of the visual delay in each of its intervals so far, ``invalid`` how many of its
-    attempts were not delivered as requested. ``steps`` are those of the adjustment under way, as they were asked for;
-    ``place`` is where they led to, which depends on where it started.
+    presentations of the current trial from 1. ``answers`` holds the shown or answered statements of the current
+    questionnaire. ``interrupted`` is the phase to which a pause, or the failure of a device, returns. ``force_off``
+    means that the force was stopped and has not been faded in again, ``held`` that only the operator can resume a pause
+    or force. ``stall`` is set while writes fail. ``since_s`` is the start time of the current step [s, session's
+    clock]. For trials with a design ``heard`` holds those answered so far, ``due`` the content of the current one,
+    ``interval`` its current interval (from 1), and ``until_s`` the end of a rest or a feedback [s, session's clock].
+    ``errors_ms`` is the mean error of the visual delay in each of its intervals so far, ``invalid`` the number of its
+    attempts that were not delivered as requested. ``steps`` are the requested steps of the current adjustment;
+    ``place`` is the resulting place, which depends on its start.
     """
 
     plan: Plan = field(repr=False)

@@ -46,13 +46,13 @@ FADE_OUT_S: Final = 0.05
 
 
 def enter_step(state: SessionState, index: int, done: Commands = (), *, at_s: float) -> Result:
-    """Go to the step at ``index``, or to the next that is not passed over; ``done`` ends the step before."""
+    """Go to the step at ``index``, or to the next that is not skipped; ``done`` ends the previous step."""
     reached, passed = find_due_step(state, index, at_s=at_s)
     return enter_reached(reached, (*done, *passed))
 
 
 def find_due_step(state: SessionState, index: int, *, at_s: float) -> Result:
-    """Return the state at the first step from ``index`` on that is not passed over, with an event for each passed one.
+    """Return the state at the first step from ``index`` that is not skipped, with an event for each skipped one.
 
     The phase is unchanged, or ENDED if a criterion that ends the session was missed.
     """
@@ -193,7 +193,7 @@ def _block(state: SessionState, trial: Trial) -> Block:
 def _passed_over_event(
     state: SessionState, before: Step | None, step: Step | None, due: Presentation | None
 ) -> journal.PassedOver | None:
-    """Return the event for a step that is passed over (a trial that is not due, or a break after one), else None."""
+    """Return the event for a skipped step (a trial that is not due, or a break after one), else None."""
     if isinstance(step, Trial):
         block = _block(state, step)
         if block.design is None or due is not None:
@@ -225,7 +225,7 @@ def _undelivered_reason(state: SessionState, block: Block) -> str:
 
 
 def _missed_criterion(state: SessionState, before: Step | None, step: Step | None) -> Block | None:
-    """Return the block that ended without reaching a criterion that ends the session, or None."""
+    """Return the ended block whose unmet criterion ends the session, or None."""
     if not isinstance(before, Trial):
         return None
     block = _block(state, before)
@@ -336,7 +336,6 @@ def _check_shown(state: SessionState, item: str) -> None:
 
 
 def _remove_answer(state: SessionState, item: str) -> Result:
-    """Remove an answer, if there is one."""
     answer = state.answers.get(item, Answer())
     if not answer.given:
         return state, ()

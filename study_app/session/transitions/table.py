@@ -113,9 +113,9 @@ def initial_state(
     start: Start = FIRST,
     secret: bytes = b"",
 ) -> SessionState:
-    """Return the state before ``Begin``; ``key`` is block → code → condition, ``start`` where a resumed one goes on.
+    """Return the state before ``Begin``; ``key`` is block → code → condition, ``start`` the point of resumption.
 
-    ``secret`` is the sealed key's nonce, from which levels are drawn: only a study without designs needs none.
+    ``secret`` is the sealed key's nonce, from which levels are drawn; it is not needed in a study without designs.
     """
     if language not in protocol.study.languages:
         known = ", ".join(protocol.study.languages)
@@ -126,7 +126,7 @@ def initial_state(
 
 
 def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Command, ...]]:
-    """Return the next state and what is to be done, in order."""
+    """Return the next state and the commands to execute, in order."""
     move = _TRANSITIONS.get((state.phase, type(event)))
     if move is None:
         if state.stall is not None:
