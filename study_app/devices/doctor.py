@@ -41,7 +41,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """Observations (``seen``) in words; all ``findings`` in order; the driver's ``failure`` (None: there was none)."""
+    """Observations (``seen``) as text; all ``findings`` in order; the driver's ``failure``, or None."""
 
     seen: tuple[str, ...]
     findings: tuple[Finding, ...]
@@ -99,9 +99,9 @@ def _indent_text(text: str, by: int) -> str:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FailureMode:
-    """A failure mode: the state without it, its symptom for the user, cause, cure, and how it is detected.
+    """A failure mode: the state without it, its symptom for the user, cause, remedy, and how it is detected.
 
-    ``paste`` is the cure as a terminal command of this system, "" if there is none.
+    ``paste`` is the remedy as a terminal command of this system, "" if there is none.
     """
 
     id: str
@@ -142,7 +142,7 @@ class FailureTable:
         return set(ids[: ids.index(mode)])
 
     def sentence(self, mode: str, seen: str = "") -> str:
-        """Return symptom, observation (``seen``), cause and cure of a mode in one line."""
+        """Return symptom, observation (``seen``), cause and remedy of a mode in one line."""
         known = self.mode(mode)
         detail = f" ({seen})" if seen else ""
         return f"{known.symptom}{detail}: {known.cause}; {known.cure}"

@@ -55,7 +55,7 @@ COMMON: Final[list[tuple[Any, ...]]] = [
 
 @kernel
 def enter(device: Any) -> bool:
-    """Return whether the connection may be used, until `leave`."""
+    """Claim the connection until `leave`; return whether it may be used."""
     device.inside = 1
     full_fence()
     if device.ended != RUNS:
@@ -66,7 +66,7 @@ def enter(device: Any) -> bool:
 
 @kernel
 def outlasted(device: Any) -> bool:
-    """Return whether the device was closed during this call, which must then end the force before it returns."""
+    """Return whether the device was closed during this call, which must then end the force before returning."""
     if device.ended != RELEASED:
         return False
     device.ended = FINISHED
@@ -104,7 +104,7 @@ AtClose: TypeAlias = Literal["stand_down", "release", "leave"]
 class FramedDevice(Device):
     """A device with a record of `COMMON` and more fields, shape (1,), and C functions ``read`` and ``write``.
 
-    A subclass states its failures, connects, and prepares the device with its force at zero.
+    A subclass defines its failures, connects, and prepares the device with zero force.
     """
 
     failures: ClassVar[FailureTable]
@@ -134,7 +134,7 @@ class FramedDevice(Device):
 
     @classmethod
     def of(cls, request: OpenRequest) -> Self:
-        """Return the device of a request, closed."""
+        """Return a closed device for a request."""
         raise NotImplementedError
 
     def _connect(self) -> Connection:
@@ -195,7 +195,7 @@ class FramedDevice(Device):
                     getattr(guard, then)()
 
     def _start_guard(self, *arguments: str, needed: bool = True) -> None:
-        """Start the guard, if ``needed``, with its function's arguments, and end a guard that was left behind."""
+        """Start the guard, if ``needed``, with its function's arguments, and end a guard that was left running."""
         if needed and self.ends_force is not None:
             self.guard = Guard(self.name, self.ends_force, *arguments, died=self._lose_guard)
             self.guard.start()
@@ -227,7 +227,7 @@ class FramedDevice(Device):
 
     @property
     def failure(self) -> str | None:
-        """Symptom, cause and cure of the failure that ended the exchange, in a sentence; None while it runs."""
+        """Symptom, cause and remedy of the failure that ended the exchange, as a sentence; None while it runs."""
         mode = self.failure_mode
         return None if mode is None else self.failures.sentence(mode, self._detail(mode))
 
@@ -254,7 +254,7 @@ class FramedDevice(Device):
         return ()
 
     def appeared(self, samples: Any) -> set[str]:
-        """Return the failure modes that the samples of a run at rest show."""
+        """Return the failure modes that are visible in the samples of a run at rest."""
         return set() if self.failure_mode is None else {self.failure_mode}
 
     def take_fault(self, fault: str) -> None:

@@ -30,10 +30,10 @@ _LEAVE_S = 5.0
 
 
 class Guard:
-    """The guard of a device.
+    """A process that ends the force of a device if the program dies.
 
-    It can act when the program has died, not while it is suspended: from its start until it is dismissed Ctrl-Z does
-    nothing. As a context manager it starts on entry and is dismissed on exit; after an exception it is not dismissed,
+    It can act when the program has died, not while it is suspended; therefore Ctrl-Z has no effect until it is
+    dismissed. As a context manager it starts on entry and is dismissed on exit; after an exception it is not dismissed,
     but ends the force as soon as the device is closed.
 
     Parameters
@@ -53,7 +53,7 @@ class Guard:
         self.listener: threading.Thread | None = None
 
     def start(self) -> None:
-        """Start the guard and wait until it watches.
+        """Start the guard and wait until it is ready.
 
         Raises
         ------
@@ -99,7 +99,7 @@ class Guard:
         self._end(_WORD)
 
     def release(self) -> None:
-        """Make the guard end the force after the device is closed; wait for its end."""
+        """Make the guard end the force after the device is closed; wait for it to exit."""
         self._end(b"")
 
     def leave(self) -> None:
@@ -116,7 +116,7 @@ class Guard:
         threading.Thread(target=_dismiss_child, args=(child, self.listener), name="guard", daemon=True).start()
 
     def recall(self) -> None:
-        """End the process that `leave` left behind: the program has opened the device again, with another guard.
+        """End the process left by `leave`, since the program has opened the device again with another guard.
 
         Otherwise it would try until its time limit to open a device that is in use, and report a danger.
         """

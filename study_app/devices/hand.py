@@ -181,7 +181,7 @@ def tremor(hand: Any, axis: int, time_s: float) -> Any:
 
 @kernel
 def wave(turn: float) -> float:
-    """Return nearly sin(2 pi turn), within 0.0012, by two parabolas: the same bits on every machine."""
+    """Return sin(2 pi turn) to within 0.0012, by two parabolas, with the same bits on every machine."""
     phase = 2.0 * (turn - math.floor(turn)) - 1.0  # half turns, [-1, 1): shifted by half a turn, hence the sign
     arch = 4.0 * phase * (1.0 - abs(phase))
     return -(0.225 * (arch * abs(arch) - arch) + arch)
@@ -193,7 +193,7 @@ _KEPT_MOTIONS = 8
 
 
 class HandOrders:
-    """A hand that takes orders, and the buttons under its fingers.
+    """A simulated hand that accepts orders, and the buttons under its fingers.
 
     Parameters
     ----------
@@ -229,13 +229,13 @@ class HandOrders:
         self.state.buttons = 0
 
     def hold(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Hold the handle at a place at once [m, hand frame]."""
+        """Hold the handle at a position at once [m, hand frame]."""
         self._post(HOLD, target_m=self._inside(x_m, y_m, z_m))
 
     def follow(self, t_s: Any, position_m: Any) -> None:
-        """Move along the straight lines between given places from the next tick on, and stay at the last.
+        """Move along straight lines between the given positions from the next tick onwards, and stay at the last.
 
-        Of the times (n,) [s], which increase, only differences count; places (n, 3) are in the hand frame [m].
+        Only differences of the increasing times (n,) [s] matter; positions (n, 3) are in the hand frame [m].
 
         Raises
         ------
@@ -264,9 +264,9 @@ class HandOrders:
         self._post(FOLLOW, rows=int(motion.ctypes.data), count=times.size)
 
     def reach_to(self, x_m: float, y_m: float, z_m: float, duration_s: float | None = None) -> None:
-        """Reach for a place [m, hand frame] with minimum jerk, from the next tick on, and stay there.
+        """Reach for a position [m, hand frame] with minimum jerk, from the next tick onwards, and stay there.
 
-        Without ``duration_s`` the reach takes 0.3 s and 4 s for every metre.
+        Without ``duration_s`` the reach takes 0.3 s plus 4 s per metre.
         """
         if duration_s is not None and not duration_s > 0.0:
             raise DeviceError(f"a reach must last longer than 0 s, got {duration_s} s")
@@ -278,7 +278,7 @@ class HandOrders:
 
     @property
     def aim_m(self) -> Vector:
-        """The present target of the hand or pointer [m, hand frame]."""
+        """The current target of the hand or pointer [m, hand frame]."""
         x, y, z = self.state.hand.aim_m
         return float(x), float(y), float(z)
 
@@ -288,7 +288,7 @@ class HandOrders:
         return bool(hand.moving) or bool(hand.serial != hand.taken)
 
     def _tremble(self, random: Random | None, tremor_m: float) -> None:
-        """Draw frequencies and phases of a tremor whose waves have this amplitude; None: always the same ones."""
+        """Draw frequencies and phases of a tremor with this amplitude; with None they are always the same."""
         draw = (random or Random(0)).random  # noqa: S311 - a hand trembles, it keeps no secrets
         hand = self.state.hand
         hand.tremor_m = tremor_m
@@ -297,7 +297,7 @@ class HandOrders:
         hand.tremor_turn = [[draw() for _ in range(_WAVES)] for _ in range(3)]
 
     def _inside(self, x_m: float, y_m: float, z_m: float) -> Vector:
-        """Return the nearest place the handle can reach."""
+        """Return the nearest position that the handle can reach."""
         x, y, z = (min(max(v, -half), half) for v, half in zip((x_m, y_m, z_m), self.workspace_m, strict=True))
         return x, y, z
 

@@ -23,7 +23,7 @@ _REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
 
 
 def _are_backends(value: object) -> bool:
-    """Return whether a value is a sequence of backends; an iterator would be used up by the check."""
+    """Return whether a value is a sequence of backends; an iterator would be consumed by the check."""
     return isinstance(value, Sequence) and all(isinstance(backend, Backend) for backend in value)
 
 
@@ -73,7 +73,7 @@ def title_of(name: str) -> str:
 def open_device(name: str, **request: Any) -> Device:
     """Open the device ``name``; ``request`` has the fields of an `OpenRequest` except its argument.
 
-    ``name`` is one of `list_devices`, or with what follows the colon, such as ``falcon:SERIAL``.
+    ``name`` is one of `list_devices`, or has an argument after a colon, such as ``falcon:SERIAL``.
 
     Raises
     ------

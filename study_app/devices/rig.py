@@ -27,7 +27,7 @@ _open: Final = weakref.WeakSet["Rig"]()
 
 @atexit.register
 def _stop_open_rigs() -> None:
-    """Stop the rigs that a program left open at its end, each of them even if another one fails to stop."""
+    """Stop all rigs that the program left open at its end, even if some of them fail to stop."""
     with ExitStack() as stops:
         for rig in tuple(_open):
             stops.callback(rig.stop)

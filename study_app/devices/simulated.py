@@ -150,7 +150,7 @@ class PointedDevice(SimulatedDevice):
         self.state.hand.lag_s = _LAG_S
 
     def point_to(self, x_m: float, y_m: float, z_m: float) -> None:
-        """Set the pointer's place [m, hand frame]; a place outside the workspace counts as its border."""
+        """Set the pointer's position [m, hand frame]; outside the workspace it is moved to the border."""
         self._post(POINT, target_m=self._inside(x_m, y_m, z_m))
 
 

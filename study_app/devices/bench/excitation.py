@@ -136,11 +136,11 @@ class BenchDriver:
 
     @property
     def failure(self) -> str | None:
-        """Why the inner device ended, if it reports it."""
+        """The reason why the inner device failed, if it reports one."""
         return self._inner.failure
 
     def excite(self, what: Excitation) -> None:
-        """Apply this excitation from the next reading on; a spring begins at the handle and keeps its integral."""
+        """Apply this excitation from the next reading onwards; a spring begins at the handle and keeps its integral."""
         state = self.state
         state.armed = 0
         held = state.stiffness_npm > 0.0 and what.stiffness_npm > 0.0 and state.ended == RUNNING
@@ -302,7 +302,7 @@ class Stand:
 
     @property
     def position_m(self) -> Any:
-        """The place of the handle (3,) [m, hand frame]."""
+        """The position of the handle (3,) [m, hand frame]."""
         return self._driver.state.position_m.copy()
 
     @property
@@ -320,14 +320,14 @@ class Stand:
         return self._servo.overruns
 
     def excite(self, what: Excitation) -> None:
-        """Apply this from the next tick on."""
+        """Apply this excitation from the next tick onwards."""
         self._live()
         self._driver.excite(what)
 
     def run(
         self, seconds: float, *, answered: Callable[[], str | None] | None = None, may_end: bool = False
     ) -> tuple[Any, str | None]:
-        """Wait for a time; return its samples and the operator's answer during it, if any.
+        """Wait for a duration; return its samples and the operator's answer during it, if any.
 
         Parameters
         ----------

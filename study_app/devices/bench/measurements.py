@@ -72,7 +72,7 @@ class Motion(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """Force of a scale over the force that was sent: slope, offset [N], greatest residual [N], readings."""
+    """Force on a scale relative to the force sent: slope, offset [N], greatest residual [N], number of readings."""
 
     gain: float
     offset_n: float
@@ -164,9 +164,9 @@ def motion_under_force(stretches: Sequence[Any], axis: int, rate_hz: float) -> M
 def count_um(stretches: Sequence[Any], axis: int) -> float:
     """Return the encoder count [µm] along an axis; NaN if it moved too little.
 
-    Counting moves a position by up to half a count, evenly distributed: by count / √12 RMS. `_DIFFERENCE`th differences
-    of positions contain this noise and almost nothing of a motion below 25 Hz. Slower motion would repeat counts; in
-    faster motion the uncertain time of samples would count, too.
+    Quantisation shifts a position by up to half a count, evenly distributed: by count / √12 RMS. `_DIFFERENCE`th
+    differences of positions contain this noise and almost nothing of a motion below 25 Hz. Slower motion would repeat
+    counts; in faster motion the timing uncertainty of samples would contribute.
     """
     noises_m: list[Floats] = []
     for samples in stretches:
@@ -195,7 +195,7 @@ class _Prepared(NamedTuple):
     bell: Floats
 
     def force_n(self, delay_s: float) -> Floats:
-        """Return the smoothed force with a delay from its writing to its effect."""
+        """Return the smoothed force delayed by ``delay_s``."""
         force_n = np.convolve(np.interp(self.grid_s - delay_s, self.sent_s, self.sent_n), self.bell, "valid")
         reach = len(self.bell) // 2
         return force_n[reach : len(force_n) - reach]

@@ -75,7 +75,7 @@ class Durations:
 
 @dataclass(frozen=True, slots=True)
 class StableDamping:
-    """The greatest damping on an axis [N·s/m] before ``ended``: "oscillation", "operator" or "most"."""
+    """The greatest stable damping on an axis [N·s/m]; the increase ``ended`` by "oscillation", "operator" or "most"."""
 
     damping_nspm: float
     ended: str
@@ -83,7 +83,7 @@ class StableDamping:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The results of a bench; None for those not measured.
+    """The results of a bench; None for those that were not measured.
 
     Attributes
     ----------
@@ -105,13 +105,13 @@ class Found:
 
     @property
     def count_m(self) -> float | None:
-        """The coarsest encoder count of the three axes [m]; None where the handle moved too little."""
+        """The coarsest encoder count of the three axes [m]; None if the handle moved too little."""
         counts_um = [motion.count_um for motion in self.motions if motion.count_um > 0.0]
         return 1e-6 * max(counts_um) if counts_um else None
 
     @property
     def fits(self) -> bool:
-        """Whether mass, damping and friction explain the handle's motion: it was not touched and reached no stop."""
+        """Whether mass, damping and friction explain the handle's motion; a touch or an end stop would not fit."""
         return all(motion.explained >= _LEAST_EXPLAINED and motion.mass_kg > 0.0 for motion in self.motions)
 
 
@@ -165,7 +165,7 @@ def _hold_excitation(**more: Any) -> Excitation:
 
 
 def _measure_motion(stand: Stand, axis: int, lasts: Durations, progress: Callable[[str], object]) -> Motion:
-    """Bring the handle to the middle, move it by a chirp, and fit its response."""
+    """Move the handle to the centre, excite it with a chirp, and fit its response."""
     stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
     most_n = min(_WAVE_N, stand.limit_n / 2)
@@ -183,7 +183,7 @@ def _measure_motion(stand: Stand, axis: int, lasts: Durations, progress: Callabl
 def _measure_damping(
     stand: Stand, axis: int, lasts: Durations, ask: Ask, progress: Callable[[str], object]
 ) -> StableDamping:
-    """Move the handle back and forth while the damper grows, until it oscillates, is stopped or is greatest."""
+    """Move the handle back and forth while the damping increases, until it oscillates, is stopped or is greatest."""
     stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
     progress(f"Stable damping along {_AXES[axis]}: up to {_MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
@@ -211,7 +211,7 @@ def _measure_damping(
 
 
 def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
-    """Push down on a scale, and ask for its reading."""
+    """Push down on a scale and ask for its reading."""
     request = (
         "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero. Without "
         "a scale, type 'no'."

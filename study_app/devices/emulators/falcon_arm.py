@@ -55,7 +55,7 @@ _HALVINGS = 60
 
 
 def set_arms(arms: Any, geometry: Geometry, units_per_nm: float, arm_offset_rad: tuple[float, float, float]) -> None:
-    """Return the arms of a Falcon with these offsets of its encoders' zeros [rad]."""
+    """Return the arms of a Falcon whose encoders have these zero offsets [rad]."""
     arms.arm_m, arms.rod_m, arms.ends_m = geometry.arm_m, geometry.rod_m, geometry.ends_m
     arms.base_m, arms.platform_m, arms.aside_m = geometry.base_m, geometry.platform_m, geometry.aside_m
     arms.rad_per_count, arms.units_per_nm = geometry.rad_per_count, units_per_nm
@@ -75,7 +75,7 @@ def find_angles(arms: Any, hand_m: Any) -> None:
 
 @kernel
 def stop(arms: Any, handle: Any) -> None:
-    """Keep a ``plant.HANDLE`` within the arms' reach, and set their angles: outward it stops before the arms' stops."""
+    """Keep a ``plant.HANDLE`` within the arms' reach, and set their angles; it stops before the arms' end stops."""
     find_angles(arms, handle.position_m)
     if _reached(arms, handle.position_m):
         return
@@ -102,7 +102,7 @@ def _put(handle: Any, x: float, y: float, z: float) -> None:
 
 @kernel
 def _reached(arms: Any, hand_m: Any) -> bool:
-    """Return whether the arms' angles match the grip's place, and no arm is stretched."""
+    """Return whether the arms' angles match the grip's position, and no arm is stretched."""
     x, y, z = hand_m[0], hand_m[1], hand_m[2] + arms.centre_m
     held = 0
     for i in range(3):
@@ -178,7 +178,7 @@ def _stretch(arms: Any, arm: int, angle: float, x: float, y: float, z: float) ->
 
 @kernel
 def _angle(arms: Any, arm: int, x: float, y: float, z: float, near: float) -> float:
-    """Return the angle of ``arm``, with its elbow outside; out of reach, the angle toward the place."""
+    """Return the angle of ``arm``, with its elbow outside; out of reach, the angle toward the position."""
     ax, ay = arms.along[arm, 0], arms.along[arm, 1]
     toward = math.atan2(z, x * ax + y * ay + arms.platform_m - arms.base_m)
     # The nearer the arm points to the platform the shorter the rod: one such angle on either side, outside is below.

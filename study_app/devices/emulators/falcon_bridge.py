@@ -71,7 +71,7 @@ def power_up(bridge: Any) -> None:
 
 @kernel
 def begin(bridge: Any) -> int:
-    """Begin a transfer; return the jump of the clock meanwhile, by which all other times must be shifted [ns]."""
+    """Begin a transfer; return the clock jump since the last one, by which all other times must be shifted [ns]."""
     if bridge.clock == 0:
         bridge.now_ns += _USB_NS
         return 0
@@ -136,7 +136,7 @@ def send(bridge: Any, value: int, end_ns: int) -> bool:
 
 @kernel
 def answer(bridge: Any, value: int, since_ns: int, divisor: int) -> None:
-    """Put a byte from the device on the line, not before ``since_ns``."""
+    """Send a byte from the device over the line, not before ``since_ns``."""
     if bridge.back_last - bridge.back_first >= BACK_RING:
         bridge.lost += 1
         return
@@ -149,7 +149,7 @@ def answer(bridge: Any, value: int, since_ns: int, divisor: int) -> None:
 
 @kernel
 def hand_over_ns(bridge: Any) -> int:
-    """Return the time at which the chip sends its next packet to a host that requests it from now on [ns]."""
+    """Return when the chip sends its next packet to a host that requests it from now on [ns]."""
     due = bridge.sent_ns + bridge.latency_ns
     first, held = bridge.back_first, bridge.back_last - bridge.back_first
     if held >= constants.CHUNK:
@@ -164,7 +164,7 @@ def hand_over_ns(bridge: Any) -> int:
 
 @kernel
 def hand_over(bridge: Any, data: int, noise: int) -> int:
-    """Write the present packet to the address ``data``; return its length, including status bytes."""
+    """Write the current packet to the address ``data``; return its length, including status bytes."""
     byte_at(data).value = _STATUS[0] ^ (noise & 0xF0)
     byte_at(data + 1).value = _STATUS[1] ^ ((noise >> 8) & 0xFF)
     length = constants.STATUS_BYTES

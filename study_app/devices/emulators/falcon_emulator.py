@@ -237,14 +237,14 @@ def let_pass(e: Any, lasting_ns: int) -> None:
 
 @kernel
 def look(e: Any) -> None:
-    """Advance to the clock's present time."""
+    """Advance to the current time of the clock."""
     _begin(e)
     falcon_processor.move_until(e, e.bridge.now_ns, falcon_processor.LONGEST_NS)
 
 
 @kernel
 def unload(e: Any) -> None:
-    """Reset to the state after connection: arms at the grip's place, no program."""
+    """Reset to the state after connection: arms at the grip's position, no program."""
     find_angles(e.arms, e.handle.position_m)
     e.loader.state = falcon_processor.WAITING
 
@@ -264,11 +264,11 @@ ALL_HOMED = 0b111
 
 
 class Emulator(HandOrders):
-    """An emulated Falcon, its mains adapter plugged in.
+    """An emulated Falcon with its mains adapter plugged in.
 
-    Orders go to the hand at the grip, in the frame of the hand; while homing is on and it has nothing else to do, the
-    hand pulls the grip out, pushes it in, out again, and returns to the middle. Properties give the state at the last
-    step of emulated time.
+    Orders go to the hand that holds the grip, in the hand frame; while homing is on and it has no other order, the hand
+    pulls the grip out, pushes it in, out again, and returns to the centre. Properties give the state at the last step
+    of emulated time.
 
     Parameters
     ----------
@@ -391,7 +391,7 @@ class Emulator(HandOrders):
         return entry_of(let_pass, self.state, 0)
 
     def look(self) -> None:
-        """Advance to the current time of its clock: process bytes that have arrived, move for a limited time."""
+        """Advance to the current time of its clock: process received bytes, and move for a limited time."""
         look(self.state)
 
     # State and faults.

@@ -76,7 +76,7 @@ def draw(faults: Any) -> float:
 
 @kernel
 def is_struck(faults: Any, kind: int) -> bool:
-    """Draw whether this fault occurs now."""
+    """Return whether this fault occurs now, at random."""
     if faults.due[kind] > 0:
         faults.due[kind] -= 1
     elif not (faults.chance[kind] > 0.0 and draw(faults) < faults.chance[kind]):
@@ -471,7 +471,7 @@ def _load(e: Any) -> None:
 
 @kernel
 def _stroke(e: Any, now_ns: int) -> None:
-    """Pull out, push in, pull out and go to the middle, if homing needs it and no other command is active.
+    """Pull out, push in, pull out and go to the centre, if homing needs it and no other command is active.
 
     Repeat it, like a person, whenever an arm is not homed or the blue light requests a pull.
     """

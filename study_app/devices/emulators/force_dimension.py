@@ -50,7 +50,7 @@ _READING, _COMMAND = int(_fields["reading"][1]), int(_fields["command"][1])
 
 
 class _EmulatedFunctions:
-    """The library's functions, emulated, with one device, whose handle is that of ``hand``."""
+    """The library's functions, emulated for one device, whose handle is that of ``hand``."""
 
     def __init__(self, hand: ScriptedDevice) -> None:
         self.memory = records(EMULATED, 1)

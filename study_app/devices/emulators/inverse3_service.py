@@ -148,7 +148,7 @@ def template(message: dict[str, Any]) -> tuple[bytes, list[int]]:
 
 
 def faulty_bytes(fault: str, message: dict[str, Any]) -> bytes:
-    """Return the bytes sent for a fault of `_OF_STREAM` in place of a state."""
+    """Return the bytes sent instead of a state for a fault of `_OF_STREAM`."""
     device = message["inverse3"][0]
     if fault == "no-position":
         del device["state"]["cursor_position"]

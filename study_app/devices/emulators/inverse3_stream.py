@@ -236,7 +236,7 @@ def _answer(service: Any, begin: int, end: int) -> bool:
 
 @kernel
 def go_on(service: Any) -> None:
-    """Move the handle up to the current time; it is idle after a long time without commands."""
+    """Move the handle to the current time; it is idle after a long time without commands."""
     _look_at_clock(service)
     if service.clock == 0:
         service.now_ns += _OWN_STEP_NS
@@ -261,7 +261,7 @@ def act(service: Any, x_n: float, y_n: float, z_n: float) -> None:
 
 @kernel
 def rest(service: Any) -> None:
-    """Remove the force: the device is idle."""
+    """Remove the force: the device becomes idle."""
     release_handle(service.handle)
     for axis in range(3):
         service.force_n[axis] = 0.0
@@ -269,7 +269,7 @@ def rest(service: Any) -> None:
 
 @kernel
 def reply(service: Any) -> None:
-    """Send the state, or the bytes of a fault in its place."""
+    """Send the state, or the bytes of a fault instead."""
     if service.fault_at > 0 and service.commands >= service.fault_at:
         if service.silent == 0:
             put_bytes(service, service.faulty, service.faulty_size)

@@ -152,7 +152,7 @@ class BootFailure(DeviceFailure):
 
 
 class _Ended(Exception):
-    """A step of an attempt did not complete."""
+    """A step of an attempt was not completed."""
 
     def __init__(self, step: str, reason: str) -> None:
         self.step, self.reason = step, reason
@@ -172,7 +172,7 @@ class _Line:
         self._parser, self._status = records(PARSER, 1), records(STATUS, 1)
 
     def until(self, complete: Callable[[bytes], bool], timeout_s: float, came: bytes = b"") -> bytes:
-        """Return ``came`` and the bytes received after it, until they are complete or the time-out."""
+        """Return ``came`` and the bytes received after it, until they are complete or the time-out is reached."""
         ends_s = self._transport.now_s() + timeout_s
         while not complete(came) and (left_s := ends_s - self._transport.now_s()) > 0.0:
             came += self._memory[: self._read(left_s)].tobytes()

@@ -68,8 +68,8 @@ def fit(
 ) -> Calibration:
     """Fit gain, arm offset and weight of the grip to the measured motor units by least squares.
 
-    The grip stands still when motors, its own weight and what pulls at it balance:
-    ``-J(theta + offset)^T units / gain + (0, -own weight, 0) + force = 0``.
+    The grip is at rest when motors, its own weight and the external force balance: ``-J(theta + offset)^T units / gain
+    + (0, -own weight, 0) + force = 0``.
 
     Parameters
     ----------
@@ -237,7 +237,7 @@ class Notes:
 
 
 class Grip:
-    """The grip of an open Falcon, kept at a place by a spring; one tick of it takes a millisecond.
+    """The grip of an open Falcon, held at a position by a simulated spring; one tick takes a millisecond.
 
     Parameters
     ----------
@@ -267,7 +267,7 @@ class Grip:
         return self._place_m.copy()
 
     def tick(self) -> None:
-        """Read the position and push toward the target; without a new position for 20 ticks, send no force."""
+        """Read the position and push toward the target; after 20 ticks without a new position, send no force."""
         if self._virtual:
             self._now_ns += round(1e9 * _TICK_S)
             elapsed_s = _TICK_S
@@ -326,7 +326,7 @@ class Grip:
         )
 
     def weigh(self) -> tuple[Any, Any]:
-        """Return the mean encoder counts and motor units (each (3,)) of some tenths of a second."""
+        """Return the mean encoder counts and motor units (each (3,)) over some tenths of a second."""
         counts, units = np.zeros(3), np.zeros(3)
         for _ in range(_WEIGHED_TICKS):
             self.tick()
@@ -337,7 +337,7 @@ class Grip:
 
 
 def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
-    """Measure without load at all places, then with a weight of ``weight_n`` newtons; return the measurements."""
+    """Measure without load at all positions, then with a weight of ``weight_n`` newtons; return the measurements."""
     if not LEAST_N <= weight_n <= MOST_N:
         raise DeviceError(
             f"a weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g is {weight_n:.2f} N: use a weight of "
@@ -366,7 +366,7 @@ def _measure_round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
 
 
 def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
-    """Measure without load and then with an operator's pull on a scale, at each place; return the measurements."""
+    """Measure at each position without load and then with an operator's pull on a scale; return the measurements."""
     notes: list[tuple[Any, float, Any]] = []
     grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
     for number, place in enumerate(PLACES_M, start=1):

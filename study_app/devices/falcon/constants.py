@@ -55,7 +55,7 @@ ERROR_TIMEOUT, ERROR_OVERFLOW, ERROR_PIPE, ERROR_NOT_SUPPORTED = -7, -8, -9, -12
 
 
 def quiet_packet(flags: int = 0) -> bytes:
-    """Return the packet that asks for no torque, with these lights and homing flags."""
+    """Return the packet with zero torque and these lights and homing flags."""
     return bytes([START, *([ZERO] * 12), ZERO + flags, ZERO, STOP])
 
 

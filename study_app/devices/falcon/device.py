@@ -89,7 +89,7 @@ class FalconDevice(FramedDevice):
         return open_transport(self._serial)
 
     def _prepare(self, connection: Transport) -> dict[str, Any]:
-        """Load the firmware if needed, measure the round trip, start the guard, and home it with instructions."""
+        """Load the firmware if needed, measure the round trip, start the guard, and guide the homing."""
         serial = connection.serial
         facts: dict[str, Any] = {"serial": serial, "firmware": self._run_firmware(connection)}
         round_trip_s, event_character = boot.choose_event_character(connection)
@@ -124,7 +124,7 @@ class FalconDevice(FramedDevice):
 
     @property
     def failure_mode(self) -> str | None:
-        """The id of what ended the exchange; without positions it follows from homed bits and errors of transfers."""
+        """The id of the failure that ended the exchange; without positions from homed bits and transfer errors."""
         mode, state = super().failure_mode, self.exchange
         if mode != self.silent:
             return mode
@@ -232,7 +232,7 @@ class FalconDevice(FramedDevice):
         self._progress(READY)
 
     def _begin_anew(self) -> None:
-        """Fade the force in over half a second from the next tick on, and reset the counters."""
+        """Fade the force in over half a second from the next tick onwards, and reset the counters."""
         self.exchange.share = 0.0
         self.exchange.started = 0
         for name in exchange.COUNTERS:

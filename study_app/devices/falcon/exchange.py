@@ -39,7 +39,7 @@ _LONGEST_TICK_S: Final = 4e-3
 def set_motor_units(falcon: Any) -> None:
     """Convert ``force_n``, limited by the gate, into motor ``units``.
 
-    ``held_n`` is then the force of the motors until the next command, where the grip is now, and ``sent_n`` the force
+    ``held_n`` is then the motors' force until the next command at the grip's current position, and ``sent_n`` the force
     after it [N].
     """
     mechanics.jacobian(falcon.mechanism, falcon.theta, falcon.position_m, falcon.rates)
@@ -50,7 +50,7 @@ def set_motor_units(falcon: Any) -> None:
 
 @kernel
 def can_wait(falcon: Any) -> bool:
-    """Return whether the motors may keep their force for a tick: it is close to the requested force, which is not 0."""
+    """Return whether the motors may keep their force for a tick: it is close to the requested non-zero force."""
     near: bool = square_distance(falcon.sent_n, falcon.held_n) <= _MOST_WAITING_N * _MOST_WAITING_N
     return near and (square(falcon.sent_n) > 0.0 or square(falcon.held_n) == 0.0)
 
@@ -84,8 +84,8 @@ def _choose_units(falcon: Any) -> None:
 def limit_growth(falcon: Any) -> None:
     """Limit the part of the force that is new and does not brake the grip to the servo's slew limit.
 
-    New is the way from the nearest force that is a share (0 to 1) of the one held, so that a force that turns round
-    falls at once and grows by steps. A grip slower than ``SURE_MPS`` may be a count of an encoder, and is not braked.
+    The new part is the difference from the nearest fraction (0 to 1) of the previous force, so that a reversing force
+    drops at once and grows in steps. A grip slower than ``SURE_MPS`` may be encoder noise, and is not braked.
     """
     held_n, force_n, v_mps = falcon.held_n, falcon.force_n, falcon.velocity_mps
     kept = 0.0
@@ -341,7 +341,7 @@ def _send_packet(falcon: Any, context: int) -> None:
 
 @kernel
 def _lights(falcon: Any) -> int:
-    """Return the homing flag, which must stay set, and red before homing, blue before the out-stroke, then green."""
+    """Return the homing flag, which must remain set, and red before homing, blue before the out-stroke, then green."""
     if falcon.homed == 0:
         return constants.FLAG_HOMING | constants.FLAG_RED
     return constants.FLAG_HOMING | (constants.FLAG_BLUE if falcon.pulled_out == 0 else constants.FLAG_GREEN)

@@ -196,7 +196,7 @@ def inverse(mechanism: Any, position_m: Any, theta: Any) -> int:
 def forward(mechanism: Any, theta: Any, position_m: Any) -> int:
     """Set ``position_m`` (3,) [m] to the grip's position at angles ``theta`` (3,) [rad], starting from its value.
 
-    Returns ``REACHED``; or ``OUTSIDE``, and the position is as it was.
+    Returns ``REACHED``, or ``OUTSIDE`` with the position unchanged.
     """
     for i in range(3):
         if not abs(theta[i]) < math.pi:
@@ -288,7 +288,7 @@ def torques(rates: Any, force_n: Any, torque_nm: Any) -> None:
 def motor_units(mechanism: Any, torque_nm: Any, units: Any) -> int:
     """Write the motor commands into ``units`` (3,); return 1 if they exceed the motors' range, else 0.
 
-    Too large commands are reduced by one factor for all three, so that the force keeps its direction. Torques that are
+    Commands that are too large are reduced by a common factor, so that the force keeps its direction. Torques that are
     not finite give zero.
     """
     most = 0.0
@@ -321,7 +321,7 @@ def _across(mechanism: Any, arm: int, p: Any) -> Any:
 def _constraint(mechanism: Any, arm: int, cos: float, sin: float, p: Any) -> Any:
     """Return g of an arm whose angle has this cosine and sine, its slopes along x, y, z and along the angle.
 
-    If the lateral offset exceeds the rod there is no such arm: the slope along the angle is then 0, unlike in any pose.
+    If the lateral offset exceeds the rod there is no such arm; the slope along the angle is then 0, unlike in any pose.
     """
     u, v, w = _along(mechanism, arm, p), _across(mechanism, arm, p), p[2]
     a = mechanism.arm_m

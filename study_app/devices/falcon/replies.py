@@ -176,7 +176,7 @@ _DOUBTS: Final = 2  # greatest number of doubted replies in a row
 
 @kernel
 def update_delay(falcon: Any, packets: int, gap: bool) -> bool:
-    """Update the owed replies and the delay; return whether the received reply is recent enough."""
+    """Update the pending replies and the delay; return whether the received reply is recent enough."""
     owed = falcon.owed + falcon.asked - packets
     falcon.asked = 0
     falcon.surplus += max(-owed, 0)
@@ -198,7 +198,7 @@ def update_delay(falcon: Any, packets: int, gap: bool) -> bool:
 
 @kernel
 def _look_for_change(falcon: Any) -> None:
-    """Begin a measurement if more, or for a long time fewer, replies are owed than the delay explains."""
+    """Begin a measurement if more (or, for a long time, fewer) replies are pending than the delay explains."""
     more, less = falcon.owed > falcon.delay - 1, falcon.owed < falcon.delay - 1
     falcon.astray = falcon.astray + 1 if more or less else max(falcon.astray - 1, 0)
     due = falcon.unsure != 0 or falcon.delay > MOST_DELAY or falcon.astray >= (_SLOWER_READS if more else _FASTER_READS)
@@ -210,7 +210,7 @@ def _look_for_change(falcon: Any) -> None:
 
 @kernel
 def _has_few_owed(falcon: Any) -> bool:
-    """Return whether few enough replies are owed beyond the delay that any received one is recent."""
+    """Return whether so few replies are pending beyond the delay that any received one is recent."""
     return bool(falcon.owed < falcon.delay + MOST_OWED)
 
 
@@ -278,7 +278,7 @@ def take_status(falcon: Any) -> bool:
 
 @kernel
 def is_plausible(falcon: Any) -> bool:
-    """Return whether the encoder counts continue the arms' motion, or confirm counts doubted before."""
+    """Return whether the encoder counts continue the arms' motion, or confirm previously rejected counts."""
     counts = falcon.status.encoders
     astray, repeated = False, falcon.doubts > 0
     for i in range(3):

@@ -43,7 +43,7 @@ class Transport(Protocol):
 
     @property
     def name(self) -> str:
-        """The word by which `open_transport` opens it again."""
+        """The argument with which `open_transport` opens it again."""
         return self.serial or ""
 
     def control(self, request: int, value: int) -> None:

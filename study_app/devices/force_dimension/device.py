@@ -29,7 +29,7 @@ class Functions(Protocol):
 
 
 class ForceDimensionDevice(FramedDevice):
-    """A device behind the maker's library.
+    """A device accessed through the maker's library.
 
     Parameters
     ----------

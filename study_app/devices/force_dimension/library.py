@@ -213,7 +213,7 @@ class Library:
         return {"com_mode": mode, "delay_s": delay_s, "count_m": count_m, "mass_kg": mass_kg}
 
     def _round_trip_s(self) -> float | None:
-        """Return the 90th percentile of the time that a zero force and a new position take [s]."""
+        """Return the 90th percentile of the time from a zero force to a new position [s]."""
         call, device, taken = self._functions, self.id, []
         place = [c_double() for _ in range(3)]
         for _ in range(_ROUND_TRIPS):
@@ -228,10 +228,10 @@ class Library:
         return sorted(taken)[int(0.9 * len(taken))] if taken else None
 
     def _in_the_middle(self) -> tuple[float | None, float | None]:
-        """Return the longest motion within an encoder count [m] and the least mass [kg] in the workspace's middle.
+        """Return the longest motion within an encoder count [m] and the least mass [kg] in the centre of the workspace.
 
-        The maker's kinematics and inertia matrix compute both for the model and its calibration: no document states
-        them. None if the library lacks the function or its answers are contradictory.
+        The maker's kinematics and inertia matrix compute both for the model and its calibration; they are not
+        documented. None if the library lacks the function or its answers are contradictory.
         """
         import numpy as np  # noqa: PLC0415 - the guard, which loads this module, needs no arrays
 
@@ -321,7 +321,7 @@ def _load(path: str | Path | None) -> ctypes.CDLL:
 
 
 def _usual_names() -> Sequence[str]:
-    """Return the names under which the library is installed; CHAI3D 3.3.0 loads drd64.dll, too."""
+    """Return the names under which the library is installed; like CHAI3D 3.3.0, drd64.dll is tried, too."""
     if sys.platform == "win32":
         return ("drd64.dll",)
     name = "libdrd.dylib" if sys.platform == "darwin" else "libdrd.so"

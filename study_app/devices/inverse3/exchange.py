@@ -321,7 +321,7 @@ def _answer_ping(device: Any, context: int, at: int, length: int) -> None:
 
 @kernel
 def _end(device: Any, context: int, why: int) -> int:
-    """End the stream: send zero force and a close frame, then nothing."""
+    """End the stream: send zero force and a close frame, and nothing after them."""
     if why != CLOSED:
         finish(device, context)
     clear(device.sent_n)  # silence ends a force that could not be reset

@@ -110,7 +110,7 @@ class Session:
 
 
 class Messages:
-    """Text messages over a link, for the time in which a device is opened."""
+    """Text messages over a link, used while a device is opened."""
 
     @staticmethod
     def compile() -> None:

@@ -34,8 +34,8 @@ _MASKED = 0x80
 def parse_header(data: Any, begin: int, end: int, header: Any) -> int:
     """Read the header of the frame that begins at ``begin`` in ``data``, whose bytes before ``end`` are valid.
 
-    ``header`` (2,) is given the opcode and the length of the payload [bytes]. Return the length of the header [bytes],
-    `INCOMPLETE` where more bytes are needed, or `VIOLATION`.
+    ``header`` (2,) receives the opcode and the length of the payload [bytes]. Return the length of the header [bytes],
+    `INCOMPLETE` if more bytes are needed, or `VIOLATION`.
     """
     if end - begin < 2:
         return INCOMPLETE
@@ -200,7 +200,7 @@ _TENS = np.array([float(f"1e{power}") for power in range(309)] + [np.inf])
 def scan(data: Any, begin: int, end: int, state: Any) -> int:
     """Read the message from ``begin`` to ``end``; return `UNDERSTOOD` or the reason why it gives no position.
 
-    ``state`` is a record of `SCAN`; its ``own_id`` says which device is meant.
+    ``state`` is a record of `SCAN`, whose ``own_id`` identifies the device.
     """
     state.known = state.found = state.infinite = state.seen = state.is_own = 0
     at, depth, path, value_due = _skip(data, begin, end), 0, _NOTHING, True
@@ -281,7 +281,7 @@ def _keep(state: Any) -> None:
 
 @kernel
 def _skip(data: Any, at: int, end: int) -> int:
-    """Return the end of the white space from ``at`` on; a negative ``at`` is returned unchanged."""
+    """Return the end of the white space from ``at`` onwards; a negative ``at`` is returned unchanged."""
     while 0 <= at < end and data[at] <= 32:
         byte = data[at]
         if byte != 32 and byte != 10 and byte != 13 and byte != 9:  # noqa: PLR1714 - compiled

@@ -93,7 +93,7 @@ def parse_report(report: bytes) -> Displacement | Buttons | None:
 def program_buttons(held: int, model: Model) -> int:
     """Return the program's buttons: the first one continues; Esc, or the first two together, stops the force.
 
-    So every model can stop the force, and no other button of a large model has an effect.
+    Every model can therefore stop the force, and no other button of a large model has an effect.
     """
     buttons = held & _KNOWN_BUTTONS
     escape = model.escape is not None and bool(held >> model.escape & 1)
