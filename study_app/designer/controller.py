@@ -49,7 +49,7 @@ _REST_MS: Final = 200
 
 
 class DesignerController(QObject):
-    """Gives the designer's place what it shows, and opens studies."""
+    """Provides the content of the designer's view, and opens studies."""
 
     def __init__(self, results: Path) -> None:
         place = DesignerPlace()
@@ -106,7 +106,7 @@ class DesignerController(QObject):
     # opening
 
     def enter(self) -> None:
-        """Reload the list of studies; load a file that another program changed if nothing was edited."""
+        """Reload the list of studies; reload a file that another program changed if it was not edited here."""
         self._choices = study_choices(self.editing.opened)
         self.saving.look_again()
         self.runs.read_in_background()
@@ -135,7 +135,7 @@ class DesignerController(QObject):
         self._show_document(opened)
 
     def begin_study(self, source: str, name: str, answers: Answers = NO_ANSWERS) -> None:
-        """Create a study under a name, as a copy of a template ("template:NAME") or of another study."""
+        """Create a named study as a copy of a template ("template:NAME") or of another study."""
         try:
             if source.startswith("template:"):
                 study, copy_of = template(source.removeprefix("template:")), ""
@@ -189,7 +189,7 @@ class DesignerController(QObject):
     # steps that ask first
 
     def ask_to_delete(self, path: Place) -> None:
-        """Delete an element; if others refer to it, ask how."""
+        """Delete an element; if others refer to it, ask how to treat them."""
         opened = self.editing.writable
         if opened is None or len(path) < 2:
             return
@@ -251,7 +251,7 @@ class DesignerController(QObject):
     # display
 
     def show_study(self) -> None:
-        """Show the open study: header, form, file and problems now, the outline after a pause in typing."""
+        """Show the open study: header, form, file and problems at once, the outline after a pause in typing."""
         opened = self.editing.opened
         if opened is None:
             self.place.show_view(DesignerView(self._header_state()))

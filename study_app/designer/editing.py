@@ -15,11 +15,11 @@ from study_app.protocol.source.document import Path as Place
 
 
 class Editing(QObject):
-    """The open study: every change of it and of its selection is made here.
+    """The open study; all changes to it and to the selection are made here.
 
-    ``opened_other`` is emitted when another study is open, or none, ``changed`` after each step of the study or of its
-    selection, ``edited`` after each step of the study alone; ``refused`` carries the path that a refused request
-    concerns, the sentence that says why, and the request; ``made`` the `Step` of a request, after ``edited``.
+    ``opened_other`` is emitted when another study is opened or the study is closed, ``changed`` after each step of the
+    study or the selection, ``edited`` after each step of the study only; ``refused`` carries the path of a rejected
+    request, the reason, and the request; ``made`` carries the `Step` of a request, after ``edited``.
     """
 
     opened_other = Signal()
@@ -42,7 +42,7 @@ class Editing(QObject):
 
     @property
     def selected(self) -> Place:
-        """The path of the selected element, () where no study is open."""
+        """The path of the selected element, () without an open study."""
         return () if self.opened is None else self.opened.selected
 
     def open(self, opened: Document | None) -> None:
@@ -74,7 +74,7 @@ class Editing(QObject):
             opened.selected = existing_path(opened.study.document, opened.selected)
 
     def handle_request(self, asked: Request) -> None:
-        """Carry out a step that a view requests; emit ``refused`` with the reason if it cannot be made."""
+        """Carry out a step that a view requests; emit ``refused`` with the reason if it is not possible."""
         opened = self.writable
         if opened is None:
             return
@@ -95,7 +95,7 @@ class Editing(QObject):
         self.made.emit(step)
 
     def suggest_id(self) -> None:
-        """Give the last added element an id made from its text, once, when the text is left."""
+        """Give the last added element an id made from its text, once, when the text field is left."""
         path, name, initial = self._added
         if (opened := self.writable) is None or not path or id_at(opened.study.document, path) != name:
             return
@@ -111,7 +111,7 @@ class Editing(QObject):
         self._note_edit()
 
     def make_step(self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:
-        """Make a step of edits or of another text; a refused step changes nothing."""
+        """Make a step of edits or of a new text; a rejected step changes nothing."""
         if (opened := self.writable) is not None:
             opened.edit(name, *edits, text=text, select=select)
             self._note_edit()

@@ -38,7 +38,7 @@ from study_app.protocol.source.document import Path
 
 
 class _VisibleLine(NamedTuple):
-    """The number of a line from 0, how far down it is, and its height [px]."""
+    """The number of a line from 0, its vertical position, and its height [px]."""
 
     number: int
     top: float
@@ -60,7 +60,7 @@ def _visible_lines(text: QPlainTextEdit) -> list[_VisibleLine]:
 
 @dataclass(frozen=True, slots=True)
 class FileText:
-    """The text of the pane; lines count from 0."""
+    """The text of the editor; lines count from 0."""
 
     name: str = ""  # the name of the file
     text: str = ""  # its text with line feeds alone
@@ -91,7 +91,7 @@ _PIECES = r"(#.*$)|(^\s*\[.*?\]\]?)|(\"\"\"|\"(?:[^\"\\]|\\.)*\"|'[^']*')"
 
 
 class Colours(QSyntaxHighlighter):
-    """Colours the groups of a pattern, each with the roles of its ink and its ground ("" for none) and a weight."""
+    """Colours the groups of a pattern, each with roles for text and background ("" for none) and a weight."""
 
     def __init__(self, document: QTextDocument, pattern: str, *roles: tuple[str, str, int]) -> None:
         super().__init__(document)
@@ -115,7 +115,7 @@ class Colours(QSyntaxHighlighter):
 
 
 class _Gutter(QWidget):
-    """The numbers of the lines."""
+    """The line numbers."""
 
     def __init__(self, editor: _FileEditor) -> None:
         super().__init__(editor)
@@ -129,7 +129,7 @@ class _Gutter(QWidget):
 
 
 class _FileEditor(Coloured, QPlainTextEdit):
-    """The text; ``typed`` carries it within moments. While it is hidden, it is not brought up to date."""
+    """The text editor; ``typed`` emits its text with a short delay. It is not updated while hidden."""
 
     typed = Signal(str)
 
@@ -164,7 +164,7 @@ class _FileEditor(Coloured, QPlainTextEdit):
         self._place_gutter()
 
     def words(self) -> str:
-        """Return the text; Qt's own plain text would lose spaces that do not break."""
+        """Return the text; Qt's plain text would lose non-breaking spaces."""
         self._show_late_file()
         return self.document().toRawText().replace("\u2029", "\n")
 
@@ -288,7 +288,7 @@ class _FileEditor(Coloured, QPlainTextEdit):
 
 
 class FileCard(Card):
-    """The editor; ``aside`` holds the name of the file, for the right of the tabs."""
+    """The editor; ``aside`` holds the file name, for the right of the tabs."""
 
     def __init__(self) -> None:
         super().__init__(padding=14, gap=8)

@@ -33,9 +33,9 @@ _ICONS = {"play": "play", "stop": "stop", "keep": "save", "delete": "trash"}
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """A line with its buttons: what each asks for, and its words; ``listed`` are lines below it.
+    """A line with buttons: the action and text of each; ``listed`` are lines below it.
 
-    ``closes`` says that it needs no answer and can be closed.
+    With ``closes`` it needs no answer and can be closed.
     """
 
     words: str
@@ -47,10 +47,10 @@ class Notice:
 
 
 class NoticeCard(Card):
-    """Draws a `Notice`: that of the study is tinted, that of playing gives its first button the keyboard.
+    """Draws a `Notice`; that of the study is tinted, and that of playing focuses its first button.
 
-    Signals: ``asked`` (the action of a button, "close" of the one that closes it), ``left`` before it is hidden with
-    the keyboard.
+    Signals: ``asked`` (the action of a button, "close" for the one that closes it), ``left`` before it is hidden while
+    focused.
     """
 
     asked = Signal(str)
@@ -101,7 +101,7 @@ class NoticeCard(Card):
             next(iter(self.buttons.values())).setFocus()  # of the window, once it is active again
 
     def close_by_key(self) -> bool:
-        """Close the notice if it can be closed; return whether there was one."""
+        """Close the notice if it can be closed; return whether it was."""
         closes = self.isVisible() and self.notice is not None and (self.notice.closes or "close" in self.buttons)
         if closes:
             self.asked.emit("close")
@@ -124,7 +124,7 @@ class NoticeCard(Card):
 
 @dataclass(frozen=True, slots=True)
 class PlayDevices:
-    """The devices to play with: name and words of each, and the chosen one."""
+    """The devices for playing: name and label of each, and the chosen one."""
 
     choices: tuple[tuple[str, str], ...] = ()
     chosen: str = ""
@@ -135,14 +135,14 @@ class PlayDevices:
 
 
 def device_question(title: str, step: str, *, has_force: bool) -> Notice:
-    """Return the question before a device other than the simulated hand is used."""
+    """Return the question that is shown before a device other than the simulated hand is used."""
     force = "The force fades in when a trial begins; hold" if has_force else "This device does not produce force. Hold"
     question = f"Play from {step}, with the device {title}? {force} Esc to stop."
     return Notice(question, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
 
 def refusal_notice(problems: tuple[str, ...]) -> Notice:
-    """Return the notice with the problems that prevent playing from here."""
+    """Return the notice with the problems that prevent playing."""
     more = (f"and {len(problems) - _MOST_PROBLEMS} more",) if len(problems) > _MOST_PROBLEMS else ()
     sentence = "The study cannot be played from here: correct these problems first"
     actions = (("problems", "Show problems"), ("close", "Close"))
@@ -150,13 +150,13 @@ def refusal_notice(problems: tuple[str, ...]) -> Notice:
 
 
 def playing_notice(step: str, title: str) -> Notice:
-    """Return the notice that is shown while a pilot is played."""
+    """Return the notice shown while a pilot is played."""
     sentence = f"Playing from {step}, with the device {title}. Hold Esc to stop."
     return Notice(sentence, (("stop", "Stop"),), "ok", "play")
 
 
 def ended_notice(step: str, how: str) -> Notice:
-    """Return the question whether the data of a played pilot are kept."""
+    """Return the question whether to keep the data of a played pilot."""
     return Notice(f"Played from {step}: {how}. Its data are deleted unless you save them.", _KEEP, "neutral", "flag")
 
 
@@ -228,7 +228,7 @@ class StudyChoice:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HeaderState:
-    """The header."""
+    """The content of the header."""
 
     studies: tuple[StudyChoice, ...] = ()  # what can be opened
     chosen: str = ""  # the source of the open study; "" if none
@@ -244,7 +244,7 @@ class HeaderState:
 
 @dataclass(frozen=True, slots=True)
 class DesignerView:
-    """What the place shows, but the outline, which follows a moment later; without a form no study is open."""
+    """The content of the designer except the outline, which follows later; without a form no study is open."""
 
     header: HeaderState = HeaderState()
     form: Form | None = None
@@ -269,7 +269,7 @@ _OPENS = {
 
 
 class _StudyList(Choice):
-    """The studies that can be opened; keys open the list, none of them opens another study."""
+    """The studies that can be opened; keys open the list, but do not select another study."""
 
     def add_study(self, study: StudyChoice, *, opened: bool) -> None:
         self.addItem(study.words, study.source)
@@ -300,7 +300,7 @@ WIDEST_PROBLEMS, WIDEST_DRAFT, WIDEST_VERSION = "88 problems", "Draft kept 88:88
 
 
 class _ChipButton(Themed, PressedByEnter):
-    """A chip that is pressed; ``does`` says what follows."""
+    """A chip that can be pressed; ``does`` describes the effect."""
 
     def __init__(self, does: str) -> None:
         super().__init__()
@@ -338,10 +338,10 @@ class _ChipButton(Themed, PressedByEnter):
 
 
 class DesignerHeader(QWidget):
-    """Signals: ``study_asked`` (source), ``new_asked``, undo, redo, save.
+    """The header. Signals: ``study_asked`` (source), ``new_asked``, undo, redo, save.
 
-    ``keyboard_left`` is emitted when a button that has the keyboard is about to be disabled, and after a click between
-    the buttons or on one that is disabled.
+    ``keyboard_left`` is emitted when a focused button is about to be disabled, and after a click between the buttons or
+    on a disabled one.
     """
 
     study_asked = Signal(str)
@@ -429,7 +429,7 @@ class DesignerHeader(QWidget):
             part.setVisible(part.isVisibleTo(self) and self._row.minimumSize().width() + more <= self.width())
 
     def _announce_changes(self, before: HeaderState, state: HeaderState) -> None:
-        """Announce changes that happen by themselves, once: problems, and that a draft is kept."""
+        """Announce changes that happen by themselves once: problems, and a stored draft."""
         if not state.chosen or state.chosen != before.chosen:
             return
         if state.problems != before.problems:

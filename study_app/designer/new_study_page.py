@@ -73,9 +73,9 @@ FILE: Final = FOLDER / "known_answers.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KnownAnswer:
-    """A planted threshold (mean of ``people``), and what simulated studies find of it, in ``unit``.
+    """A planted threshold (mean of ``people``), and the estimates of simulated studies, in ``unit``.
 
-    ``found`` is the mean of the studies' thresholds, ``low`` and ``high`` the ends of the middle 90 % of them.
+    ``found`` is the mean of the studies' thresholds, ``low`` and ``high`` are the ends of the middle 90 % of them.
     """
 
     planted: float
@@ -106,7 +106,7 @@ class KnownAnswer:
 
 @cache
 def known_answers() -> dict[str, KnownAnswer]:
-    """Return the known answers of the templates that have one, computed when the templates were made."""
+    """Return the known answers of templates, which were computed when the templates were made."""
     answers: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
     return {name: KnownAnswer(**values) for name, values in answers.items()}
 
@@ -144,7 +144,7 @@ _STEPS: Final = ("pages", "blocks", "questionnaires")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OwnQuestion:
-    """A question of a template: its key, words, unit, what is permitted, and the value that the template has."""
+    """A question of a template: its key, text, unit, permitted values, and the template's value."""
 
     path: Place
     words: str
@@ -156,7 +156,7 @@ class OwnQuestion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TemplateChoice:
-    """What a new study can begin as."""
+    """A possible starting point for a new study."""
 
     source: str  # what it is opened by
     title: str
@@ -254,7 +254,7 @@ def _unit_of(study: Study, path: Place) -> str:
 def study_choices(opened: Document | None) -> tuple[StudyChoice, ...]:
     """Return the studies that can be opened: the open one, unsaved drafts, recent files, known names.
 
-    They are in the order of their titles; studies that ship with the program come last.
+    They are sorted by title; shipped studies come last.
     """
     known = dict.fromkeys([*map(str, unsaved_files(workspace().protocols)), *known_sources()])
     own = "" if opened is None else source_of(opened.file)
@@ -298,7 +298,7 @@ def _title_of_file(file: Path, _changed_ns: int, _size: int) -> str:
 def header_state(
     opened: Document | None, choices: tuple[StudyChoice, ...], warnings: int, version: VersionChip
 ) -> HeaderState:
-    """Return the header's state for the open study, which has so many ``warnings``."""
+    """Return the header's state for the open study with this number of ``warnings``."""
     if opened is None:
         return HeaderState(studies=choices)
     draft = "Saved" if not opened.edited and opened.base else "Not saved yet"
@@ -318,13 +318,13 @@ def header_state(
 
 
 def source_of(file: Path) -> str:
-    """Return the name that opens a study's file, else its path."""
+    """Return the name by which a study's file can be opened, else its path."""
     found_file = _protocol_file(file.stem)
     return file.stem if found_file is not None and found_file.resolve() == file.resolve() else str(file)
 
 
 def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
-    """Return the choices for a new study: templates, the empty one last, then studies to copy.
+    """Return the choices for a new study: templates, the empty one last, followed by studies to copy.
 
     Raises StudyError if the study ``source`` cannot be read.
     """
@@ -363,7 +363,7 @@ _DEEP: Final = "#142E40"
 
 
 def _paint_picture(painter: QPainter, name: str, body: QRectF) -> None:
-    """Paint the picture of a template into the upper part of its card: what a participant feels or answers."""
+    """Paint the picture of a template into the upper part of its card: the participant's task."""
     ground = QPainterPath()
     ground.addRoundedRect(body.adjusted(0, 0, 0, RADIUS_CARD), RADIUS_CARD, RADIUS_CARD)
     painter.save()
@@ -395,7 +395,7 @@ _RING = 4
 
 
 class Picture(QWidget):
-    """The picture of a template, above its words."""
+    """The picture of a template, above its text."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -407,9 +407,9 @@ class Picture(QWidget):
 
 
 class TemplateButton(Themed, QAbstractButton):
-    """One thing to begin from: its picture or icon, title, description and figures.
+    """A starting point for a study: its picture or icon, title, description and figures.
 
-    ``came`` is emitted when it gets the keyboard; it says whether by a click.
+    ``came`` is emitted when it gets the focus, with whether this was by a click.
     """
 
     came = Signal(bool)
@@ -480,7 +480,7 @@ _TICKS = 4
 
 
 class _RecoveryBar(Themed, QWidget):
-    """An axis from 0 with the middle 90 % of what is found as a bar, and the planted value as a line."""
+    """An axis from 0 with a bar for the middle 90 % of the estimates, and a line at the planted value."""
 
     def __init__(self, shown: KnownAnswer) -> None:
         super().__init__()
@@ -518,7 +518,7 @@ _NAME_HINT: Final = "small letters and digits"
 
 
 class Questions(Themed, QWidget):
-    """Fields for the answers; ``entered`` when Enter is pressed in one."""
+    """Fields for the answers; ``entered`` is emitted when Enter is pressed in one."""
 
     entered = Signal()
 
@@ -568,7 +568,7 @@ class Questions(Themed, QWidget):
         self.name.clear()
 
     def show_choice(self, choice: TemplateChoice) -> None:
-        """Show the questions of a template or copy; a typed name stays."""
+        """Show the questions of a template or copy; a typed name is kept."""
         before, self._choice = self._choice, choice
         if before is not None and before.source == choice.source:
             return
@@ -643,7 +643,7 @@ ACROSS, COPIES_ACROSS = 3, 4
 
 
 class NoStudyCard(Card):
-    """What is shown while no study is open, with the button ``new``."""
+    """The card shown while no study is open, with the button ``new``."""
 
     def __init__(self) -> None:
         super().__init__(padding=28, gap=12)

@@ -103,8 +103,8 @@ class OutlineRow:
 def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
     """Return the outline of a study; with a search text only the matching elements.
 
-    ``times_s``: how long each step takes [s], by its id; empty while the study has faults; ``find``: what an element's
-    title, id or one of its texts must hold, or the label or a choice of one of its fields.
+    ``times_s`` are the durations of steps [s] by id, empty while the study has faults; ``find`` is searched for in an
+    element's title, id and texts, and in the labels and choices of its fields.
     """
     if study.is_unreadable:
         only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))
@@ -205,7 +205,7 @@ HELP: Final = {"designs": "2IFC and other trial designs"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Addable:
-    """One thing that can be added: its words and icon, what is asked for, and a line of help."""
+    """A thing that can be added: its text and icon, the request, and a line of help."""
 
     words: str
     icon: str
@@ -214,7 +214,7 @@ class Addable:
 
 
 def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
-    """Return the addable elements: for lists of the selected element, its section, then the other sections."""
+    """Return what can be added: for lists of the selected element, its section, then the other sections."""
     document = study.document
     around = selected[:2] if len(selected) > 1 else ()
     lists = [row.path for row in rows(document, around) if row.kind == "list"] if around else []
@@ -253,9 +253,9 @@ def _addable_liquids() -> tuple[Addable, ...]:
 
 
 def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:
-    """Yield a question for each questionnaire that can get one, or only for the one that the element names.
+    """Yield a question for each questionnaire that can get one, or only for that of the element.
 
-    Where there are several, each says of which it is.
+    If there are several, each names its questionnaire.
     """
     named = value_at(study.document, (*around, "questionnaire")) if around else None
     tables = names(study.document, _QUESTIONNAIRES)
@@ -280,7 +280,7 @@ def _addable_instruments() -> tuple[Addable, ...]:
 
 
 def _addable_entry(study: Study, path: Path) -> Addable:
-    """Return the entry that adds to a list, found by each of its kinds."""
+    """Return the entry that adds to a list; a search finds it by each of its kinds."""
     known = tags(node_at(study.document, (*path, 0)))[1] if is_format_2(study.document) else ()
     kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
     to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
@@ -294,7 +294,7 @@ _MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown
 
 
 class AddList(Themed, QFrame):
-    """A list over the place; ``chosen`` carries an `Addable`."""
+    """A list over the page; ``chosen`` carries an `Addable`."""
 
     chosen = Signal(object)
 
@@ -377,7 +377,7 @@ _Index = QModelIndex | QPersistentModelIndex
 
 
 class _RowPainter(QStyledItemDelegate):
-    """Paints rows; the tree says the theme and whether rows may be moved."""
+    """Paints rows; the tree knows the theme and whether rows may be moved."""
 
     def __init__(self, tree: "Tree") -> None:
         super().__init__(tree)
@@ -475,10 +475,10 @@ _EDGE_PX = 24
 
 
 class Tree(Themed, QTreeView):
-    """The rows.
+    """The rows of the outline.
 
-    Signals: ``entered_row`` (by Enter), ``dropped`` (an entry of a list, and the place of the entry that it comes
-    before). Its menu shows its actions.
+    Signals: ``entered_row`` (by Enter), ``dropped`` (a list entry, and the entry before which it was dropped). Its menu
+    shows its actions.
     """
 
     entered_row = Signal()
@@ -593,8 +593,8 @@ class Tree(Themed, QTreeView):
 class OutlineCard(Coloured, Card):
     """Draws outline rows.
 
-    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``field_asked`` (path of a field that was
-    found, instead of these two).
+    Signals: ``chosen`` (path), ``element_clicked``, ``form_asked`` (Enter), ``field_asked`` (path of a matching field,
+    instead of the other two).
     """
 
     chosen = Signal(object)
@@ -640,7 +640,7 @@ class OutlineCard(Coloured, Card):
         self._sign.setIcon(icon("search", theme.text2, 16))
 
     def begin(self) -> None:
-        """Reset the outline for the next rows: at the top, everything closed, no search text."""
+        """Reset the outline for other rows: scrolled to the top, collapsed, without a search text."""
         self.rows, self._opened = (), set()
         self._filling = True
         self.items.clear()
@@ -648,7 +648,7 @@ class OutlineCard(Coloured, Card):
         self.words.clear()
 
     def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
-        """Show rows; open branches stay open. If nothing matches, a line says so."""
+        """Show rows; expanded branches stay expanded. If nothing matches, a line says so."""
         self._show_whether_found(rows)
         if rows != self.rows:
             current = self.tree.currentIndex()
@@ -689,7 +689,7 @@ class OutlineCard(Coloured, Card):
         self.nothing.setVisible(bool(sentence))
 
     def mark_row(self, path: object, *, reveals: bool = True) -> None:
-        """Mark the row of an element; ``reveals`` opens its branch and scrolls to it."""
+        """Mark the row of an element; with ``reveals`` its branch is expanded and scrolled to."""
         current = self.tree.currentIndex()
         if current.isValid() and current.data(ROW_ROLE).path == path:
             return
@@ -731,7 +731,7 @@ class OutlineCard(Coloured, Card):
             self.chosen.emit(index.data(ROW_ROLE).path)
 
     def _click(self, index: QModelIndex) -> None:
-        """Open or close the clicked branch, else go to the matching field."""
+        """Expand or collapse the clicked branch, else go to the matching field."""
         heading = self.items.hasChildren(index) and len(index.data(ROW_ROLE).path) == 1
         if heading or self.tree.arrow_pressed:
             self.tree.setExpanded(index, not self.tree.isExpanded(index))

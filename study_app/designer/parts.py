@@ -32,14 +32,14 @@ class _Segment(PressedByEnter):
             self.setAccessibleName(text)
 
     def nextCheckState(self) -> None:
-        """Leave it to `Segments` which is chosen."""
+        """Do nothing: `Segments` decides which one is checked."""
 
     def sizeHint(self) -> QSize:
         return QSize(round(QFontMetricsF(font("label", weight=600)).horizontalAdvance(self.text())) + 18, SEGMENT_PX)
 
 
 class Segments(Themed, QWidget):
-    """One of few values; ``chosen`` carries the value that a press or an arrow key asks for; ``tips`` are of values."""
+    """A choice between few values; ``chosen`` carries the value of a press or an arrow key; ``tips`` are by value."""
 
     chosen = Signal(object)
 
@@ -92,7 +92,7 @@ W = TypeVar("W", bound=QWidget)
 
 
 def make_dense(part: W, name: str, height: int = FIELD_PX) -> W:
-    """Give a field or list the designer's low form and an accessible name."""
+    """Give a field or list the designer's low height and an accessible name."""
     part.setAccessibleName(name)
     part.setProperty("dense", "true")
     part.setFont(font("label", weight=400))
@@ -101,7 +101,7 @@ def make_dense(part: W, name: str, height: int = FIELD_PX) -> W:
 
 
 def small_button(icon: str, label: str, *, cap: str = "", role: str = "", height: int = 34) -> ActionButton:
-    """Return a button with little room around its text."""
+    """Return a button with a small margin around its text."""
     made = ActionButton(icon, label, cap=cap, role=role, height=height)
     made.setProperty("dense", "true")
     made.setFont(font("label"))
@@ -109,7 +109,7 @@ def small_button(icon: str, label: str, *, cap: str = "", role: str = "", height
 
 
 def cut_text(text: str, role: TypeRole = "small", ink: Ink = "text2", *, right: bool = False) -> Elided:
-    """Return a line of text that ends in "…" if it is too long, aligned left or right."""
+    """Return a line of text that is elided if it is too long, aligned left or right."""
     made = Elided(role, ink)
     made.show_text(text)
     if right:

@@ -48,7 +48,7 @@ class ProblemRow:
 
     @property
     def identity(self) -> tuple[Path, str, bool]:
-        """The part that stays the same when lines are inserted above."""
+        """The part that does not change when lines are inserted above."""
         return self.fault.path, self.message, self.warning
 
     @property
@@ -79,7 +79,7 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
 
 
 def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ...]:
-    """Return the warnings of ``check``, in its order, each with the element that it names first."""
+    """Return the warnings of ``check`` in order, each with the first element that it names."""
     places = places_of(study.text) if study.is_toml else None
     rows = []
     for sentence in dict.fromkeys(sentences):
@@ -121,7 +121,7 @@ _REST_MS: Final = 500
 
 
 class RepairSearch(QObject):
-    """Finds the repairs of problems; ``found`` carries the problem and the words of its repairs."""
+    """Finds the repairs of problems; ``found`` carries a problem and the texts of its repairs."""
 
     found = Signal(object, object)
 
@@ -168,7 +168,7 @@ class RepairSearch(QObject):
 
 
 class RepairButton(ActionButton):
-    """Makes a repair of ``problem``; ``typed`` carries the event of a letter, which is meant for the field."""
+    """Repairs ``problem``; ``typed`` carries the event of a typed letter, which is meant for the field."""
 
     typed = Signal(object)
 
@@ -195,7 +195,7 @@ HEAD_PX, ROW_PX, NAME_PX, NARROW_NAME_PX, REPAIR_PX, NARROW_REPAIR_PX = 92, 47, 
 
 
 class ProblemLine(Coloured, QWidget):
-    """One problem; ``opened`` when it is clicked, ``repair_asked`` with the words of a repair."""
+    """One problem; ``opened`` is emitted when it is clicked, ``repair_asked`` with the text of a repair."""
 
     opened = Signal()
     repair_asked = Signal(str)
@@ -264,7 +264,7 @@ def _column(*parts: QWidget) -> QVBoxLayout:
 
 
 class ProblemsCard(Card):
-    """Signals: ``opened`` (a `ProblemRow`), ``repair_asked`` (row, words), ``close_asked``."""
+    """The list of problems. Signals: ``opened`` (a `ProblemRow`), ``repair_asked`` (row, text), ``close_asked``."""
 
     opened = Signal(object)
     repair_asked = Signal(object, str)
@@ -366,7 +366,7 @@ class ProblemsCard(Card):
 
     @property
     def under_pointer(self) -> bool:
-        """Whether the pointer is over the list, which then keeps its height so that a click hits nothing below."""
+        """Whether the pointer is over the list, which then keeps its height so that a click does not miss it."""
         return self.isVisible() and self.underMouse()
 
     def leaveEvent(self, event: QEvent) -> None:
@@ -385,7 +385,7 @@ class ProblemsCard(Card):
 
     @property
     def rows_after_current(self) -> tuple[ProblemRow, ...]:
-        """The rows after the current one; if the last is solved, from the row that took its place."""
+        """The rows after the current one; if it was solved, from the row that replaced it."""
         at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number
         at %= max(1, len(self.rows))
         return (*self.rows[at:], *self.rows[:at])

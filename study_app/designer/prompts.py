@@ -24,7 +24,7 @@ _PLACES_PX = 200
 
 
 class Prompt(Card):
-    """A question with a way back; ``answered`` carries what was chosen, ``given_up`` comes at Cancel and Esc."""
+    """A question that can be cancelled; ``answered`` carries the choice, ``given_up`` is emitted at Cancel and Esc."""
 
     answered = Signal(object)
     given_up = Signal()
@@ -47,7 +47,7 @@ class Prompt(Card):
 
 
 def naming_places(study: Study, path: Path) -> tuple[str, ...]:
-    """Return the places outside an element that refer to it, in words."""
+    """Return the places outside an element that refer to it, as text."""
     document = study.document
     places = (*references_to(document, path), *orphaned_keys(document, [path]))
     outside = [place for place in places if place[: len(path)] != path]
@@ -63,7 +63,7 @@ def _field_label(study: Study, place: Path) -> str:
 
 
 class DeleteCard(Prompt):
-    """What names an element that is to be deleted (``places``), and what becomes of it."""
+    """The references (``places``) to an element that is to be deleted, and what to do with them."""
 
     def __init__(self, study: Study, path: Path, places: tuple[str, ...]) -> None:
         document, count = study.document, len(places)
@@ -103,7 +103,7 @@ class DeleteCard(Prompt):
 
 
 class ConfirmCard(Prompt):
-    """Whether something is done that breaks or loses something; ``answered`` comes where it is."""
+    """A confirmation of something that breaks or loses data; ``answered`` is emitted if it is confirmed."""
 
     def __init__(self, title: str, explanation: str, action: str, icon: str = "", breaks: Sequence[str] = ()) -> None:
         super().__init__(title, explanation)
@@ -116,7 +116,7 @@ class ConfirmCard(Prompt):
 
 
 class SeriesCard(Prompt):
-    """Which number of an element differs in its copies, and its values; below are the titles that the copies get."""
+    """The number that varies between copies of an element, and its values, with the titles of the copies."""
 
     def __init__(self, study: Study, path: Path, numbers: Sequence[Row]) -> None:
         title = title_of(study.document, path)

@@ -31,10 +31,10 @@ _RETRY_MS: Final = 2_000
 class Saving(QObject):
     """Keeps the draft of the open study and writes its file.
 
-    ``kept`` is emitted when a draft was written or the banner changed, ``saved`` carries the file that was written,
-    ``copy_asked`` the study of which a copy is to be made, ``compare_asked`` the version to compare with (its hash, or
-    "file"), ``continued`` the study under another name that is open from now on; ``discarded`` is emitted when nothing
-    is left of the study, which was never saved.
+    ``kept`` is emitted when a draft was written or the banner changed, ``saved`` carries the written file,
+    ``copy_asked`` the study to be copied, ``compare_asked`` the version to compare with (its hash, or "file"),
+    ``continued`` the study under another name that replaces the open one; ``discarded`` is emitted when a study that
+    was never saved was discarded.
     """
 
     kept = Signal()
@@ -75,7 +75,7 @@ class Saving(QObject):
         self.banner = _banner_notice(opened) or self._notice
 
     def offer_to_discard(self) -> None:
-        """Show the time of the restored draft; for a study that was never saved each time it is opened."""
+        """Show the time of the restored draft; for a study that was never saved, whenever it is opened."""
         opened = self.editing.opened
         draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
         if opened is not None and draft is not None and opened.edited:
@@ -101,7 +101,8 @@ class Saving(QObject):
     def look_again(self) -> None:
         """Check whether the study may be edited, and whether another program changed its file.
 
-        Where it was not edited here, the file's content is taken in as a step; else it is asked which is to be kept.
+        If it was not edited here, the file's content is loaded as a step; otherwise the user is asked which one to
+        keep.
         """
         opened = self.editing.opened
         if opened is None:
@@ -115,7 +116,7 @@ class Saving(QObject):
             self.editing.announce_edit()
 
     def _look_after_return(self, state: Qt.ApplicationState) -> None:
-        """Check the file when the program becomes active: another one may have written it."""
+        """Check the file when the program becomes active, since another program may have written it."""
         if state == Qt.ApplicationState.ApplicationActive and self.place.isVisible():
             self.place.flush()
             self.look_again()
@@ -193,7 +194,7 @@ class Saving(QObject):
         self.place.show_prompt(card, card.first)
 
     def save_as_version(self, version: str) -> None:
-        """Set the study's version and save it; the card says why if that fails."""
+        """Set the study's version and save it; the card shows the reason if that fails."""
         opened = self.editing.writable
         if opened is None:
             return

@@ -27,7 +27,7 @@ _STATED: Final = re.compile(r"""^\s*version\s*=\s*["']([^"']+)""", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VersionChip:
-    """The chip of the version: tone, icon, words, what its tip says; and what the button that saves says."""
+    """The version chip: tone, icon, text and tool tip, and the text of the save button."""
 
     tone: Tone = "neutral"
     icon: str = "ring"
@@ -38,7 +38,7 @@ class VersionChip:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """How a study differs from a version: lines of a unified difference, or sentences, and a note about it."""
+    """The differences between a study and a version: lines of a unified diff, or sentences, and a note."""
 
     lines: tuple[str, ...] = ()
     note: str = ""
@@ -71,7 +71,7 @@ def version_choices(
 ) -> tuple[tuple[str, str], ...]:
     """Return key and label of each version to compare with: the file, run and saved versions, newest first.
 
-    ``file`` is what is said of the file, "" where it does not differ from the study; ``now`` is for "Today 14:02".
+    ``file`` is the label of the file, "" if it equals the study; ``now`` is used for "Today 14:02".
     """
     choices = [(FILE, file)] if file else []
     ran = {run.hash for run in known}

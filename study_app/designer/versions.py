@@ -45,9 +45,9 @@ _LOOK_MS: Final = 150
 
 
 class KnownRuns(QObject):
-    """The contents of the open study that sessions were run with; ``changed`` comes when they or the chip change.
+    """The contents of the open study that were used in sessions; ``changed`` is emitted when they or the chip change.
 
-    ``items`` counts the sessions of participants by questionnaire and id of the questions that they were asked.
+    ``items`` counts the sessions of participants by questionnaire and id of the questions asked.
     """
 
     changed = Signal()
@@ -65,7 +65,7 @@ class KnownRuns(QObject):
         editing.edited.connect(self._resting.start)
 
     def read_in_background(self) -> None:
-        """Read in the background which sessions there are."""
+        """Read the existing sessions in the background."""
         if (opened := self.editing.opened) is not None:
             self._reader.run(partial(_read_runs, self.editing.results, opened.name, opened.file))
 
@@ -109,7 +109,7 @@ _LETTERS_PX = 12
 
 
 class _DifferenceText(Coloured, QPlainTextEdit):
-    """A difference of texts, to be read and copied: lines that are gone begin with "-", new ones with "+"."""
+    """A text difference that can be copied: removed lines begin with "-", new ones with "+"."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -137,7 +137,7 @@ class _DifferenceText(Coloured, QPlainTextEdit):
 
 
 class SaveCard(Prompt):
-    """Signals: ``save_asked`` (version), ``another_asked`` (name), ``changes_asked``."""
+    """The card for saving. Signals: ``save_asked`` (version), ``another_asked`` (name), ``changes_asked``."""
 
     save_asked = Signal(str)
     another_asked = Signal(str)
@@ -229,7 +229,7 @@ _EQUAL: Final = "The study does not differ from this version."
 
 
 class Version(NamedTuple):
-    """A version to compare with: its source (text and liquid files) where a copy is kept, and a run with a receipt."""
+    """A version to compare with: its source (text and liquid files) if a copy is stored, and a run with a receipt."""
 
     source: str | None
     run: Run | None = None
@@ -240,7 +240,7 @@ class Version(NamedTuple):
 
 
 def version_of(opened: Document, run: Run) -> Version:
-    """Return a version that was run, from its kept copy or the present file."""
+    """Return a version that was run, from its stored copy or the current file."""
     source = source_of(run)
     if source is None:
         file = with_liquid_files(opened.saved.encode(), opened.study.folder)
@@ -255,7 +255,7 @@ def _kept_version(hash_: str) -> Version:
 
 
 def _file_version(file: Path) -> Version:
-    """Return the present content of a study's file."""
+    """Return the current content of a study's file."""
     try:
         return Version(file.read_bytes().decode("utf-8", "replace"))
     except OSError:
@@ -278,13 +278,13 @@ def compare(version: Version, study: Study) -> Comparison:
 
 
 def latest_run(known: Iterable[Run]) -> Run | None:
-    """Return the version that participants were run with last, else the last pilot or rehearsal."""
+    """Return the version used last with participants, else that of the last pilot or rehearsal."""
     ran = tuple(known)
     return next((run for run in reversed(ran) if run.sessions), ran[-1] if ran else None)
 
 
 class Changes(Card):
-    """The tab: how the open study differs from a version, while it is shown."""
+    """The tab with the differences between the open study and a version."""
 
     def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
         super().__init__(padding=14, gap=8)
@@ -403,7 +403,7 @@ BREAKS: Final = (
 
 
 class Renaming(QObject):
-    """Locks the ids of questions with recorded answers, until it is said what another id breaks."""
+    """Locks the ids of questions with recorded answers, until the consequences of a new id are confirmed."""
 
     def __init__(self, editing: Editing, place: DesignerPlace, runs: KnownRuns) -> None:
         super().__init__(editing)

@@ -51,7 +51,7 @@ _ASIDE_GAP = 24
 
 @dataclass(frozen=True, kw_only=True)
 class PanePage:
-    """A page of the pane."""
+    """A page of the right pane."""
 
     # name of the tab, and what it says
     name: str
@@ -65,7 +65,7 @@ class PanePage:
 
 
 class _RightPane(QWidget):
-    """Tabs, the page of the chosen one, and the facts; ``tab_shown`` carries the name of a tab when it is shown."""
+    """Tabs, the selected page, and the facts; ``tab_shown`` carries the name of a tab when it is shown."""
 
     tab_shown = Signal(str)
 
@@ -140,7 +140,7 @@ _FORM_SHARE = 44
 
 
 class _Crumb(PressedByEnter):
-    """A step of the path; its words end in "…" where its room is too small."""
+    """A step of the path; its text is elided if there is not enough room."""
 
     def __init__(self, text: str, least_px: int) -> None:
         super().__init__(text)
@@ -166,7 +166,7 @@ class _Crumb(PressedByEnter):
 
 
 class _PathBar(QWidget):
-    """The way to the element of the form, where the outline is a drawer; ``open_asked`` carries a path."""
+    """The path to the form's element, shown if the outline is a drawer; ``open_asked`` carries a path."""
 
     outline_asked = Signal()
     open_asked = Signal(object)
@@ -223,7 +223,7 @@ def _reading_order(part: QWidget, other: QWidget) -> int:
 
 
 class _Arrangement(QWidget):
-    """Places outline, form, pane and problems; ``used`` is that of the first three that had the keyboard last."""
+    """Places outline, form, pane and problems; ``used`` is the last focused one of the first three."""
 
     def __init__(
         self, header: DesignerHeader, outline: OutlineCard, form: FormCard, pane: _RightPane, file: FileCard,
@@ -301,7 +301,7 @@ class _Arrangement(QWidget):
             self.focus_outline()
 
     def close_drawer(self) -> None:
-        """Close the drawer, if there is one; its button takes the keyboard focus."""
+        """Close the drawer, if there is one; its button gets the focus."""
         if self.drawer and self.outline.isVisible():
             had = self.outline.isAncestorOf(self.window().focusWidget() or self)
             self._hide_drawer()
@@ -423,7 +423,7 @@ class _Arrangement(QWidget):
 
 
 class DesignerPlace(Place):
-    """Draws a `DesignerView`; ``asked`` carries what is asked for: a step of the study, or what else to `Do`."""
+    """Draws a `DesignerView`; ``asked`` carries a step of the study, or a task (`Do`)."""
 
     entered = Signal()
     left = Signal()
@@ -533,7 +533,7 @@ class DesignerPlace(Place):
     # display
 
     def show_view(self, view: DesignerView) -> None:
-        """Show a study; only what has changed is made anew."""
+        """Show a study; only changed parts are recreated."""
         before, self.view = self.view, view
         self.header.show_state(view.header)
         self.nothing.setVisible(view.form is None)
@@ -564,7 +564,7 @@ class DesignerPlace(Place):
         self.form.show_repairs(self.problems.repairs)
 
     def begin_study(self) -> None:
-        """Show the next view from the top: it is of another study."""
+        """Show the next view from the top, since it belongs to another study."""
         self.view, self.form.form = DesignerView(), None
         self.outline.begin()
         self.problems.begin()
@@ -591,7 +591,7 @@ class DesignerPlace(Place):
         first.setFocus()
 
     def close_prompt(self, *, elsewhere: bool = False) -> None:
-        """Close an open question; ``elsewhere``: another element is selected from now on."""
+        """Close an open question; ``elsewhere`` means that another element will be selected."""
         if self.prompt is not None:
             closing = self.prompt
             self.prompt = None
@@ -609,11 +609,11 @@ class DesignerPlace(Place):
         self.asked.emit(Do(what, arguments))
 
     def finish(self, what: Task, *arguments: Any) -> None:
-        """Hand on the typed text, then request a task with the element's resulting id."""
+        """Submit the typed text, then request a task with the element's resulting id."""
         self.asked.emit(self._with_typed_id(Do(what, arguments)))
 
     def _with_typed_id(self, asked: Any) -> Any:
-        """Hand on the typed text; return a path or request with the element's resulting id."""
+        """Submit the typed text; return a path or request with the element's resulting id."""
         before = () if self.form.form is None else self.form.form.path
         self.flush()
         after = () if self.form.form is None else self.form.form.path
@@ -632,7 +632,7 @@ class DesignerPlace(Place):
         self.adding.open(every, button.mapToGlobal(button.rect().topLeft()))
 
     def _handle_request(self, asked: object) -> None:
-        """Hand on a request after the typed text; the page carries out its own tasks."""
+        """Forward a request after the typed text; the page carries out its own tasks."""
         if not (isinstance(asked, SetText | LeaveText) or (isinstance(asked, SetValue) and asked.typing)):
             asked = self._with_typed_id(asked)
         match asked:
@@ -701,7 +701,7 @@ class DesignerPlace(Place):
         self.left.emit()
 
     def focusNextPrevChild(self, forward: bool) -> bool:
-        """Let Tab follow the reading order of visible parts, then go to the start of the window; Shift+Tab back."""
+        """Let Tab follow the reading order of visible parts and then wrap around; Shift+Tab goes back."""
         self.flush()
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)  # new parts are laid out
         in_order, here = list(focus_stops(self)), self.window().focusWidget()

@@ -37,7 +37,8 @@ from study_app.protocol.wording.languages import LANGUAGES, language_name, langu
 def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:
     """Return the edits that change the kind of a table; None stands for the kind without the key.
 
-    Keys of both kinds keep their values, the others are removed; keys that the new kind needs get an initial one.
+    Keys that both kinds have keep their values, others are removed; keys that the new kind requires get an initial
+    value.
     """
     key, named = tags(node_at(study.document, path))
     if not key or kind not in named:
@@ -58,7 +59,7 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
 
 
 def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
-    """Return edits of a block's design, followed by what the design fixes.
+    """Return edits of a block's design and the further edits that the design requires.
 
     Keys that no longer belong to the block are removed; a questionnaire comes after the block, once; the first
     condition becomes the standard.
@@ -114,7 +115,7 @@ def edits_to_fill_in(study: Study, code: str) -> tuple[Edit, ...]:
 
 
 def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
-    """Yield every text that is in the languages of a study, labels of scales included, with its place."""
+    """Yield every localised text of a study with its place, including labels of scales."""
     for pattern in TEXTS:
         yield from entries(study.document, pattern)
 
@@ -122,7 +123,7 @@ def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
 def edits_to_move(study: Study, entry: Path, to: int) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that move an entry of a list before the entry ``to``, and its new path.
 
-    ``to`` counts before the move; the length of the list stands for its end. Parts of the study are renumbered if they
+    ``to`` is an index before the move; the length of the list means its end. Parts of the study are renumbered if they
     were numbered correctly before.
     """
     place, index = entry[:-1], int(entry[-1])
@@ -180,14 +181,14 @@ _HALVINGS: Final = 12
 
 @dataclass(frozen=True, slots=True)
 class Repair:
-    """What a button says, and the edits that it makes as one step."""
+    """A repair: the text of its button, and the edits that it makes as one step."""
 
     words: str
     edits: tuple[Edit, ...]
 
 
 def repairs(study: Study, fault: Fault) -> tuple[Repair, ...]:
-    """Return the repairs of a fault, by its kind: after each of them it is gone."""
+    """Return the repairs for a fault, each of which removes it."""
     offered = (*_level_repairs(study, fault), *_stated_repairs(study, fault), *_repairs_by_kind(study, fault))
     return tuple(repair for repair in offered if _removes_fault(study, fault, repair))
 
@@ -204,7 +205,7 @@ def _removes_fault(study: Study, fault: Fault, repair: Repair) -> bool:
 
 
 def _stated_repairs(study: Study, fault: Fault) -> Iterator[Repair]:
-    """Yield the value or key that the fault proposes; for a number with a wrong sign, the number without it."""
+    """Yield the value or key that the fault proposes; for a wrong sign, the number without it."""
     if fault.use is None:
         return
     path, value = fault.use
@@ -260,7 +261,7 @@ def _level_repairs(study: Study, fault: Fault) -> Iterator[Repair]:
 def _lowered_levels(study: Study, stimulus: str, highest: float) -> dict[str, tuple[float, ...]]:
     """Return the listed levels of a stimulus' methods, capped at the highest one, if any exceeds it.
 
-    A method of another stimulus, too, keeps its levels.
+    A method that another stimulus also uses keeps its levels.
     """
     blocks = () if study.formed is None else study.formed.blocks.values()
     lowered_levels: dict[str, tuple[float, ...]] = {}
@@ -273,7 +274,7 @@ def _lowered_levels(study: Study, stimulus: str, highest: float) -> dict[str, tu
 
 
 def _highest_level(study: Study, fault: Fault, low: float, high: float) -> float | None:
-    """Return the highest level, in three digits, without this kind of fault; None if even ``low`` has it."""
+    """Return the highest level without this kind of fault, with three digits; None if ``low`` already has it."""
     formed = study.formed
     if formed is None:
         return None
@@ -308,7 +309,7 @@ def edits_to_add(
 ) -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that add an element to a section or list as one step, and its path.
 
-    ``name`` is the preferred name of a table; it is written after the table or entry ``behind``, else at the end.
+    ``name`` is the preferred name of a table; it is inserted after the table or entry ``behind``, or at the end.
     """
     row = row_at(study.document, section)
     if row is None or row.kind not in {"tables", "list"}:
@@ -358,7 +359,7 @@ def _unsets(edit: Edit, path: Path) -> bool:
 
 
 def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
-    """Return the repairs of a reference to a missing element: each adds an element of that name."""
+    """Return the repairs for a reference to a missing element: each adds an element with that name."""
     name = value_at(study.document, fault.path)
     if fault.kind != "unknown name" or not isinstance(name, str):
         return ()
@@ -375,7 +376,7 @@ def additions_for(study: Study, fault: Fault) -> tuple[Repair, ...]:
 def edits_to_duplicate(study: Study, path: Path, wanted: str = "") -> tuple[tuple[Edit, ...], Path]:
     """Return the edits that copy an element right after itself as one step, and the path of the copy.
 
-    The copy has the name ``wanted``, or the next free one, the next free code letter, and a place in the session if it
+    The copy gets the name ``wanted``, or the next free one, the next free code letter, and a place in the session if it
     needs one. Its texts are those of the original.
     """
     table = value_at(study.document, path)
@@ -432,7 +433,7 @@ _DEEPEST: Final = 2
 def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     """Return the numbers of an element that a series can vary, in the order of its form.
 
-    Pages differ only in their texts, so there is no series of them.
+    Pages differ only in their texts, so they have none.
     """
     section = row_at(document, path[:1])
     if len(path) != 2 or path[0] == "pages" or section is None or section.kind != "tables":
@@ -462,7 +463,7 @@ def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
 
 
 def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float]) -> None:
-    """Refuse values that copies of an element cannot have."""
+    """Reject values that copies of an element cannot have."""
     known = [row.value]
     for value in values:
         if why := violated_bound(document, row, value):

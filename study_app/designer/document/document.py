@@ -45,10 +45,10 @@ from study_app.workspace import workspace
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What a new study begins with; what is left out stays as it is in the template.
+    """The initial settings of a new study; omitted ones are taken from the template.
 
-    Texts of languages that the template lacks are missing. Where it lacks all of them, the first one has the texts of
-    the template's first language.
+    Texts in languages that the template lacks are missing. If it lacks all of them, the first language gets the texts
+    of the template's first language.
     """
 
     title: str = ""
@@ -73,7 +73,7 @@ def template(name: str) -> Study:
 
 
 def copy_of(study: Study, name: str) -> Study:
-    """Return a copy of a study under another name, comments included, as version 0.1.
+    """Return a copy of a study under another name, including comments, as version 0.1.
 
     Raises Refused if the name is not permitted, or the study cannot be read.
     """
@@ -142,7 +142,7 @@ def _check_name(name: str) -> None:
 
 
 def taken_names() -> set[str]:
-    """Return the short names of studies: those that ship, and those of the workspace, saved or not."""
+    """Return the short names of all studies: shipped ones, and those of the workspace, saved or not."""
     folder = workspace().protocols
     return {*shipped(), *(file.stem for file in (*folder.glob("*.toml"), *unsaved_files(folder)))}
 
@@ -160,7 +160,7 @@ _VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
 
 @dataclass(frozen=True, slots=True)
 class DoneStep:
-    """A step that was made: its words ("Move Honey up"), its splices, and what was selected before and after it."""
+    """A completed step: its description ("Move Honey up"), its splices, and the selection before and after it."""
 
     words: str
     splices: tuple[Splices, ...]
@@ -169,11 +169,11 @@ class DoneStep:
 
 
 class Document:
-    """A study that is open in the designer, with what was done in it.
+    """A study that is open in the designer, with its undo history.
 
-    ``base`` is the hash of the file's content that is edited and ``saved`` its text, "" for a new file; ``read_only``
-    says why it cannot be changed, "" where it can; ``draft`` was found when it was opened, ``kept`` is when it was
-    written last.
+    ``base`` is the hash of the file content that is edited and ``saved`` its text, "" for a new file; ``read_only`` is
+    the reason why it cannot be changed, or ""; ``draft`` was found when it was opened, ``kept`` is the time of the last
+    draft.
     """
 
     def __init__(
@@ -194,9 +194,10 @@ class Document:
     def edit(
         self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None, key: object = None
     ) -> None:
-        """Replace the text, apply edits in their order, or both, as one step; if nothing changes, there is no step.
+        """Replace the text, apply edits in order, or both, as one step; without a change there is no step.
 
-        A step with the ``key`` of the last step, made within `_JOIN_S`, is joined to it. Refused edits change nothing.
+        A step with the same ``key`` as the last one, made within `_JOIN_S`, is joined to it. Rejected edits change
+        nothing.
         """
         study, splices = (self.study, ()) if text is None else self.study.with_text(text)
         if edits or text is None:
@@ -214,7 +215,7 @@ class Document:
         self.done = [*self.done, DoneStep(name, splices, before, selected)][-_MOST_STEPS:]
 
     def end_step(self) -> None:
-        """Close the current undo step: the next edit begins a new one."""
+        """Close the current undo step; the next edit begins a new one."""
         self.last = (None, 0.0)
 
     def undo(self) -> None:
@@ -240,12 +241,12 @@ class Document:
 
     @property
     def name(self) -> str:
-        """The name of the study, which its results folder has, too."""
+        """The name of the study, also used for its results folder."""
         return str(value_at(self.study.document, ("study", "name")) or "")
 
     @property
     def version(self) -> str:
-        """The version that the study states, or the default version."""
+        """The version stated in the study, or the default version."""
         stated = value_at(self.study.document, ("study", "version"))
         return str(stated) if stated is not None else _DEFAULT_VERSION
 
@@ -256,7 +257,7 @@ class Document:
         return self.study.text != self.saved
 
     def note_edit(self, now_s: float) -> None:
-        """Schedule the draft after an edit; none is needed if the text equals the file again."""
+        """Schedule the draft after an edit; none is needed if the text equals the file."""
         if self.edited or not self.base:
             self.keeper.note_edit(self.study.text, self.selected, now_s)
         else:
@@ -328,7 +329,7 @@ class Document:
     # versions
 
     def source(self) -> bytes:
-        """Return the content that a session would run: the text and the liquid files that it names."""
+        """Return the content that a session would use: the text and the liquid files that it names."""
         return with_liquid_files(self.study.text.encode(), self.study.folder)
 
     def standing(self, known: tuple[Run, ...]) -> Standing:
@@ -338,9 +339,9 @@ class Document:
         return standing(content_hash(self.source()), base, self.version, known)
 
     def save(self, known: tuple[Run, ...]) -> None:
-        """Write the file, and keep the content that sessions will run.
+        """Write the file, and store the content for sessions.
 
-        It is refused where sessions were run with this version and another content, or the file was changed outside.
+        It is rejected if sessions were run with this version and other content, or if the file was changed outside.
         """
         source = self.source()
         if others := self.standing(known).others:
@@ -376,7 +377,7 @@ class Document:
         self.study = replace(self.study, folder=folder)
 
     def copy_as(self, name: str) -> Document:
-        """Return the edited study under another name, as one step; this one returns to its file."""
+        """Return the edited study under another name as one step; this document returns to its file's content."""
         made = Document(self.study, self.selected, check_free_name(name))
         made.done = [*self.done]
         made.edit(f"Save as {name}", text=copy_of(self.study, name).text)
@@ -419,7 +420,7 @@ def _file_content(file: Path) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How a study's content stands to those that participants were run with."""
+    """The relation of a study's content to the contents with which participants were run."""
 
     version: str  # to save it as: its own, or the next free one
     was: str = ""  # the version that was run last, "" if none was
@@ -429,10 +430,10 @@ class Standing:
 
 
 def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
-    """Return how a study's content relates to the versions that were run; pilots and rehearsals protect nothing.
+    """Return how a study's content relates to the versions that were run; pilots and rehearsals are ignored.
 
-    ``hash_`` and ``base`` are the ``protocol_hash`` of the study as it is edited, and of the file that it is edited
-    from, "" for a new study; ``version`` is what the study states.
+    ``hash_`` and ``base`` are the ``protocol_hash`` of the edited study and of the file from which it is edited, "" for
+    a new study; ``version`` is the version stated in the study.
     """
     ran = [run for run in known if run.sessions]
     if not ran:
@@ -447,7 +448,7 @@ def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Stand
 
 
 def check_version(version: str, known: Iterable[Run]) -> None:
-    """Refuse a text that cannot be the version of content that was not run."""
+    """Reject a text that cannot be the version of a content that was not run."""
     if not _VERSION.fullmatch(version):
         raise Refused(f'"{version}" cannot be a version: write letters, digits, dots, plus and minus, such as 1.2')
     if any(run.sessions and run.version == version for run in known):
@@ -455,7 +456,7 @@ def check_version(version: str, known: Iterable[Run]) -> None:
 
 
 def next_version(version: str) -> str:
-    """Return a version with its last number raised: 1.2 for 1.1; without a number, with ".1" added."""
+    """Return a version with its last number incremented: 1.2 for 1.1; without a number, with ".1" appended."""
     last = re.search(r"(\d+)(\D*)$", version)
     if last is None:
         return f"{version}.1"

@@ -81,9 +81,9 @@ def element(study: Study, path: Path, depth: int = 0) -> Element:
 
 
 def title_of(document: Mapping[str, Any], path: Path) -> str:
-    """Return an element's title in the first language, else its id with spaces and a capital.
+    """Return an element's title in the first language, else its capitalised id with spaces.
 
-    An entry of a list without either is called by its first texts.
+    A list entry without either is named by its first texts.
     """
     value = value_at(document, path)
     if not isinstance(value, Mapping) or len(path) == 1:
@@ -97,7 +97,7 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
 
 
 def study_title(document: Mapping[str, Any]) -> str:
-    """Return the title of a study in its first language; "" where it has none."""
+    """Return the title of a study in its first language; "" if it has none."""
     head = document.get("study")
     return _title_text(document, head) if isinstance(head, Mapping) else ""
 
@@ -112,14 +112,14 @@ def _title_text(document: Mapping[str, Any], value: Mapping[str, Any]) -> str:
 def has_text(document: Mapping[str, Any], path: Path, sought: str, *, named: bool = False) -> bool:
     """Return whether title, id or any text of an element, in any language, contains the text.
 
-    ``named`` leaves the texts out, but the title.
+    With ``named`` only title and id are searched.
     """
     texts = () if named else _all_texts(value_at(document, path))
     return any(sought.casefold() in text.casefold() for text in (str(path[-1]), title_of(document, path), *texts))
 
 
 def _session_elements(study: Study) -> Iterator[Element]:
-    """Yield the steps of every sequence, blocks with what they refer to, questionnaires with their items."""
+    """Yield the steps of every sequence, blocks with the tables they use, questionnaires with their items."""
     document = study.document
     steps: list[Path] = [(*place, index) for place, listed in sequences_in(document) for index in range(len(listed))]
     things = [(named_at(document, step), step) for step in steps]
@@ -139,7 +139,7 @@ def _session_elements(study: Study) -> Iterator[Element]:
 
 
 def rows_of_blocks(document: Mapping[str, Any]) -> tuple[Row, ...]:
-    """Return the rows about all main blocks: their order, if there are several, and the hypotheses."""
+    """Return the form rows that concern all main blocks: their order, if there are several, and the hypotheses."""
     blocks = [block for _, block in entries(document, "blocks.*") if isinstance(block, Mapping)]
     several = sum(block.get("phase", "main") == "main" for block in blocks) > 1
     places = [("study", "block_order")] * several + [("analysis", "contrasts")]
@@ -190,7 +190,7 @@ def position_of(document: Mapping[str, Any], path: Path) -> tuple[int, int] | No
 
 
 def first_element(document: Mapping[str, Any]) -> Path:
-    """Return the path of the element that is selected first: the first session step, else the study's table."""
+    """Return the path of the initially selected element: the first session step, else the study's table."""
     steps = ((*place, 0) for place, listed in sequences_in(document) if listed)
     return next((named for step in steps if (named := named_at(document, step)) is not None), FIRST)
 
@@ -209,7 +209,7 @@ def kind_of(path: Path) -> str:
 
 
 def kind_and_title(document: Mapping[str, Any], path: Path) -> str:
-    """Return "Condition Water", or the title alone if it names the kind."""
+    """Return kind and title, such as "Condition Water", or only the title if it contains the kind."""
     kind, title = kind_of(path), title_of(document, path)
     return title if title.casefold().startswith(kind.casefold()) else f"{kind} {title}"
 
@@ -237,9 +237,9 @@ def short_note(document: Mapping[str, Any], path: Path) -> str:
 
 
 def usage_text(document: Mapping[str, Any], path: Path) -> str:
-    """Return how many elements use an element: "used by 3 conditions", "not used".
+    """Return the number of uses of an element as text: "used by 3 conditions", "not used".
 
-    It is "" of steps and settings.
+    It is "" for steps and settings.
     """
     if len(path) != 2 or path[0] not in _USED:
         return ""
@@ -262,7 +262,7 @@ _DEEPEST: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class FoundField:
-    """A field that was found."""
+    """A field that matches a search."""
 
     element: Path
     field: Path  # in the element
@@ -272,14 +272,14 @@ class FoundField:
 
 
 def search_words(text: str) -> list[str]:
-    """Return the search words, each without the "s" of a plural."""
+    """Return the search words, each without a plural "s"."""
     return [part.removesuffix("s") if len(part) > _SHORTEST else part for part in text.casefold().split()]
 
 
 def found_fields(study: Study, text: str) -> tuple[FoundField, ...]:
-    """Return the fields whose labels or choices have words beginning with the search words, labels first.
+    """Return the fields whose labels or choices have words that begin with the search words, labels first.
 
-    Choices that are not chosen count where no label and nothing that is chosen has the words; sentences count last.
+    Choices that are not selected are considered only if no label and no selected choice matches; sentences come last.
     """
     parts = search_words(text)
     if not parts or len(text.strip()) < _SHORTEST:
@@ -325,7 +325,7 @@ def _fields_of_table(study: Study, path: Path, above: str, depth: int = 0) -> It
 
 
 def _matches_in_field(field: tuple[Path, Row, str], parts: list[str]) -> Iterator[FoundField]:
-    """Yield the field if its label has the words, else once for each choice that has them."""
+    """Yield the field if its label matches, else once for each matching choice."""
     element, row, label = field
     if _has_words(label, parts):
         yield FoundField(element, row.path, label)
@@ -341,7 +341,7 @@ def _matches_in_field(field: tuple[Path, Row, str], parts: list[str]) -> Iterato
 
 
 def _has_words(text: str, parts: list[str]) -> bool:
-    """Return whether each part begins a word of a text."""
+    """Return whether each part is the beginning of a word in a text."""
     spaced = " " + " ".join(text.casefold().replace("-", " ").replace(",", " ").replace("(", " ").split())
     return all(f" {part}" in spaced for part in parts)
 

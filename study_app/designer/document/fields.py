@@ -33,7 +33,7 @@ _MAY_LEAVE_OUT = (("blocks", "task"), ("stimuli", "condition"))
 
 
 def named_at(document: Document, place: Path) -> Path | None:
-    """Return the path of the element that the text at ``place`` names, or None."""
+    """Return the path of the element to which the text at ``place`` refers, or None."""
     name = value_at(document, place)
     if not isinstance(name, str):
         return None
@@ -73,7 +73,7 @@ def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
 
 @cache
 def _designs() -> dict[str, Design]:
-    """Return the designs that need no key but their kind."""
+    """Return the designs whose keys all have defaults."""
     return {
         kind: default_design(kind)
         for kind, design in DESIGNS.items()
@@ -82,14 +82,14 @@ def _designs() -> dict[str, Design]:
 
 
 def _designs_for(block: Mapping[str, Any]) -> Iterator[str]:
-    """Yield the kinds of designs that a block can have: one of conditions compares them with its standard."""
+    """Yield the kinds of designs that a block can have; conditions are compared with a standard."""
     for kind, design in _designs().items():
         if "stimulus" in block or (design.has_standard and not design.adjusts):
             yield kind
 
 
 def kind_note(place: Path, kind: str) -> str:
-    """Return what a paper calls a kind of design, and what it asks; for a method, how it chooses levels."""
+    """Return the published name of a kind of design and its question; for a method, its rule for levels."""
     if place[-1] == "design" and kind in _designs():
         design = _designs()[kind]
         return f"{design.paper_name}: {LANGUAGES['en'].design_questions[design.wording]}"
@@ -107,7 +107,7 @@ def edits_to_rename(
 ) -> tuple[Edit, ...]:
     """Return the edits that rename a table or item and all references to it.
 
-    Where the name is refused, a free one is proposed that is not one of those with ``recorded`` answers.
+    If the name is rejected, a free one without ``recorded`` answers is proposed.
     """
     item = _item_id(document, thing)
     taken = _sibling_names(document, thing)
@@ -155,9 +155,10 @@ def edits_to_replace(document: Document, thing: Path, other: str) -> tuple[Edit,
 
 
 def with_references(document: Document, thing: Path, needs: Callable[[Path], bool]) -> tuple[Path, ...]:
-    """Return the paths that must be deleted with an element, itself last: list entries, keys and whole tables.
+    """Return the paths that must be deleted with an element (last): list entries, keys and whole tables.
 
-    A table whose key ``needs`` says that it cannot be without goes too, and so does one whose list would be empty.
+    A table for which a key is required according to ``needs`` is deleted too, and so is one whose list would become
+    empty.
     """
     named: dict[Path, list[Path]] = {}
     for place, target in _uses_without_conditions(document):
@@ -181,7 +182,7 @@ def with_references(document: Document, thing: Path, needs: Callable[[Path], boo
 
 
 def edits_to_delete(paths: Iterable[Path]) -> tuple[Edit, ...]:
-    """Return the edits that remove these paths: later entries of an array first, nothing twice."""
+    """Return the edits that remove these paths: later entries of an array first, without duplicates."""
     every = set(paths)
     outer = [path for path in every if not any(path[:length] in every for length in range(1, len(path)))]
     return tuple(
@@ -195,7 +196,7 @@ def edits_to_delete(paths: Iterable[Path]) -> tuple[Edit, ...]:
 
 
 def check_id(name: str, free: str = "") -> None:
-    """Refuse an invalid id and propose a valid one."""
+    """Reject an invalid id and propose a valid one."""
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
@@ -212,7 +213,7 @@ def _is_covered(path: Path, outer: Iterable[Path]) -> bool:
 
 
 def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield every place of a reference with its target."""
+    """Yield every place that contains a reference, with its target."""
     for pattern in CHOICES:
         for place, name in entries(document, pattern):
             for section in _sections(document, pattern):
@@ -227,7 +228,7 @@ def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
 
 
 def uses(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield every reference, and each omitted key with the only table that it can mean."""
+    """Yield every reference, and each omitted key with the only table to which it can refer."""
     yield from named_places(document)
     for section, key in _MAY_LEAVE_OUT:
         (of,) = _sections(document, f"{section}.*.{key}")
@@ -235,7 +236,7 @@ def uses(document: Document) -> Iterator[tuple[Path, Path]]:
 
 
 def orphaned_keys(document: Document, things: Iterable[Path]) -> tuple[Path, ...]:
-    """Return the omitted keys that mean nothing once all of these tables are deleted."""
+    """Return the omitted keys that refer to nothing once all of these tables are deleted."""
     gone = set(things)
     meant: dict[Path, set[Path]] = {}
     for place, named in _uses_without_conditions(document):
@@ -245,7 +246,7 @@ def orphaned_keys(document: Document, things: Iterable[Path]) -> tuple[Path, ...
 
 
 def _uses_without_conditions(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield what `uses` yields, and the meaning of omitted keys once the study has no conditions."""
+    """Yield the same as `uses`, with the meaning of omitted keys in a study without conditions."""
     yield from uses(document)
     if "conditions" in document:
         yield from _implied_uses(document, "stimuli", "condition", "liquids")
@@ -258,7 +259,7 @@ def _implied_uses(document: Document, section: str, key: str, of: str) -> Iterat
 
 
 def _sections(document: Document, pattern: str) -> tuple[str, ...]:
-    """Return the sections whose tables places may name; where a study has no conditions, each liquid is one."""
+    """Return the sections to whose tables a pattern may refer; without conditions, each liquid counts as one."""
     sections = CHOICES[pattern]
     return ("liquids",) if sections == ("conditions",) and "conditions" not in document else sections
 
@@ -289,7 +290,7 @@ OWN = "own description"
 
 
 def node_at(document: Any, path: Path) -> tuple[_Node, ...]:
-    """Return the schema's alternatives for the value at ``path``, present or not; none if no value is permitted."""
+    """Return the schema's alternatives for the value at ``path``, present or not; empty if no value is permitted."""
     nodes: list[_Node] = [schema()]
     for step in path:
         nodes = [child for node in (table_of(tuple(nodes), document),) if node for child in _children(node, step)]
@@ -349,7 +350,7 @@ def _is_of(node: _Node, tables: list[_Node], value: Mapping[str, Any]) -> bool:
 
 
 def _distinguishes(key: str, tables: list[_Node]) -> bool:
-    """Return whether the key has another fixed value in each table; one table may lack it."""
+    """Return whether the key has a different fixed value in each table; one table may lack it."""
     values = [_fixed_values(node, key) for node in tables]
     every = [value for some in values for value in some]
     return sum(map(bool, values)) >= len(tables) - 1 and len(every) == len(set(every))
@@ -549,7 +550,7 @@ def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tup
 
 
 def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
-    """Return the keys that a table with its present values does not permit."""
+    """Return the keys that a table with its current values does not permit."""
     table = value_at(document, path)
     node = table_of(node_at(document, path), table) or {}
     if not isinstance(table, Mapping):
@@ -653,7 +654,7 @@ def _permitted_values(node: _Node) -> tuple[Any, ...]:
 
 
 def is_localised(nodes: tuple[_Node, ...]) -> bool:
-    """Return whether the value of such nodes is a text, or one for each language."""
+    """Return whether the value of these nodes is a text, or one text per language."""
     if len(nodes) != 2 or nodes[0].get("type") != "string":
         return False
     return nodes[1].get("additionalProperties") == {"type": "string"}
@@ -683,7 +684,7 @@ def violated_bound(document: Mapping[str, Any], row: Row, number: float) -> str:
 
 
 def label_of(step: str | int) -> str:
-    """Return a key in words without its unit: "Force limit" for ``force_limit_n``; for an entry its number."""
+    """Return a key as a label without its unit: "Force limit" for ``force_limit_n``; for a list entry its number."""
     if isinstance(step, int):
         return str(step + 1)
     if step in _LABELS:
@@ -694,7 +695,7 @@ def label_of(step: str | int) -> str:
 
 
 def name_label(name: str) -> str:
-    """Return an ID in words: "Thick honey" for ``thick_honey``."""
+    """Return an ID as a label: "Thick honey" for ``thick_honey``."""
     return _KIND_LABELS.get(name, name.replace("_", " ").strip().capitalize())
 
 
@@ -720,22 +721,22 @@ LETTER: Final = "^[A-Z]$"
 
 
 def element_noun(section: str | int) -> str:
-    """Return the name of an element of a section: "liquid" of ``liquids``."""
+    """Return the noun for an element of a section: "liquid" for ``liquids``."""
     return _SINGULAR.get(str(section), str(section).removesuffix("s"))
 
 
 def counted_elements(number: int, section: str | int) -> str:
-    """Return "1 stimulus", "2 stimuli" of ``stimuli``."""
+    """Return a count with the noun of a section: "1 stimulus", "2 stimuli" for ``stimuli``."""
     return counted(number, element_noun(section), _PLURAL.get(str(section), str(section)))
 
 
 def _new_text(section: str | int) -> str:
-    """Return the initial text of an element of a list: "New question" of ``items``."""
+    """Return the initial text of a list element: "New question" for ``items``."""
     return f"New {element_noun(section)}"
 
 
 def initial_value(document: Mapping[str, Any], path: Path) -> Any:
-    """Return a valid value for a key that is not in the study."""
+    """Return a valid value for a key that is missing in the study."""
     row = row_at(document, path)
     if row is None or row.kind == "unknown":
         raise Refused(f"{label_of(path[-1])} is not a key of this table")
@@ -775,7 +776,7 @@ def _initial_of_kind(document: Mapping[str, Any], row: Row, node: _Node) -> Any:
 
 
 def _initial_tables(document: Mapping[str, Any], path: Path, node: _Node) -> list[Any]:
-    """Return the minimum number of tables of a list, each with its required keys, or of lists for sequences."""
+    """Return the minimum number of tables for a list, each with its required keys, or of lists for sequences."""
     tables: list[Any] = []
     for number in range(max(1, node.get("minItems", 1))):
         place = (*path, number)

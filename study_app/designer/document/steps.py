@@ -67,7 +67,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class Situation:
-    """The study that a step is made in, what is selected, and ids with recorded answers."""
+    """The context of a step: the study, the selection, and ids with recorded answers."""
 
     study: Study
     selected: Path = ()
@@ -75,7 +75,7 @@ class Situation:
 
 
 class Request:
-    """What is asked for; `step` refuses what makes no sense in a study."""
+    """A requested change; `step` rejects it if it is impossible in the study."""
 
     __slots__ = ()
 
@@ -85,7 +85,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class SetValue(Request):
-    """Give a key or entry a value; several while one field is typed in are one step."""
+    """Set the value of a key or entry; consecutive changes while typing in one field are one step."""
 
     path: Path
     value: Any
@@ -98,7 +98,7 @@ class SetValue(Request):
 
 @dataclass(frozen=True, slots=True)
 class SetText(Request):
-    """Give a text in one language."""
+    """Set a text in one language."""
 
     path: Path
     language: str
@@ -120,7 +120,7 @@ class SetText(Request):
 
 @dataclass(frozen=True, slots=True)
 class LeaveText(Request):
-    """Say that a text is left: a new element takes the id of its text."""
+    """Report that a text field was left; a new element then gets an id from its text."""
 
     path: Path
 
@@ -138,7 +138,7 @@ class RemoveKey(Request):
 
 @dataclass(frozen=True, slots=True)
 class AddKey(Request):
-    """Write an optional key with its default or an initial value."""
+    """Add an optional key with its default or an initial value."""
 
     path: Path
 
@@ -149,7 +149,7 @@ class AddKey(Request):
 
 @dataclass(frozen=True, slots=True)
 class AddEntry(Request):
-    """Add an entry at the end of a list: the value, or where it is None an initial one."""
+    """Add an entry at the end of a list: the given value, or (None) an initial one."""
 
     path: Path
     value: Any = None
@@ -171,7 +171,7 @@ class AddEntry(Request):
 
 @dataclass(frozen=True, slots=True)
 class SwitchKind(Request):
-    """Give a table another kind."""
+    """Change the kind of a table."""
 
     path: Path
     kind: str | None
@@ -183,7 +183,7 @@ class SwitchKind(Request):
 
 @dataclass(frozen=True, slots=True)
 class SwitchKey(Request):
-    """Give one key in place of another one of the same table, of two of which exactly one is given."""
+    """Replace one key by another in a table in which exactly one of the two is given."""
 
     path: Path
     to: str
@@ -215,7 +215,7 @@ class AddElement(Request):
 
 @dataclass(frozen=True, slots=True)
 class AddNamed(Request):
-    """Add an element to a section and name it: in the reference at ``path``, or at the end of the list there."""
+    """Add an element to a section and refer to it in the reference at ``path``, or at the end of the list there."""
 
     path: Path
     section: str
@@ -235,7 +235,7 @@ class AddNamed(Request):
 
 @dataclass(frozen=True, slots=True)
 class AddInstrument(Request):
-    """Add a questionnaire that is a standard one; where texts are missing, the study writes what is known."""
+    """Add a standard questionnaire; if texts are missing, all its known parts are written into the study."""
 
     name: str
 
@@ -249,7 +249,7 @@ class AddInstrument(Request):
 
 @cache
 def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
-    """Return the tables of the shipped studies' liquids that mean the same in format 2, by study and id."""
+    """Return the shipped studies' liquids that have the same meaning in format 2, by study and id."""
     documents = {name: read_document(source_bytes(name), name)[0] for name in shipped()}
     return {
         (study, name): table
@@ -261,7 +261,7 @@ def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
 
 @dataclass(frozen=True, slots=True)
 class AddLiquid(Request):
-    """Add a shipped study's liquid, and a condition of it where the study has conditions."""
+    """Add a shipped study's liquid, with a condition for it if the study has conditions."""
 
     source: str
     name: str
@@ -277,7 +277,7 @@ class AddLiquid(Request):
 
 @dataclass(frozen=True, slots=True)
 class ChangeLanguage(Request):
-    """Add a language to every text, copy the first language's texts where it has none, or take it away."""
+    """Add a language to every text, fill its missing texts from the first language, or remove it."""
 
     how: Literal["add", "copy", "remove"]
     language: str
@@ -292,9 +292,9 @@ class ChangeLanguage(Request):
 
 @dataclass(frozen=True, slots=True)
 class DuplicateElement(Request):
-    """Copy an element right after itself, and its step in the session right after that of the original.
+    """Copy an element right after itself, and its session step right after that of the original.
 
-    ``stays`` says that the form stays at its element, as where an entry of a list in it is copied.
+    With ``stays`` the form stays at its element, for example if an entry of one of its lists is copied.
     """
 
     path: Path
@@ -315,7 +315,7 @@ class DuplicateElement(Request):
 class MakeSeries(Request):
     """Copy an element once for each value of the number ``field``.
 
-    A copy is listed in the blocks that list the element, unless the block would then have a problem.
+    A copy is added to the blocks that list the element, unless this would cause a problem in the block.
     """
 
     path: Path
@@ -348,7 +348,7 @@ class MakeSeries(Request):
 
 @dataclass(frozen=True, slots=True)
 class MoveElement(Request):
-    """Move an element among its neighbours, by so many places."""
+    """Move an element among its neighbours by a number of places."""
 
     path: Path
     by: int
@@ -366,9 +366,9 @@ class MoveElement(Request):
 
 @dataclass(frozen=True, slots=True)
 class MoveTo(Request):
-    """Move an entry of a list before the one at the index ``to``; its length stands for the end.
+    """Move an entry of a list before the one at the index ``to``; the list's length means its end.
 
-    ``stays`` says that the form stays at its element.
+    With ``stays`` the form stays at its element.
     """
 
     entry: Path
@@ -383,7 +383,7 @@ class MoveTo(Request):
 
 @dataclass(frozen=True, slots=True)
 class AddToSession(Request):
-    """Name an element in the session, before each of the steps at ``places``."""
+    """Add an element to the session before each of the steps at ``places``."""
 
     path: Path
     places: tuple[Path, ...]
@@ -398,7 +398,7 @@ class AddToSession(Request):
 
 @dataclass(frozen=True, slots=True)
 class DeleteElement(Request):
-    """Delete an element: with all that needs it, with another one in its place, or leaving gaps."""
+    """Delete an element: with everything that requires it, with a replacement, or leaving gaps."""
 
     path: Path
     how: Literal["all", "other", "gaps"] = "gaps"
@@ -422,7 +422,7 @@ class DeleteElement(Request):
 
 @dataclass(frozen=True, slots=True)
 class RenameElement(Request):
-    """Give an element another id, and all that name it."""
+    """Change the id of an element and all references to it."""
 
     path: Path
     name: str
@@ -437,7 +437,7 @@ class RenameElement(Request):
 
 @dataclass(frozen=True, slots=True)
 class RetypeFile(Request):
-    """Give the file another text, as the pane shows it."""
+    """Replace the file's text by that of the text editor."""
 
     text: str
 
@@ -447,7 +447,7 @@ class RetypeFile(Request):
 
 @dataclass(frozen=True, slots=True)
 class Several(Request):
-    """Several requests, one after the other, as one step."""
+    """Several requests, executed in order as one step."""
 
     words: str
     requests: tuple[Request, ...]
@@ -470,7 +470,7 @@ Task: TypeAlias = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Do:
-    """A task that is no step of the study, and what it takes: ``Do("select", (path,))``."""
+    """A task that is not a step of the study, with its arguments: ``Do("select", (path,))``."""
 
     what: Task
     arguments: tuple[Any, ...] = ()
@@ -478,14 +478,14 @@ class Do:
 
 @dataclass(frozen=True, slots=True)
 class GoTo:
-    """Select an element and give the keyboard to one of its fields; a step of the place, not of the study."""
+    """Select an element and focus one of its fields; this changes the view, not the study."""
 
     element: Path
     field: Path
 
 
 def with_path(asked: Any, before: Path, after: Path) -> Any:
-    """Return a request or path with one element's path replaced, as after a new id."""
+    """Return a request or path in which one element's path is replaced, for example after a rename."""
     if isinstance(asked, tuple):
         if asked[: len(before)] == before:
             return (*after, *asked[len(before) :])

@@ -22,7 +22,7 @@ _NOT_TOML: Final = "the file cannot be read: correct its text first"
 
 @dataclass(frozen=True)
 class Study:
-    """A study's text, from which all else is computed."""
+    """A study's text and everything that is computed from it."""
 
     text: str  # the file's text, with its own line breaks
     folder: File = File()  # where the liquid files are that it names
@@ -35,7 +35,7 @@ class Study:
 
     @cached_property
     def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
-        """The document with the files that it names and its line numbers; None and the problem if it is not TOML."""
+        """The document with its liquid files and line numbers, or None and the problem if it is not TOML."""
         try:
             return *read_document(self._source, ""), ()
         except ProtocolError as error:
@@ -51,7 +51,7 @@ class Study:
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
-        """The tables of the text, arrays as tuples; those of the last valid text if this one is not TOML."""
+        """The tables of the text, with arrays as tuples; the last valid ones if the text is not TOML."""
         document = self._read[0]
         if document is None:
             return self.before

@@ -33,7 +33,7 @@ _BLANK_LINE: Final = re.compile(r"[ \t]*(?:\r?\n|\Z)")
 
 
 def _replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
-    """Replace the value at ``path``; a comment behind it keeps its column if possible."""
+    """Replace the value at ``path``; a comment after it keeps its column if possible."""
     node = spans.node(path)
     if node is None or node.kind in {"table", "array table"}:
         raise Refused("a table with headers cannot become a single value")
@@ -76,7 +76,7 @@ def _add_key(spans: Spans, edit: Editor, path: Path, value: Any, after: str | No
 
 
 def _with_header(spans: Spans, path: Path, value: Any) -> bool:
-    """Return whether a new table gets a header: its neighbours have one, it is at the root, or needs several lines."""
+    """Return whether a new table gets a header: like its neighbours, at the root, or if it needs several lines."""
     if isinstance(value, list | tuple):
         if not value or not all(isinstance(entry, Mapping) and entry for entry in value):
             return False
@@ -102,7 +102,7 @@ def _header_pieces(spans: Spans, path: Path) -> list[Piece]:
 
 
 def _insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
-    """Insert whole lines after the piece that ends at ``at``, with a blank line before them, and after where needed."""
+    """Insert whole lines after the piece that ends at ``at``, with blank lines around them as needed."""
     text, newline = spans.text, spans.newline
     before = text[:at]
     opening = "" if not before.strip() else newline if before.endswith("\n") else newline * 2
@@ -115,7 +115,7 @@ def _insert_block(spans: Spans, edit: Editor, at: int, body: str) -> None:
 
 
 def _insert_lines(spans: Spans, edit: Editor, at: int, lines: str) -> None:
-    """Insert whole lines; at the end of a text without a last line break, the text stays without."""
+    """Insert whole lines; a text without a final line break stays without one."""
     if at and not spans.text[:at].endswith("\n"):
         lines = spans.newline + lines.removesuffix(spans.newline)
     edit.insert(at, lines)
@@ -153,7 +153,7 @@ def _add_pair(spans: Spans, edit: Editor, owner: Node, path: Path, value: Any) -
 
 
 def _add_dotted(spans: Spans, edit: Editor, piece: Piece, path: Path, value: Any) -> None:
-    """Add a key to a table written with dotted keys: after the last one, with the same beginning."""
+    """Add a key to a table written with dotted keys: after the last one, with the same prefix."""
     node, text = piece.node, spans.text
     parts = node.parts[: len(path) - 1 - (len(node.path) - len(node.parts))]
     key = f"{text[parts[0][0] : parts[-1][1]]}.{key_text(str(path[-1]))} = "
@@ -167,7 +167,7 @@ def _add_dotted(spans: Spans, edit: Editor, piece: Piece, path: Path, value: Any
 
 
 def _remove_key(spans: Spans, edit: Editor, path: Path) -> None:
-    """Remove a key or table with its comments, and the blank line before it where two would be left."""
+    """Remove a key or table with its comments, and the preceding blank line if two would remain."""
     for piece in spans.pieces(path):
         if piece.node.kind == "pair":
             _remove_pair(spans, edit, piece)
@@ -208,7 +208,7 @@ def _copy_table(spans: Spans, edit: Editor, path: Path, name: str) -> None:
 
 
 def _renamed_text(spans: Spans, piece: Piece, depth: int, name: str) -> str:
-    """Return the text of a piece with another name for the step at ``depth`` of its paths, whole lines."""
+    """Return the whole lines of a piece with another name for the step at ``depth`` of its paths."""
     editor = Editor(spans.text)
     for start, end in _key_parts(spans, piece.node.path[: depth + 1]):
         if piece.start <= start < piece.end:
@@ -245,7 +245,7 @@ def _array_and_index(path: Path) -> tuple[Path, int]:
 
 
 def _insert_entry(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
-    """Insert an entry at the index that ends ``path``, into an array that is in the text."""
+    """Insert an entry into an existing array at the index that ends ``path``."""
     array, index = _array_and_index(path)
     node = spans.node(array)
     if node is None:
@@ -275,7 +275,7 @@ def _fits_line(spans: Spans, start: int, end: int, value: Any) -> bool:
 
 
 def _spread_array(spans: Spans, edit: Editor, array: Path, slots: list[Slot], value: str) -> None:
-    """Write an array that becomes too long for its line with a line for each entry."""
+    """Write an array that becomes too long for its line with one entry per line."""
     node = spans.node(array)
     if node is None:
         return
@@ -362,7 +362,7 @@ def _lines(text: str, piece: Piece, newline: str) -> str:
 
 
 def _move_entry(spans: Spans, edit: Editor, path: Path, to: int) -> None:
-    """Move an entry with its comments to another index; the others close up."""
+    """Move an entry with its comments to another index."""
     array, index = _array_and_index(path)
     order = list(range(max(index, to) + 1))
     order.insert(to, order.pop(index))
@@ -386,7 +386,7 @@ def _move_entry(spans: Spans, edit: Editor, path: Path, to: int) -> None:
 
 
 def _move_table(spans: Spans, edit: Editor, array: Path, order: list[int]) -> None:
-    """Write the entries of an array of tables in another order, each into the place of another one."""
+    """Reorder the entries of an array of tables."""
     text = spans.text
     pieces = [spans.pieces((*array, index)) for index in range(len(order))]
     for place, source in enumerate(order):
@@ -406,7 +406,7 @@ Document: TypeAlias = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class Set:
-    """Give a key or entry a value; a key that is missing is added, with the tables it is in, after ``after``."""
+    """Set the value of a key or entry; a missing key is added after ``after``, with missing parent tables."""
 
     path: Path
     value: Any
@@ -430,7 +430,7 @@ class Insert:
 
 @dataclass(frozen=True, slots=True)
 class Duplicate:
-    """Copy a table or entry right after itself; a table under the name ``name``."""
+    """Copy a table or entry right after itself; a table gets the name ``name``."""
 
     path: Path
     name: str = ""
@@ -446,7 +446,7 @@ class Move:
 
 @dataclass(frozen=True, slots=True)
 class Rename:
-    """Give a table another name; ``references`` are the places of texts that name it and follow."""
+    """Rename a table; ``references`` are the places of texts that refer to it and are changed, too."""
 
     path: Path
     name: str
@@ -457,11 +457,11 @@ Edit: TypeAlias = Set | Unset | Insert | Duplicate | Move | Rename
 
 
 class WriterError(AssertionError):
-    """The text that an edit produced does not mean what the edit meant: a bug of the writer."""
+    """The edited text does not have the intended meaning: a bug of the writer."""
 
 
 def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
-    """Return the text after an edit, and the splices of its steps, each of the text before it."""
+    """Return the text after an edit, and the splices of its steps, each relative to the text before it."""
     document = _parse(text)
     meant = meant_document(document, edit)
     steps: list[Splices] = []
@@ -494,7 +494,7 @@ def _parse(text: str) -> Document:
 
 
 def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
-    """Return the document after an edit; unchanged parts are shared with the document before."""
+    """Return the document after an edit; unchanged parts are shared with the previous document."""
     meant: Document = dict(document)
     *parent, last = edit.path
     if isinstance(edit, Set):
@@ -528,7 +528,7 @@ def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
 
 
 def _own_value(document: Document, path: Iterable[str | int], *, makes: bool = False) -> Any:
-    """Return the document's own value at a path: tables and arrays on the way are copied, the rest is shared."""
+    """Return a private copy of the value at a path: tables and arrays on the way are copied, others shared."""
     node: Any = document
     for step in path:
         absent = isinstance(node, dict) and isinstance(step, str) and step not in node
@@ -585,7 +585,7 @@ def _check_value(value: Any) -> None:
 
 
 def check_encodable(text: str) -> None:
-    """Refuse a text that cannot be encoded in UTF-8."""
+    """Reject a text that cannot be encoded in UTF-8."""
     if any("\ud800" <= letter <= "\udfff" for letter in text):
         raise Refused("the text contains an incomplete character, which UTF-8 cannot encode: type it again")
 

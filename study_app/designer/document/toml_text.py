@@ -17,11 +17,11 @@ from study_app.protocol.source.document import Node, Path, scan_nodes
 
 
 class Refused(StudyError):
-    """The study cannot be changed in this way; its message says why, and nothing was changed."""
+    """The requested change of the study is not possible; its message gives the reason, and nothing was changed."""
 
 
 class Splice(NamedTuple):
-    """``before`` at position ``at`` of a text becomes ``after``."""
+    """A replacement of ``before`` at position ``at`` of a text by ``after``."""
 
     at: int
     before: str
@@ -33,7 +33,7 @@ Splices: TypeAlias = tuple[Splice, ...]
 
 
 class Editor:
-    """Collects replacements of one text; insertions at one place keep their order."""
+    """Collects replacements of one text; insertions at the same position keep their order."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -102,12 +102,12 @@ _ENDS: Final = re.compile("\r\n|\r|\u2029")
 
 
 def with_line_feeds(text: str) -> str:
-    """Return a text with line feeds only."""
+    """Return a text with LF line endings."""
     return _ENDS.sub("\n", text)
 
 
 def with_own_line_ends(text: str, typed: str) -> str:
-    """Return the typed text with the line ends of the original text."""
+    """Return the typed text with the line endings of the original text."""
     old, newline = with_line_feeds(text), "\r\n" if "\r\n" in text else "\n"
     first, last = common_ends(old, typed)
     begin, end = _original_position(text, first), _original_position(text, len(old) - last)
@@ -115,7 +115,7 @@ def with_own_line_ends(text: str, typed: str) -> str:
 
 
 def _original_position(text: str, place: int) -> int:
-    """Return the position in the file's text of a position in the shown text."""
+    """Return the position in the file's text for a position in the displayed text."""
     for match in _ENDS.finditer(text):
         if match.start() >= place:
             break
@@ -131,7 +131,7 @@ _COMMA: Final = re.compile(r"[ \t]*,")
 
 
 class Piece(NamedTuple):
-    """A part of the text that belongs to one path, from ``start`` to ``end``; ``node`` is what it begins with."""
+    """A part of the text that belongs to one path, from ``start`` to ``end``; ``node`` is its first node."""
 
     node: Node
     start: int
@@ -139,10 +139,10 @@ class Piece(NamedTuple):
 
 
 class Slot(NamedTuple):
-    """An entry of an array in its place.
+    """An array entry with its surroundings.
 
-    ``start`` to ``end`` is the entry with its comments above, then follows a comma until ``tail`` (or none), then the
-    comment behind it until ``tail_end``. ``own_line`` says that nothing precedes the entry on its line.
+    ``start`` to ``end`` is the entry with the comments above, followed by a comma until ``tail`` (or none), and the
+    comment after it until ``tail_end``. With ``own_line`` nothing precedes the entry on its line.
     """
 
     start: int
@@ -160,7 +160,7 @@ def spans_of(text: str) -> Spans:
 
 
 class Spans:
-    """Where everything of a TOML text is written."""
+    """The source spans of the parts of a TOML text."""
 
     def __init__(self, text: str) -> None:
         self.text = text
@@ -171,7 +171,7 @@ class Spans:
         self._starts = [node.start for node in self._lines]
 
     def node(self, path: Path) -> Node | None:
-        """Return the header, key or entry at a path; None if it exists only as a part of other paths, or not at all."""
+        """Return the header, key or entry at a path; None if there is none, or it is only a part of other paths."""
         return self._by_path.get(path)
 
     def pieces(self, path: Path) -> list[Piece]:
@@ -194,7 +194,7 @@ class Spans:
         return Piece(node, self.owned_start(node), self.line_end(last))
 
     def last_of(self, header: Node | None) -> Node | None:
-        """Return the last key in a header's section, the header if it has none; None stands for the root."""
+        """Return the last key in a header's section, or the header if it has none; None means the root."""
         place = -1 if header is None else self._place(header)
         last = header
         for node in self._lines[place + 1 :]:
@@ -204,7 +204,7 @@ class Spans:
         return last
 
     def section(self, header: Node | None) -> Iterator[Node]:
-        """Yield the keys of a header's section; None stands for the root."""
+        """Yield the keys of a header's section; None means the root."""
         for node in self._lines[0 if header is None else self._place(header) + 1 :]:
             if node.kind != "key":
                 return
@@ -214,14 +214,14 @@ class Spans:
         return (node for node in self._lines if node.kind != "key")
 
     def line_end(self, node: Node | None) -> int:
-        """Return the end of the line that ends a header or key, after its comment and line break."""
+        """Return the end of the line on which a header or key ends, after its comment and line break."""
         if node is None:
             return 0
         rest = _REST.match(self.text, node.end)
         return rest.end() if rest else node.end
 
     def owned_start(self, node: Node) -> int:
-        """Return the start of a header or key with its line and the comments directly above."""
+        """Return the start of a header or key including its line and the comments directly above."""
         place = self._place(node)
         return self._with_comments(node.start, self.line_end(self._lines[place - 1]) if place else 0)
 
@@ -242,7 +242,7 @@ class Spans:
         return start
 
     def slots(self, path: Path) -> list[Slot]:
-        """Return the entries of the array written at ``path``, each with its comments."""
+        """Return the entries of the array at ``path``, each with its comments."""
         node = self._by_path[path]
         floor, slots = node.value + 1, list[Slot]()
         index = 0
@@ -275,15 +275,15 @@ _LITERAL: Final = re.compile(r"[^'\x00-\x08\x0a-\x1f\x7f]*")
 
 
 def key_text(key: str) -> str:
-    """Return a key as it is written, in quotes where it needs them."""
+    """Return a key in TOML notation, with quotes if it needs them."""
     return key if _BARE.fullmatch(key) else str(tomlkit.key(key).as_string())
 
 
 def toml_value(value: Any, like: str = "", newline: str = "\n", indent: str = "", column: int = 0) -> str:
-    """Return a value, as ``tomllib`` reads it, as TOML.
+    """Return a value, as read by ``tomllib``, in TOML notation.
 
-    ``like`` is the text that it replaces, or of a neighbour: its quotes and its lines are kept where possible;
-    ``indent`` and ``column`` are what precedes the value on its line.
+    ``like`` is the text that it replaces, or that of a neighbour, whose quotes and line breaks are kept if possible;
+    ``indent`` and ``column`` describe what precedes the value on its line.
     """
     if isinstance(value, str):
         return _toml_string(value, like, newline)
@@ -298,7 +298,7 @@ def toml_value(value: Any, like: str = "", newline: str = "\n", indent: str = ""
 
 
 def inline_value(value: Any) -> str:
-    """Return a value as TOML without a line break."""
+    """Return a value in TOML notation without a line break."""
     if isinstance(value, Mapping):
         pairs = ", ".join(f"{key_text(key)} = {inline_value(entry)}" for key, entry in value.items())
         return f"{{ {pairs} }}" if pairs else "{}"
@@ -308,9 +308,9 @@ def inline_value(value: Any) -> str:
 
 
 def table_text(path: tuple[str | int, ...], value: Mapping[str, Any], newline: str, *, entry: bool = False) -> str:
-    """Return a table with its header; inner tables that fill more than a line get headers of their own.
+    """Return a table with its header; inner tables longer than a line get their own headers.
 
-    ``entry`` says that it is an entry of an array of tables.
+    ``entry`` means that it is an entry of an array of tables.
     """
     name = ".".join(key_text(key) for key in path if isinstance(key, str))
     lines, inner = [f"[[{name}]]" if entry else f"[{name}]"], list[str]()

@@ -68,7 +68,7 @@ KINDS = {
 
 
 class _EitherField(Field):
-    """A value of one of several kinds: the kind, then its editor."""
+    """A value of one of several kinds: a choice of the kind, followed by its editor."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -95,7 +95,7 @@ class _EitherField(Field):
         return replace(row, **values_of(row.either[row.number or 0]))
 
     def _switch_kind(self, at: int) -> None:
-        """Request a value of another kind, converted from the present one as far as possible."""
+        """Request a value of another kind, converted from the current one as far as possible."""
         if at == self.row.number:
             return
         to, value = self.row.either[at], self.row.value
@@ -148,7 +148,7 @@ EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
 
 
 class _FaultLine(QWidget):
-    """A sentence that says what is wrong, below an editor."""
+    """A sentence about a fault, below an editor."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -158,9 +158,9 @@ class _FaultLine(QWidget):
 
 
 class RowWidget(Themed, QWidget):
-    """A row: its label, its editor, a button that removes the key, and what is wrong with it.
+    """A row: its label, its editor, a button that removes the key, and its faults.
 
-    ``repair_asked`` carries a problem and the words of one of its repairs.
+    ``repair_asked`` carries a problem and the text of one of its repairs.
     """
 
     repair_asked = Signal(object, str)
@@ -223,7 +223,7 @@ class RowWidget(Themed, QWidget):
 
     @cached_property
     def wrong(self) -> _FaultLine:
-        """The faults below the editor; made on first use."""
+        """The faults below the editor; created on first use."""
         made = _FaultLine()
         column = self.layout()
         assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
@@ -233,7 +233,7 @@ class RowWidget(Themed, QWidget):
         return made
 
     def _ask_to_remove(self) -> None:
-        """Ask to remove the key; typed text is handed on first, otherwise it would restore the key."""
+        """Request to remove the key; typed text is submitted first, because it would restore the key later."""
         for part in self.field.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
@@ -257,7 +257,7 @@ class RowWidget(Themed, QWidget):
         self.show_messages()
 
     def begin(self, row: FormRow) -> None:
-        """Show a row of another element: nothing typed, refused or selected remains."""
+        """Show the row of another element without typed text, rejection or selection."""
         for field in (self.field, *self.field.findChildren(Field)):
             field.refusal = ""
         typed = [part for part in self.field.findChildren(QWidget) if isinstance(part, TypedLine | TypedText)]
@@ -293,7 +293,7 @@ class RowWidget(Themed, QWidget):
                 part.show_refused(bool(self.row.faults) and blamed)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
-        """Offer the first repair of each problem of this row, without repairs that read alike."""
+        """Offer the first repair of each problem of this row, omitting repairs with the same text."""
         path = self.row.path
         offered = {
             problem: sentences
@@ -332,7 +332,7 @@ class RowWidget(Themed, QWidget):
 
     @property
     def help(self) -> str:
-        """What the row edits: the description, or the sentence of what is chosen, and what is permitted."""
+        """The help text of the row: its description, or that of the current choice, and the permitted values."""
         row = self.row
         shown = row.default if row.value is None else row.value
         sentence = next((choice.sentence for choice in row.choices if choice.value == shown), "")
@@ -344,7 +344,7 @@ class RowWidget(Themed, QWidget):
 
 
 def _special_editor_of(row: FormRow) -> SpecialEditor | None:
-    """Return the special editor of a row, None if the editor of its kind is used."""
+    """Return the special editor of a row, or None for the standard editor of its kind."""
     return EDITORS.get((row.model, str(row.path[-1])))
 
 
@@ -364,7 +364,7 @@ def _editor_structure(row: FormRow) -> object:
 
 
 class _LanguageHeads(QWidget):
-    """Names of languages above the columns of their texts; ``inset`` is the room left and right [px]."""
+    """Names of languages above the columns of their texts; ``inset`` is the margin left and right [px]."""
 
     def __init__(self, languages: Iterable[str], inset: tuple[int, int] = (0, 0)) -> None:
         super().__init__()
@@ -392,9 +392,9 @@ class _Tile(Themed, QWidget):
 
 
 class _FormHead(QWidget):
-    """Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, text so far).
+    """The head of the form. Signals: ``asked`` (a request), ``feel_asked`` (path), ``id_typed`` (path, current text).
 
-    ``unlock_asked`` is emitted where a locked id is to be changed.
+    ``unlock_asked`` is emitted if a locked id is to be changed.
     """
 
     asked = Signal(object)
@@ -539,7 +539,7 @@ _FOOT_FROM = 460
 
 
 class _FormFoot(Themed, QWidget):
-    """Label and place of a field, and its description."""
+    """Label, place and description of a field."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -576,9 +576,9 @@ class _AddKeys(QWidget):
 
 
 class FormCard(Card):
-    """Shows a `Form`; a part that both the old and the new form have keeps its widget, with caret and focus.
+    """Shows a `Form`; parts common to the old and the new form keep their widgets, with caret and focus.
 
-    Signals: ``asked`` (a request), ``repair_asked`` (problem, words).
+    Signals: ``asked`` (a request), ``repair_asked`` (problem, text).
     """
 
     asked = Signal(object)
@@ -619,7 +619,7 @@ class FormCard(Card):
         self._renames = before
 
     def show_form(self, form: Form, *, read_only: bool) -> None:
-        """Show a form: existing parts stay, missing ones are made, the rest is removed."""
+        """Show a form: existing parts are kept, missing ones are created, others removed."""
         before = self.form
         stays = before is not None and (
             form.path == before.path or (self._renames and form.path[:-1] == before.path[:-1])
@@ -679,7 +679,7 @@ class FormCard(Card):
             self._refocus(form, before, gone)
 
     def _refocus(self, form: Form, before: Form | None, gone: QWidget) -> None:
-        """Move a removed part's keyboard focus to the row in its place or the row it added; else to the first row."""
+        """Move the focus from a removed part to the row in its place or the row it added; else to the first row."""
         path: Path | None = None
         if before is not None and isinstance(gone, RowWidget):
             path = gone.row.path
@@ -772,9 +772,9 @@ class FormCard(Card):
         return max(around, key=lambda row: len(row.row.path), default=None)
 
     def focus_row(self, path: Path) -> bool:
-        """Focus the row of a place and scroll to it; return whether there is one.
+        """Focus the row of a place and scroll to it; return whether it exists.
 
-        A key that the file does not have has a button that adds it instead.
+        For a key that is missing in the file, the button that adds it is focused.
         """
         row = self._row_of(path)
         if row is None:
@@ -792,9 +792,9 @@ class FormCard(Card):
             self.focus_row(self.rows[0].row.path)
 
     def focus_first_text(self, *, filled: bool) -> None:
-        """Focus the first text and select it; an empty one comes first unless all are filled in.
+        """Focus the first text and select it; empty texts are preferred unless all are filled in.
 
-        A form without texts gives it to its first row.
+        In a form without texts the first row gets the focus.
         """
         texts = [part for row in self.rows for part in row.field.findChildren(QWidget)]
         lines = [part for part in texts if isinstance(part, TypedLine | TypedText)]
@@ -811,7 +811,7 @@ class FormCard(Card):
         self._scroll_to(row)
 
     def refuse(self, path: Path, sentence: str) -> None:
-        """Show at the field of a place why it was not changed."""
+        """Show the reason for a rejected change at the field of a place."""
         if (row := self._row_of(path)) is not None:
             row.refusal = sentence
             row.show_messages()

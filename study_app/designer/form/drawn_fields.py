@@ -48,7 +48,7 @@ _MOST_TICKS: Final = 6
 
 @dataclass(frozen=True, slots=True)
 class _AxisLimit:
-    """A limit: its name with its value, and the level that reaches it."""
+    """A limit: its name with its value, and the level at which it is reached."""
 
     words: str
     level: float
@@ -118,7 +118,7 @@ def _level_axis(study: Study, row: Row) -> _LevelAxis | None:
 
 
 def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit, _AxisLimit]]:
-    """Return the highest standard in words, and the limits of the block that presents the levels."""
+    """Return the highest standard as text, and the limits of the block that presents the levels."""
     protocol = study.formed
     block = block_of(protocol, row.path[:-1])
     if protocol is None or block is None or block.stimulus is None or block.design is None:
@@ -142,7 +142,7 @@ HEIGHT, TRACK_Y, TRACK_PX, MARGIN = 104, 46.0, 12.0, 14
 
 
 class _AxisView(Extra, Themed, QWidget):
-    """The axis: the levels with their ends, and the limits."""
+    """The axis with its levels, ends and limits."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -200,7 +200,7 @@ class _AxisView(Extra, Themed, QWidget):
         painter.drawText(below, Qt.AlignmentFlag.AlignRight, axis.caption)
 
     def _paint_limits(self, painter: QPainter, axis: _LevelAxis, track: QRectF) -> None:
-        """Paint where the limits begin, the name of the higher one above that of the lower one."""
+        """Paint where the limits begin, with the name of the higher one above that of the lower one."""
         limits = [(limit, limit_colour(self.theme, name)) for name, limit in axis.limits.items()]
         for row, (limit, ink) in enumerate(sorted(limits, key=lambda pair: pair[0].level)):
             x, top = self._x(limit.level), 14.0 * (1 - row)
@@ -231,7 +231,7 @@ class _Phase:
 
     @property
     def opens(self) -> str:
-        """The label of its field; "" where it has none."""
+        """The label of its field; "" if it has none."""
         return label_of(self.field[-1]) if self.field else ""
 
     @property
@@ -243,7 +243,7 @@ class _Phase:
 
 @dataclass(frozen=True, slots=True)
 class _TrialStrip:
-    """A trial: its phases, and how long it takes with the pause after it [s]."""
+    """The phases of a trial, and its duration with the following pause [s]."""
 
     phases: tuple[_Phase, ...]
     duration_s: float
@@ -259,7 +259,7 @@ class _TrialStrip:
 
 
 def _trial_strip(study: Study, row: Row) -> _TrialStrip | None:
-    """Return a trial of a block with a design; None where the study has faults."""
+    """Return the strip for a trial of a block with a design; None if the study has faults."""
     protocol = study.formed
     block = None if protocol is None else protocol.blocks.get(str(row.path[1]))
     if protocol is None or block is None or block.design is None:
@@ -300,7 +300,7 @@ PICTURE_PX, GAP = 52, 6
 
 
 class _PhaseButton(Themed, QAbstractButton):
-    """A phase of a trial; a press asks for its field."""
+    """A phase of a trial; pressing it opens its field."""
 
     def __init__(self, strip: QWidget) -> None:
         super().__init__(strip)
@@ -361,9 +361,9 @@ class _PhaseButton(Themed, QAbstractButton):
 
 
 class _StripView(Extra, Themed, QWidget):
-    """One trial, as wide as its phases are long, but each wide enough for its words.
+    """The phases of one trial, as wide as they are long, but wide enough for their texts.
 
-    ``opened`` carries the path of the field of the phase that is pressed.
+    ``opened`` carries the path of the field of the pressed phase.
     """
 
     opened = Signal(object)

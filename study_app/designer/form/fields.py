@@ -53,7 +53,10 @@ else:
 
 
 class _Typed(_Base):
-    """What a line and a field of several lines share; ``typed`` carries the text, ``left`` follows when it is left."""
+    """Common base of single-line and multi-line fields.
+
+    ``typed`` carries the text, ``left`` follows when the field is left.
+    """
 
     typed: Any
     came: Any
@@ -82,7 +85,7 @@ class _Typed(_Base):
             self.typed.emit(self.words())
 
     def _flush_after_click(self) -> None:
-        """Hand on the typed text once no button is pressed and no list is open, since another form would discard it."""
+        """Submit the typed text once no button is pressed and no list is open, before another form discards it."""
         if QApplication.mouseButtons() == Qt.MouseButton.NoButton and QApplication.activePopupWidget() is None:
             self.flush()
             if not self.hasFocus():
@@ -91,7 +94,7 @@ class _Typed(_Base):
             self._rest.start(CLICK_MS)
 
     def accept(self) -> None:
-        """Hand on the typed text; from now on Esc restores it, unless it is refused."""
+        """Submit the typed text; afterwards Esc restores this text, unless it is rejected."""
         self.flush()
         if self.property("state") != "refused":
             self._before = self.words()
@@ -100,23 +103,20 @@ class _Typed(_Base):
         raise NotImplementedError
 
     def has_nothing_to_delete(self) -> bool:
-        """Return whether all text is selected, or none with the caret at the end, and other languages are empty.
-
-        No key removes a text that is not.
-        """
+        """Return whether there is nothing left to delete: no text here after the caret, and none in other languages."""
         return self.is_at_end() and not any(field.words() for field in self.beside if field is not self)
 
     def is_at_end(self) -> bool:
-        """Return whether the caret is at the end of a text of which nothing or all is selected."""
+        """Return whether the caret is at the end of a text that is not or completely selected."""
         raise NotImplementedError
 
     def begin_value(self) -> None:
-        """Take the shown text as the value of another element: nothing is refused, and Esc restores it."""
+        """Use the displayed text as the value of another element, without a rejection; Esc restores it."""
         self.show_refused(False)
         self._before = self.words()
 
     def restore(self) -> None:
-        """Restore the text that was there when the field got the keyboard focus."""
+        """Restore the text that was present when the field got the focus."""
         self._rest.stop()
         self.pending = False
         if self.words() != self._before:
@@ -124,15 +124,15 @@ class _Typed(_Base):
             self.typed.emit(self._before)
 
     def show_text(self, text: str) -> None:
-        """Show a text, unless something else is being typed."""
+        """Show a text, unless another one is being typed."""
         raise NotImplementedError
 
     def show_refused(self, yes: bool) -> None:
-        """Mark the field as refused, or remove the mark."""
+        """Mark the field as rejected, or remove the mark."""
         set_property(self, "state", "refused" if yes else "")
 
     def leaves_to_place(self, event: QEvent) -> bool:
-        """Return whether a key belongs to the page, such as undo, which is for the whole study."""
+        """Return whether a key is handled by the page, such as undo, which concerns the whole study."""
         if event.type() != QEvent.Type.ShortcutOverride or not isinstance(event, QKeyEvent):
             return False
         if not any(event.matches(key) for key in KEYS_OF_PLACE):
@@ -168,7 +168,7 @@ class _Typed(_Base):
 
 
 class TypedLine(_Typed, QLineEdit):
-    """One line; ``stepped`` says that an arrow key counts up (1) or down (-1)."""
+    """One line; ``stepped`` is emitted when an arrow key counts up (1) or down (-1)."""
 
     stepped = Signal(int)
     typed = Signal(str)
@@ -223,7 +223,7 @@ class TypedText(_Typed, QPlainTextEdit):
         self.textChanged.connect(self._note_change)
 
     def _note_change(self) -> None:
-        """Note typed text; Qt also emits the signal for another font or margin."""
+        """React to typed text; Qt also emits the signal for a new font or margin."""
         if self.words() != self._known:
             self._known = self.words()
             if not self._showing:
@@ -247,7 +247,7 @@ class TypedText(_Typed, QPlainTextEdit):
 
 
 class TypedSentence(TypedText):
-    """A sentence in as many lines as it takes, as far as there is room for them; Enter accepts it."""
+    """A sentence that wraps into as many lines as it needs and fit; Enter accepts it."""
 
     def __init__(self, name: str, *, most_lines: int = MOST_LINES) -> None:
         super().__init__(name)
@@ -295,7 +295,7 @@ NUMBER_PX, NARROWEST_LIST = 96, 120
 
 
 class Extra:
-    """What is shown of a row beyond its value; at the right of an editor that is at least so wide (0: below it)."""
+    """A widget with facts about a row; placed to the right of an editor of at least this width (0: below it)."""
 
     beside_px = 0
 
@@ -306,8 +306,8 @@ class Extra:
 class Field(Themed, QWidget):
     """Edits the value of one row.
 
-    ``asked`` carries a request, ``came`` says that it is focused; ``caption`` stands above an editor that takes the
-    width of the form.
+    ``asked`` carries a request, ``came`` is emitted when it gets the focus; ``caption`` is above an editor as wide as
+    the form.
     """
 
     asked = Signal(object)
@@ -328,7 +328,7 @@ class Field(Themed, QWidget):
         self.show_extra()
 
     def add_extra(self, extra: QWidget) -> None:
-        """Add a widget with the row's facts below the editor; an `Extra` goes to its right if there is room."""
+        """Add a widget with facts below the editor; an `Extra` is placed to its right if there is room."""
         self.extra = extra
         self.outer.addWidget(extra, 0, Qt.AlignmentFlag.AlignVCenter)
         self.show_extra()
@@ -370,7 +370,7 @@ class Field(Themed, QWidget):
 
 
 class LineField(Field):
-    """A plain text, one number, or numbers side by side, in one line."""
+    """A plain text, one number, or several numbers, in one line."""
 
     def __init__(self, row: FormRow, typed_in: Callable[[str], Any] = TypedLine) -> None:
         super().__init__(row)
@@ -392,7 +392,7 @@ class LineField(Field):
         self.show_value()
 
     def _count(self, by: int) -> None:
-        """Count up or down in the last shown digit."""
+        """Increase or decrease the last displayed digit."""
         shown = self.line.text().strip() or str(self.row.default or 0)
         number = number_of(shown)
         if number is None or self.line.isReadOnly():
@@ -450,9 +450,9 @@ class SwitchField(Field):
 
 
 class ChoiceField(Field):
-    """One of some words: few and short ones side by side, others in a list; a reference has an arrow to its element.
+    """A choice between values: few short ones side by side, others in a list; references have an arrow.
 
-    The kinds of a question are side by side where there is room.
+    The kinds of a question are side by side if there is room.
     """
 
     def __init__(self, row: FormRow) -> None:
@@ -551,7 +551,7 @@ class ChoiceField(Field):
 
 
 class ChecksField(Field):
-    """Several of some words."""
+    """A selection of several values."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -584,7 +584,7 @@ class ChecksField(Field):
 
 
 class UnknownField(Field):
-    """A key that does not belong to the table: its value, which can only be removed here."""
+    """A key that does not belong to the table: its value can only be removed."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -604,14 +604,14 @@ def add_button(name: str, accessible_name: str = "") -> ActionButton:
 
 
 def kept_value_sentence(value: Any) -> str:
-    """Return the sentence about the value that a study keeps while the typed one is refused."""
+    """Return the sentence about the value that the study keeps while the typed one is rejected."""
     if value is None:
         return "The study does not use it; Esc clears the field."
     return f"The study keeps {typed_value(value)}; Esc restores it."
 
 
 def typed_value(value: Any) -> str:
-    """Return a value as it is typed: numbers of a list separated by spaces."""
+    """Return a value as it would be typed: numbers of a list separated by spaces."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, tuple | list):
@@ -620,7 +620,7 @@ def typed_value(value: Any) -> str:
 
 
 class LanguagesField(Field):
-    """A text in each language, side by side, or below each other where there are more than two or several lines."""
+    """A text in each language, side by side, or stacked for more than two languages or several lines."""
 
     def __init__(self, row: FormRow, typed_in: type[TypedLine | TypedText] = TypedLine) -> None:
         super().__init__(row)
@@ -651,7 +651,7 @@ class LanguagesField(Field):
 
     @cached_property
     def copied(self) -> QLabel:
-        """The label of texts that are still in another language; made on first use."""
+        """The label that marks texts still in another language; created on first use."""
         made = label("", "small", "warn")
         made.hide()
         self.outer.addWidget(made)
@@ -686,7 +686,7 @@ def is_stacked(row: FormRow) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class SpecialEditor:
-    """An editor of certain keys; bounds, faults, help and removal stay those of the row."""
+    """An editor of certain keys; bounds, faults, help and removal stay with the row."""
 
     keys: tuple[tuple[str, str], ...]  # title of the model in the JSON Schema, such as "Block", and the key
     make: Callable[[FormRow], Field] | None = None  # makes the editor of a row; None: that of its kind

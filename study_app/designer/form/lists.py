@@ -78,7 +78,7 @@ RIGHT: Final = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 
 
 class _Rows(QListWidget):
-    """Qt's list, as high as its entries; ``keys`` are its own, and ``dropped`` says where a drag ended."""
+    """A list widget as high as its entries; ``keys`` are its own shortcuts, ``dropped`` carries the end of a drag."""
 
     dropped = Signal(int)
 
@@ -115,7 +115,7 @@ class _Rows(QListWidget):
         self.doItemsLayout()  # else rows keep the width they had
 
     def dropEvent(self, event: QDropEvent) -> None:
-        """Say before which entry the dragged ones come; the study moves them."""
+        """Emit the entry before which the dragged ones were dropped; the study moves them."""
         place = event.position().toPoint()
         index = self.indexAt(place)
         below = place.y() > self.visualRect(index).center().y()
@@ -144,7 +144,7 @@ class EntryRow(QFrame):
 
 
 class EntryList(Field):
-    """Entries in rows, each made anew where they are others; the list with its selection and the keyboard stays."""
+    """Entries in rows, recreated only if they change; the list keeps selection and focus."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -210,7 +210,7 @@ class EntryList(Field):
 
     @property
     def chosen(self) -> int:
-        """The index of the selected entry, -1 without one."""
+        """The index of the selected entry, -1 without a selection."""
         return next((index.row() for index in self.list.selectedIndexes()), -1)
 
     def take_keyboard(self) -> None:
@@ -248,7 +248,7 @@ class EntryList(Field):
 
 
 class _NamesList(Choice):
-    """A list of what can be added, which shows no choice of its own; ``chosen`` carries what an entry stands for."""
+    """A list of things that can be added, without a current choice; ``chosen`` carries the value of an entry."""
 
     chosen = Signal(object)
 
@@ -322,7 +322,7 @@ class EntriesField(EntryList):
 
 
 class _ConditionsField(EntriesField):
-    """The conditions of a block, each with its liquid, its delay and its force."""
+    """The conditions of a block, each with its liquid, delay and force."""
 
     caption = _CAPTION
 
@@ -342,7 +342,7 @@ class _ConditionsField(EntriesField):
 
 
 class LinesField(EntryList):
-    """Texts, or points, one in each line, with a button that adds one."""
+    """Texts or points, one per line, with a button that adds one."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -389,7 +389,7 @@ class LinesField(EntryList):
 
 
 class LanguageListField(EntryList):
-    """The languages, each with what it lacks; a language is added to every text, and taken away with its texts."""
+    """The languages and their missing texts; a language is added to or removed from every text."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)

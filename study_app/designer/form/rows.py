@@ -17,7 +17,7 @@ STATEMENT: Final = "statement"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class QuestionLine:
-    """One question."""
+    """The line of one question in a list."""
 
     path: Path  # its place
     number: int  # its place in the questionnaire, from 1
@@ -31,14 +31,14 @@ class QuestionLine:
 
 @dataclass(frozen=True, slots=True)
 class QuestionLines:
-    """Names of the study's languages, and the questions."""
+    """Names of the study's languages, and the lines of its questions."""
 
     languages: tuple[str, ...]
     lines: tuple[QuestionLine, ...]
 
 
 def question_lines(study: Study, path: Path) -> QuestionLines:
-    """Return a line for each question of the list at ``path``."""
+    """Return the lines of all questions in the list at ``path``."""
     codes = languages_of(study.document)
     listed = value_at(study.document, path)
     items = listed if isinstance(listed, tuple) else ()
@@ -88,9 +88,9 @@ LEAST, MOST = "at least ", "at most "
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One entry of a list, or one table of a section: where it is, what it is called, and how many faults it has.
+    """An entry of a list, or a table of a section: path, name, and number of faults.
 
-    ``target`` is the element that it opens: what a reference names, else itself.
+    ``target`` is the element that it opens: the target of a reference, else itself.
     """
 
     path: Path
@@ -142,7 +142,7 @@ def values_of(row: Row) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Rows under one heading ("" for those of the element itself), keys that can be added, and faults of no row."""
+    """Rows under one heading ("" for the element's own), keys that can be added, and faults without a row."""
 
     path: Path
     title: str

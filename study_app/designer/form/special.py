@@ -54,7 +54,7 @@ _SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "will
 def _order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
     """Return how balanced the order of a block is, and the explanation.
 
-    None where it has one condition, or another method orders it.
+    None if it has only one condition, or another method determines its order.
     """
     block = value_at(study.document, row.path[:-1])
     conditions = block.get("conditions") if isinstance(block, Mapping) else None
@@ -78,14 +78,14 @@ def _order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
 
 @dataclass(frozen=True, slots=True)
 class _ScalePoints:
-    """Code and name of each language, and the words of each point in each of them, "" where it is missing."""
+    """Code and name of each language, and the labels of each point in each language, "" if missing."""
 
     languages: tuple[tuple[str, str], ...]
     points: tuple[tuple[str, ...], ...]
 
 
 def _scale_points(study: Study, row: Row) -> _ScalePoints:
-    """Return the points of a scale in the study's languages and any others that it has."""
+    """Return the points of a scale in the study's languages and any additional ones."""
     labels = row.value if isinstance(row.value, Mapping) else {}
     codes = list(dict.fromkeys([*languages_of(study.document), *labels]))
     columns = [labels[code] if isinstance(labels.get(code), tuple) else () for code in codes]
@@ -99,7 +99,7 @@ _INSET_PX = NUMBER_PX + ICON_PX + 2 * 8
 
 
 class QuestionRow(Themed, QWidget):
-    """One question; ``opened`` when it is clicked or its button is pressed."""
+    """One question; ``opened`` is emitted when it is clicked or its button is pressed."""
 
     opened = Signal()
 
@@ -155,9 +155,9 @@ def _column_text(text: str, role: TypeRole, ink: Ink = "text") -> QLabel:
 
 
 class QuestionRows(Themed, QWidget):
-    """Questions: all of a questionnaire, or those above or below the one that is edited.
+    """The questions of a questionnaire, or those above or below the one being edited.
 
-    ``asked`` carries a request: to write the text of one.
+    ``asked`` carries a request to change the text of one.
     """
 
     asked = Signal(object)
@@ -190,7 +190,7 @@ class QuestionRows(Themed, QWidget):
 
 
 class Panel(Themed, QWidget):
-    """The ground of the form: tinted, with an accent line at its left, where one of several questions is edited."""
+    """The background of the form: tinted, with an accent line at the left while one of several questions is edited."""
 
     tinted = False
 
@@ -225,7 +225,7 @@ SENTENCES: Final = SpecialEditor(
 
 
 class _BalanceChip(Extra, Chip):
-    """Says how even an order is."""
+    """A chip that shows how balanced an order is."""
 
     beside_px = 124
 
@@ -240,7 +240,7 @@ ORDER: Final = SpecialEditor((("Block", "order"),), adds=lambda _field: _Balance
 
 
 class _PointsField(Field):
-    """A line for each point, a column for each language, and a button that adds a point."""
+    """One line per point, one column per language, and a button that adds a point."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -309,7 +309,7 @@ QUESTION_KIND: Final = SpecialEditor(tuple((kind, "kind") for kind in _QUESTIONS
 
 
 class _QuestionsField(Field):
-    """The questions, in their order; each is moved, copied and deleted in its own form."""
+    """The questions in order; each is moved, copied and deleted in its own form."""
 
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
@@ -351,7 +351,7 @@ def _choice_sentences(_study: Study, row: Row) -> str:
 
 
 class _Said(Extra, QLabel):
-    """A sentence below a choice that says what it means."""
+    """A sentence below a choice that explains it."""
 
     def __init__(self) -> None:
         super().__init__(wordWrap=True)
@@ -379,7 +379,7 @@ _NOTHING_TO_COMPARE: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
-    """A block, or a condition or group in a block, with the measures that it has, each with its words."""
+    """A block, or a condition or group in a block, with its measures and their texts."""
 
     key: str  # the key of the file that names it
     block: str
@@ -388,7 +388,7 @@ class Compared:
     measures: tuple[tuple[str, str], ...]
 
     def comparable_with(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
-        """Return the items it can be compared with: other blocks with a common measure, or items of the same block."""
+        """Return the items it can be compared with: blocks with a common measure, or items of the same block."""
         alike = (item for item in every if item.key == self.key and item.name != self.name)
         return tuple(
             item for item in alike if self.shared_measures(item) and (self.key == "blocks" or item.block == self.block)
@@ -429,7 +429,7 @@ def _comparable_items(document: Mapping[str, Any]) -> Iterator[Compared]:
 
 
 class Hypothesis(QWidget):
-    """One hypothesis; ``changed`` carries its table as it is chosen."""
+    """One hypothesis; ``changed`` carries its current table."""
 
     changed = Signal(object)
     refused = Signal(str)  # why the typed bound is refused; "" if it is valid
@@ -508,7 +508,7 @@ class Hypothesis(QWidget):
         )
 
     def _kept_bound(self, relation: Any, measure: str) -> Any:
-        """Return the present bound, the default bound of a new equality, or None."""
+        """Return the current bound, the default bound of a new equality, or None."""
         before = self.value.get("bound")
         if relation == "equal" and before is None:
             return RATIO if measure in {"threshold", "pse"} else BOUND
@@ -597,7 +597,7 @@ class _HypothesesField(Field):
 
 
 def _hypothesis_count(row: FormRow) -> int:
-    """Return the number of a row's hypotheses; 0 if the file has another value there."""
+    """Return the number of a row's hypotheses; 0 if the file has a value of another kind."""
     return len(row.value) if isinstance(row.value, tuple) else 0
 
 

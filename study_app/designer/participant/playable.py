@@ -36,7 +36,7 @@ from study_app.store.study_versions import kept_content, kept_versions
 
 @dataclass(frozen=True, slots=True)
 class ScreenSize:
-    """A screen that the page is shown for: name, words, size [logical px], and how much larger words are at least."""
+    """A screen for the preview: name, label, size [logical px], and the minimum scale of its text."""
 
     name: str
     words: str
@@ -54,7 +54,7 @@ SIZES: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ParticipantView:
-    """What the tab shows."""
+    """The content of the tab."""
 
     page: Page | None = None  # None if it cannot be shown
     language: str = "en"
@@ -86,7 +86,7 @@ def step_label(shown: Preview, step: Step, language: str) -> str:
 
 
 def moment_labels(moments: tuple[Moment, ...]) -> tuple[tuple[Moment, str], ...]:
-    """Return the pages of a step with their labels; none if there is only one."""
+    """Return the pages of a step with their labels; empty if there is only one."""
     tanks = sum(moment.kind == "tank" for moment in moments)
     named = {
         "tank": "Tank",
@@ -107,7 +107,7 @@ _Graph: TypeAlias = Mapping[Path, frozenset[Path]]
 
 
 def first_step(shown: Preview, path: Path) -> int | None:
-    """Return the index of the first step that shows an element, or a place within it; None if none does."""
+    """Return the index of the first step that shows an element, or a part of it; None if none does."""
     graph = _graph_of(shown.protocol.model_dump())
     tables = (_tables_of_step(shown, step, graph) for step in shown.schedule.steps)
     return next((at for at, tables_of_step in enumerate(tables) if path[:2] in tables_of_step), None)
@@ -156,7 +156,7 @@ _SIDES: Final[dict[str, _Side]] = {
 
 
 class StepPosition(NamedTuple):
-    """Where a preview is: a page, form or block by its id, which of the block's trials (from 1), language and seed.
+    """The position of a preview: a page, form or block by its id, the block's trial (from 1), language and seed.
 
     Without a name it is the first step that shows the selected element.
     """
@@ -169,7 +169,7 @@ class StepPosition(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """A step of a session; ``session`` names the session where it is not the first participant's first, "" there."""
+    """A step of a session; ``session`` names the session, "" for the first participant's first one."""
 
     shown: Preview
     index: int
@@ -182,7 +182,7 @@ def step_name(step: Step) -> str:
 
 
 def _previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
-    """Yield each kind of session with its name, the first participant's first and without a name."""
+    """Yield each kind of session with its name; the first participant's first session comes first, without a name."""
     first = preview(study)
     yield "", first
     for variant in variants(study):
@@ -194,7 +194,7 @@ def _previews(study: Protocol) -> Iterator[tuple[str, Preview]]:
 def first_showing(study: Protocol, path: Path) -> Found | None:
     """Return the first step that shows an element, None if none does.
 
-    A page or questionnaire that is in no session is shown on its own.
+    A page or questionnaire that is in no session is shown separately.
     """
     for session, shown in _previews(study):
         if (index := first_step(shown, path)) is not None:
@@ -237,7 +237,7 @@ _MOST_EARLIER: Final = 5
 
 
 def last_valid_study(opened: Document) -> Study | None:
-    """Return the study of the file or of its newest kept version without faults."""
+    """Return the study in the file, or in its newest stored version without faults."""
     earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-_MOST_EARLIER:]))
     for text in (opened.saved.encode(), *(unbundle(content)[0] for content in earlier)):
         with suppress(Refused):
@@ -249,7 +249,7 @@ def last_valid_study(opened: Document) -> Study | None:
 
 @dataclass(frozen=True, slots=True)
 class Playable:
-    """What is played."""
+    """A part of a study to play."""
 
     source: bytes = field(repr=False)
     folder: Folder  # where its footage is
@@ -260,7 +260,7 @@ class Playable:
 
 
 class NotPlayableError(StudyError):
-    """Faults of a study, each as ``check`` prints it."""
+    """Faults that prevent playing, each as ``check`` prints it."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
         self.problems = problems
@@ -270,8 +270,8 @@ class NotPlayableError(StudyError):
 def part_to_play(study: Study, path: Path, position: StepPosition | None = None) -> Playable:
     """Return the part to play from a position, or from the first step that shows an element.
 
-    ``position``: where the preview is. Raises NotPlayableError if the study has faults, but for texts that are missing
-    in languages that are not shown.
+    ``position`` is that of the preview. Raises NotPlayableError if the study has faults other than missing texts in
+    languages that are not shown.
     """
     position = position or StepPosition()
     if not study.is_toml:
@@ -318,7 +318,7 @@ _OF_THE_STUDY: Final = frozenset({"scene", "velocity", "knee", "body"})
 
 @dataclass(frozen=True, slots=True)
 class LabLiquids:
-    """Settings A and B for the lab; ``study`` is what takes them back, "" where the study cannot be changed."""
+    """Settings A and B for the lab; ``study`` is the study that takes changes back, "" if it cannot be changed."""
 
     a: Setting
     b: Setting
@@ -328,7 +328,7 @@ class LabLiquids:
 class Feeling(QObject):
     """Opens liquids of the open study in the lab.
 
-    ``asked`` carries a `LabLiquids`, ``returned`` comes when a liquid was put back.
+    ``asked`` carries a `LabLiquids`, ``returned`` is emitted when a liquid was taken back.
     """
 
     asked = Signal(object)

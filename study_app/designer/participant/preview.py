@@ -92,11 +92,11 @@ _LEAVES: Final = "Esc leaves the page"
 
 
 class _LivePage(Coloured, QGraphicsView):
-    """Shows a page in a `ParticipantWindow` that the mouse and the keys reach, at 100 % or as large as there is room.
+    """Shows a page in an interactive `ParticipantWindow`, at 100 % or as large as it fits.
 
-    The page has a keyboard focus of its own, whatever the designer's is on, so that it looks as in a session: it
-    receives keys while this view is focused. ``happened`` carries the session's events of the page, ``left`` comes at
-    Esc, ``frame_due`` while a tank is seen, ``shown`` when the view is.
+    The page has its own keyboard focus, independent of the designer's, so that it looks as in a session; it receives
+    keys while this view is focused. ``happened`` carries the page's session events, ``left`` is emitted at Esc,
+    ``frame_due`` while a tank is visible, ``shown`` when the view is.
     """
 
     happened = Signal(object)
@@ -130,7 +130,7 @@ class _LivePage(Coloured, QGraphicsView):
     # display
 
     def show_view(self, view: ParticipantView) -> None:
-        """Show a page; if only its answers differ, it stays with the typed text."""
+        """Show a page; if only its answers differ, it is kept with the typed text."""
         before, self._view = self._view, view
         self.setAccessibleName(view.name)
         self.viewport().setAccessibleName(view.name)
@@ -169,7 +169,7 @@ class _LivePage(Coloured, QGraphicsView):
         self._colour_ground()
 
     def _colour_ground(self) -> None:
-        """Make the ground dark around a page, as in a session, and like a card without one."""
+        """Set the background: dark around a page, as in a session, and that of a card without one."""
         colour = self.theme.surface if self._view.page is None else PARTICIPANT.window
         self.setBackgroundBrush(QBrush(QColor(colour)))
 
@@ -200,7 +200,7 @@ class _LivePage(Coloured, QGraphicsView):
 
     @property
     def scale_now(self) -> float:
-        """The scale at which the page is drawn: 1 is 100 %."""
+        """The scale of the displayed page: 1 is 100 %."""
         if not self._fits:
             return 1.0
         return min(self.width() / self._screen.width, self.height() / self._screen.height)
@@ -256,7 +256,7 @@ class _LivePage(Coloured, QGraphicsView):
                     self.ensureVisible(QRectF(0, top, 1, field.height()))
 
     def make_room(self, width: int) -> None:
-        """Take the page's height at this width if it is shown whole."""
+        """Use the page's height at this width if it is shown completely."""
         high = math.ceil(width * self._screen.height / self._screen.width)
         self.setMaximumHeight(high if self._fits else QWIDGETSIZE_MAX)
         self._scale()
@@ -363,10 +363,10 @@ _MOST_IN_ROW: Final = 2
 
 
 class ParticipantPreview(Card):
-    """The tab Participant: the page that the selected element is on, with language, screen, steps and pages.
+    """The tab Participant: the page that shows the selected element, with language, screen, steps and pages.
 
     It is drawn with the seed of `session.preview`; no sealed key is read. Answers are kept while the study is open, so
-    that an edit does not empty the page, and go nowhere else.
+    that an edit does not clear the page, and are not stored.
     """
 
     def __init__(self, editing: Editing, place: DesignerPlace) -> None:
@@ -485,7 +485,7 @@ class ParticipantPreview(Card):
         self._show_step()
 
     def _handle_page_event(self, event: object) -> None:
-        """Keep an answer for this page; go to the next page where the participant would."""
+        """Keep an answer for this page; go to the next page when the participant would."""
         if isinstance(event, LanguageChosen):
             self.show_language(event.language)
         elif isinstance(event, Chosen):
@@ -517,7 +517,7 @@ class ParticipantPreview(Card):
         self._after_form.start()
 
     def _look_at_screen(self) -> None:
-        """Offer this machine's participant screen, which may have been set elsewhere."""
+        """Offer this computer's participant screen, which may have been changed elsewhere."""
         settings, _ = settings_here()
         self._photodiode = settings.photodiode
         screen = choose_screens(screen_number(settings))[0]
@@ -532,7 +532,7 @@ class ParticipantPreview(Card):
             self._show_step()
 
     def _find_step(self) -> None:
-        """Find the shown step in the present study; another step if another element was selected."""
+        """Find the displayed step in the current study; another step if another element was selected."""
         opened = self.editing.opened
         if opened is None:
             return
@@ -565,7 +565,7 @@ class ParticipantPreview(Card):
             self._language = self._protocol.study.languages[0]
 
     def _is_shown(self, step: Found) -> bool:
-        """Return whether the shown step is of the same block, so that another element of it keeps the trial."""
+        """Return whether the displayed step belongs to the same block, so that its trial is kept."""
         now = self._found
         if now is None or now.session != step.session or step.session == STANDALONE:
             return False
@@ -656,7 +656,7 @@ class ParticipantPreview(Card):
         return f"{title_of(study.document, self._selected)} has a problem ({own.message}): {shown} shown."
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:
-        """Put the ball at the start of its path if the tank has changed."""
+        """Move the ball to the start of its path if the tank has changed."""
         assert self._found is not None  # noqa: S101 - a page is shown
         hides = condition is not None and self._found.shown.protocol.conditions[condition].ball == "hidden"
         tank = (page.task, page.workspace_m, page.trial, self._moment, hides)
@@ -724,7 +724,7 @@ class ParticipantPreview(Card):
 
     @property
     def most_px(self) -> int:
-        """The largest height it can use: of a page that is shown whole, the height of that page [px]."""
+        """The largest height that it can use, for a page shown completely the height of the page [px]."""
         other = self.column.minimumSize().height() - self.page.minimumHeight()
         return min(QWIDGETSIZE_MAX, self.page.maximumHeight() + other)
 
