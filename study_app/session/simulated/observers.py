@@ -292,7 +292,7 @@ def _target_path(task: Task, times_s: Floats) -> Floats:
 def rest_hand(task: Task, device: HandOrders) -> None:
     """Move a simulated hand after a task to the start of the next interval: a fixed position, or the middle.
 
-    If the hand stayed, it would jump there when the next trial begins, which causes forces that a person would not feel.
+    If it stayed, it would jump there when the next trial begins, which causes forces that a person would not feel.
     """
     if task.start_m is not None:
         device.reach_to(*task.start_m)
