@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from study_app.cli import commands
 from study_app.designer.document.document import check_free_name
-from study_app.designer.document.toml_text import Refused
-from study_app.errors import ProtocolError, StoreError
+from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.ids import file_name_fault, free_short_name
 from study_app.protocol.load import load, source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -31,7 +30,7 @@ def test_a_study_has_no_reserved_name(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     assert free_short_name((), "con") == "con2"
     assert free_short_name((), "com1") not in RESERVED
-    with pytest.raises(Refused, match='"nul" is a device on Windows; "nul2" is free'):
+    with pytest.raises(StudyError, match='"nul" is a device on Windows; "nul2" is free'):
         check_free_name("nul")
     file = tmp_path / "control.toml"
     file.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "con"', 1))

@@ -17,7 +17,9 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2
 from study_app.store.exclusions import exclude
 from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.sites.merge import merge_sites
 from study_app.store.unblinding import unblind
+from study_app.store.withdrawals import withdraw as erase
 from tests.analysis.conftest import CANNOT_JUDGE, Answer, make_results
 from tests.analysis.oracle.conduct import compare_captions, compare_conduct
 from tests.analysis.oracle.levels import compare_hypotheses, compare_levels
@@ -29,6 +31,7 @@ from tests.studies import made_up
 FILES = {
     "rek2024": Path("protocols/rek2024.toml"),
     **{name: Path(__file__).parent / f"{name}.toml" for name in ("levels", "groups")},
+    "sites": Path(__file__).parent / "groups.toml",
 }
 ROOT = Path(__file__).resolve().parents[3]
 NOT_MEASURED = frozenset({"part", "intervals", "targets", "setting", "standard", "level", "catch", "response", "value"})
@@ -43,17 +46,22 @@ SPREAD = 0.05
 
 @dataclass(frozen=True)
 class Written:
-    """A study's folder, its report, and its file."""
+    """A study's folder, its report, its file, and the folder of its list of exclusions."""
 
     study: Path
     report: Path
     file: Path
 
+    @property
+    def lists(self) -> Path:
+        lists = self.study.parent / "lists"
+        return lists if lists.exists() else self.study
+
     def compared(self) -> Compared:
         """Return the report with what the oracle recomputed of it."""
         compared, study = Compared(self.report), tomllib.loads((ROOT / self.file).read_text("utf-8"))
         names = ["responses", "trials", *(["intervals"] if [*self.report.glob("*intervals_data.csv")] else [])]
-        answers, trials, *intervals = (read_table(self.report, name, self.study) for name in names)
+        answers, trials, *intervals = (read_table(self.report, name, self.lists) for name in names)
         compare_statements(compared, answers, trials)
         compare_conduct(compared, answers, trials)
         if intervals:
@@ -115,6 +123,24 @@ def groups(folder: Path) -> Path:
     draw_measurements(study)
     withdraw(StudyFolder(study).session("P008", 1))
     return study
+
+
+def sites(folder: Path) -> Path:
+    """Return a study of two sites with two keys, each with an exclusion, and one with an erased participant."""
+    file, listed = FILES["sites"], []
+    for site, people, seed in (("north", 8, 4), ("south", 7, 9)):
+        own = rehearse_answers(file, participants=people, seed=seed, results=folder / site, features=made_up(str(file)))
+        trial = None if site == "north" else 2
+        exclude(own, "P003", 1, trial=trial, by="AB", reason="asleep")
+        listed.append({"participant": f"{site}-P003", "session": "1", "trial": str(trial or "n/a")})
+        if site == "south":
+            erase(own, "P005", by="CD", reason="asked for it")
+        unblind(own, "AB", "to analyse")
+        draw_measurements(own, seed)
+    (folder / "lists").mkdir()
+    write_rows(folder / "lists" / "exclusions.csv", listed)
+    merge_sites({"north": folder / "north", "south": folder / "south"}, folder / "study")
+    return folder / "study"
 
 
 def withdraw(session: SessionFolder, trials: int = 3) -> None:

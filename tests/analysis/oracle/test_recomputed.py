@@ -1,4 +1,4 @@
-"""Three studies whose reports are recomputed from their tables by code that shares nothing with the program."""
+"""Four studies whose reports are recomputed from their tables by code that shares nothing with the program."""
 
 import json
 import re
@@ -23,7 +23,7 @@ from tests.studies import once
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
-STUDIES = {"rek2024": studies.statements, "levels": studies.levels, "groups": studies.groups}
+STUDIES = {"rek2024": studies.statements, "levels": studies.levels, "groups": studies.groups, "sites": studies.sites}
 RECOMPUTED = 0.92
 """Least share of the numbers of a report."""
 THRESHOLDS, PROPERTIES = "tests/analysis/levels/test_thresholds.py::", "tests/analysis/oracle/test_properties.py::"
