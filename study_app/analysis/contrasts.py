@@ -1,10 +1,10 @@
 """Contrasts: the hypotheses that a study states, tested on one number of each participant.
 
 Within participants the differences between the two settings are tested (of thresholds, the differences of logarithms,
-whose mean is a ratio), between groups the participants' numbers: by Student's t together with a bootstrap, see
-`statistics.mean_tests`. Thresholds have the weights of the random-effects mean; those of two blocks with the same
-levels and design have a width in common. Equivalence is tested as everywhere, and corrected over the hypotheses with a
-bound.
+whose mean is a ratio), between groups the participants' numbers, in an interaction their differences: by Student's t
+together with a bootstrap, see `statistics.mean_tests`. Thresholds have the weights of the random-effects mean; those of
+two blocks with the same levels and design have a width in common. Equivalence is tested as everywhere, and corrected
+over the hypotheses with a bound.
 """
 
 import math
@@ -175,26 +175,26 @@ def _compared(
         if contrast.measure in _STATISTICS
         else f"an answer to {contrast.measure} is missing"
     )
-    names = contrast.blocks * 2 if contrast.groups is not None else contrast.compared
+    names = contrast.within or contrast.blocks * 2
     left_out = {
         person: f"{what} in {name}" for side, name in zip(sides[::-1], names[::-1], strict=True) for person in people
         if person not in side
     }  # fmt: skip
     kept = [person for person in people if person not in left_out]
-    if contrast.groups is not None:
-        sides = [{who: sides[0][who] for who in kept if members[who] == group} for group in contrast.groups]
-        samples = tuple(tuple(side.values()) for side in sides)
+    numbers = {person: sides[0][person] for person in kept}
+    if contrast.within is not None:
+        numbers = {
+            person: Measured(
+                value=sides[0][person].value - sides[1][person].value,
+                variance=sides[0][person].variance + sides[1][person].variance,
+            )
+            for person in kept
+        }
+    if contrast.groups is not None:  # the error that all have in common is the same in both groups
+        sides = [{who: numbers[who] for who in kept if members[who] == group} for group in contrast.groups]
+        samples, shared = tuple(tuple(side.values()) for side in sides), 0.0
     else:
-        sides = [{person: side[person] for person in kept} for side in sides]
-        samples = (
-            tuple(
-                Measured(
-                    value=sides[0][person].value - sides[1][person].value,
-                    variance=sides[0][person].variance + sides[1][person].variance,
-                )
-                for person in kept
-            ),
-        )
+        sides, samples = [{person: side[person] for person in kept} for side in sides], (tuple(numbers.values()),)
     return Compared(samples=tuple(map(_ascending, samples)), left_out=left_out, shared=shared, sides=tuple(sides))
 
 
@@ -306,7 +306,8 @@ def _tested(
     compared = _compared(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
     names = _side_names(study, contrast)
-    standardised = _standardised(compared, is_ordinal=contrast.measure not in _STATISTICS)
+    is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction
+    standardised = _standardised(compared, is_ordinal=is_ordinal)
     effect = ends = p_equal = p = p_bootstrap = statistic = None
     method, why = "none", _TOO_FEW if means is None else _ALIKE
     if means is not None:
@@ -323,7 +324,13 @@ def _tested(
             sides = "two-sided" if contrast.expected is None else f"one-sided ({contrast.expected})"
             method = f"t({means.freedom}), {sides}; bootstrap {p_equals(p_bootstrap)}"
     return ContrastResult(
-        test="contrast, t of two groups" if contrast.groups else "contrast, paired t",
+        test=(
+            "contrast, t of two groups' differences"
+            if contrast.is_interaction
+            else "contrast, t of two groups"
+            if contrast.groups
+            else "contrast, paired t"
+        ),
         n=sum(map(len, compared.samples)),
         dropped=len(compared.left_out),
         statistic_name="t",
@@ -359,14 +366,15 @@ def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
     """Return the names of the two sides: block titles, unless these are the same."""
     titles = {block.id: block.title for block in study.levels} | {block.id: block.title for block in study.blocks}
     first, second = (titles.get(block, block) for block in (*contrast.blocks, *contrast.blocks)[:2])
-    if first != second:
+    if first != second and contrast.groups is None:
         return first, second
     return contrast.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus})
 
 
 def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
     """Return the bound on the scale of the test, and the largest possible difference (None: unlimited)."""
-    return abs(math.log(bound)) if ratio else bound, None if contrast.measure in _STATISTICS else STEPS
+    largest = None if contrast.measure in _STATISTICS else STEPS * (2 if contrast.is_interaction else 1)
+    return abs(math.log(bound)) if ratio else bound, largest
 
 
 def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> float | None:
@@ -416,7 +424,7 @@ def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
 
 def _difference_words(contrast: ContrastResult) -> str:
     first, second = contrast.compared
-    what, expected = number_text.capitalised(contrast.contrast.measure_words), contrast.contrast.expected
+    what, expected = number_text.capitalised(contrast.contrast.effect_words), contrast.contrast.expected
     if contrast.verdict in FOUND:
         side = "higher" if (contrast.effect or 0.0) > (1.0 if contrast.ratio else 0.0) else "lower"
         said = f"{what} was {side} in {first} than in {second}"
@@ -460,7 +468,8 @@ def contrast_methods(results: Results) -> Iterator[str]:
         return
     for place, contrast in enumerate(contrasts, start=1):
         of = " of logarithms" if contrast.ratio else ""
-        groups = f"a t test{of} of two groups with unequal variances"
+        differences = " of differences within participants between" if contrast.contrast.is_interaction else " of"
+        groups = f"a t test{of}{differences} two groups with unequal variances"
         test = groups if contrast.contrast.groups else f"a paired t test{of}"
         sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
         label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"

@@ -335,7 +335,10 @@ OF_LEVELS: Final = ("threshold", "exponent", "d_prime", "pse")
 
 
 class Contrast(Table):
-    """A hypothesis: two blocks, conditions or groups differ in a measure; it is tested, planned and reported first."""
+    """A hypothesis: two blocks, conditions or groups differ in a measure; it is tested, planned and reported first.
+
+    With groups and two blocks or conditions it is an interaction: the groups differ in the difference between the two.
+    """
 
     measure: Id = Field(
         default="threshold",
@@ -349,7 +352,10 @@ class Contrast(Table):
     conditions: tuple[Id, Id] | None = Field(
         default=None, description="The two conditions of the block to compare, within participants."
     )
-    groups: tuple[Id, Id] | None = Field(default=None, description="The two groups to compare.")
+    groups: tuple[Id, Id] | None = Field(
+        default=None,
+        description="The two groups to compare; with two blocks or conditions: in the difference between those.",
+    )
     expected: Literal["higher", "lower"] | None = Field(
         default=None,
         description=(
@@ -364,18 +370,32 @@ class Contrast(Table):
 
     @model_validator(mode="after")
     def _compares_two(self) -> Self:
-        two = [len(self.blocks) == 2, self.conditions is not None, self.groups is not None]
-        if sum(two) != 1:
+        if len(self.blocks) == 2 and self.conditions is not None:
+            raise invalid("give two blocks, or two conditions of one block", "conditions")
+        if self.groups is None and self.within is None:
             raise invalid("give two blocks, or one block and two conditions, or one block and two groups", "blocks")
-        if self.compared[0] == self.compared[1]:
-            raise invalid(f'compares "{self.compared[0]}" with itself', "blocks")
+        for first, second in filter(None, (self.groups, self.within)):
+            if first == second:
+                raise invalid(f'compares "{first}" with itself', "blocks")
         return self
 
     @property
     def compared(self) -> tuple[str, str]:
-        """The ids of the two sides: blocks, conditions or groups."""
-        first, second = self.conditions or self.groups or self.blocks
+        """The ids of the two sides: groups, conditions or blocks."""
+        first, second = self.groups or self.conditions or self.blocks
         return first, second
+
+    @property
+    def within(self) -> tuple[str, str] | None:
+        """The ids of the two conditions or blocks that are compared within participants; None for groups alone."""
+        if self.conditions is None and len(self.blocks) == 2:
+            return self.blocks[0], self.blocks[1]
+        return self.conditions
+
+    @property
+    def is_interaction(self) -> bool:
+        """Whether groups are compared in the difference between two conditions or blocks."""
+        return self.groups is not None and self.within is not None
 
     @property
     def measure_words(self) -> str:
@@ -385,20 +405,30 @@ class Contrast(Table):
             words.get(self.measure, self.measure) if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
         )
 
+    @property
+    def effect_words(self) -> str:
+        """What the two sides are compared in: the measure, or in an interaction the difference within participants."""
+        if self.groups is None or self.within is None:
+            return self.measure_words
+        where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
+        return f"the difference in {self.measure_words} between {self.within[0]} and {self.within[1]}{where}"
+
     def words(self, conditions: Mapping[str, str | None]) -> tuple[str, str]:
         """Return the labels of the two sides; blocks get the conditions of their stimuli if these differ."""
         first, second = self.compared
+        if self.groups is not None:
+            return first, second
         of = [conditions.get(block) for block in self.blocks]
         return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
 
     def described(self, names: tuple[str, str] | None = None) -> str:
         """Return a sentence with the hypothesis; ``names`` are the names of the two sides, by default their ids."""
         first, second = names or self.compared
-        where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
+        where = "" if len(self.blocks) == 2 or self.is_interaction else f" in block {self.blocks[0]}"
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
         near = "" if self.bound is None else f"; equivalent within {self.bound:g}"
-        return f"{self.measure_words} {moves} {first} {joint} {second}{where}{near}"
+        return f"{self.effect_words} {moves} {first} {joint} {second}{where}{near}"
 
 
 BELOW_CHANCE_P: Final = 0.001

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from pydantic import ValidationError
 from scipy.stats import t as student
 from scipy.stats import ttest_ind
 
@@ -201,6 +202,83 @@ def test_two_groups_are_compared_with_unequal_variances() -> None:
     t = ttest_ind(one, two, equal_var=False).statistic
     assert (found.statistic, found.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
     assert found.effect == pytest.approx(one.mean() - two.mean())
+
+
+def test_an_interaction_compares_groups_in_the_difference_of_each_participant() -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), groups=("one", "two"))
+    made = statements(contrast)
+    people = sorted(made.trials["participant"].unique())
+    members = {person: "one" if number % 3 else "two" for number, person in enumerate(people)}
+    rows = made.responses["participant"].map(members).eq("one") & made.responses["code"].eq("L2")
+    assert rows.any()
+    raised = made.responses.assign(response=made.responses["response"] + 2 * rows.astype("int64"))
+    made = replace(
+        made,
+        responses=raised,
+        trials=made.trials.assign(group=made.trials["participant"].map(members).astype("string")),
+    )
+    (result,) = evaluate(made).contrasts
+
+    answers = raised[raised["item"] == ITEMS[0]].pivot_table("response", "participant", "code").astype(float)
+    differences = answers["L2"] - answers["L1"]
+    one, two = (differences[[person for person in people if members[person] == group]] for group in ("one", "two"))
+    t = ttest_ind(one, two, equal_var=False).statistic
+    assert (result.statistic, result.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
+    assert result.effect == pytest.approx(one.mean() - two.mean())
+    assert result.verdict == "shown"
+    difference = f"difference in agreement with “{ITEMS[0]}” between c2 and c1 in block b"
+    assert f"The {difference} was higher in one than in two" in answer(result)
+    assert f"the {difference} differs between one and two" in methods(made, evaluate(made))
+    assert [len(side.values) for side in result.sides] == [len(one), len(two)]
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {"blocks": ("a", "b"), "conditions": ("c", "d"), "groups": ("one", "two")},
+        {"blocks": ("a", "b"), "conditions": ("c", "d")},
+        {"blocks": ("a", "a"), "groups": ("one", "two")},
+        {"blocks": ("a", "b"), "groups": ("one", "one")},
+        {"blocks": ("a",)},
+    ],
+)
+def test_what_is_no_comparison_of_two_is_refused(keys: dict[str, tuple[str, ...]]) -> None:
+    with pytest.raises(ValidationError):
+        Contrast.model_validate({"measure": "d_prime", **keys})
+
+
+def test_power_tells_the_smallest_interaction() -> None:
+    text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
+    protocol = grouped(text, "threshold", 'late", "prompt', '["late", "prompt"]')
+    error = math.log(1.3) / math.sqrt(2)  # the SD of the two errors is ln 1.3
+    found = {
+        (block, 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)]) for block in ("late", "prompt")
+    }
+    told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found=found))
+    spread = math.hypot(math.log(1.2), math.log(1.3), math.log(1.3))
+    half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
+    assert "the difference in threshold between late and prompt differs between a and b" in told
+    assert f"| 20 | 18 | {spread:.0%} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
+    text, _, rest = source_bytes("rek2024").decode().replace("format = 1", "format = 2").partition("sequence = ")
+    sequence, _, rest = rest.partition("]")
+    alone = grouped(text + rest, "different", "delays", f"{sequence}]")
+    assert alone.analysis is not None
+    first, second = alone.blocks["delays"].conditions[:2]
+    (hypothesis,) = alone.analysis.contrasts
+    both = hypothesis.model_copy(update={"conditions": (first, second)})
+    protocol = alone.model_copy(update={"analysis": alone.analysis.model_copy(update={"contrasts": (both,)})})
+    planned = plan(protocol, felt_in(protocol))
+    name, kind = next(iter(planned.kinds.items()))
+    powers_ = Powers(plan=planned, sizes=(18,), studies=1, asked=1, seed=1, kinds={name: ()})
+    told = power_markdown(powers_)
+    place = [block.id for block in planned.blocks].index("delays")
+    block = planned.blocks[place]
+    item = [one.id for one in block.items].index("different")
+    given = people(planned, 4000, 1, 0)[place].answers(1.0, kind)[:, :, item]
+    rows = [[one.condition for one in block.settings].index(condition) for condition in (first, second)]
+    spread = float((given[:, rows[0]] - given[:, rows[1]]).std(ddof=1))
+    row = next(line for line in told.splitlines() if line.startswith("| different"))
+    assert float(row.split("|")[3]) == pytest.approx(spread, rel=0.1)
 
 
 def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> None:

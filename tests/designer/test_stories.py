@@ -877,6 +877,15 @@ def hypotheses(story: Story) -> None:
     story.ask(RetypeFile(FORMAT_2.replace(own, "", 1).replace("[limits]", groups)))
     story.play("ctrl+f 'order of blocks' Return")
     story.expect(selected="blocks.liquids")
+    story.press("Add a hypothesis")
+    story.choose(line().first, "A, Prompt in Delays − Late in Delays")
+    pair = {"blocks": ("delays",), "groups": ("a", "b"), "conditions": ("prompt", "late")}
+    assert designer.value(*contrasts) == ({"measure": "harder", "expected": "higher", **pair},)
+    story.choose(line().relation, "is different from")
+    assert designer.value(*contrasts) == ({"measure": "harder", **pair},)
+    assert [line().first.currentText(), line().second.currentText()] == [
+        f"{group}, Prompt in Delays − Late in Delays" for group in ("A", "B")
+    ]
     for before, after in (
         ('conditions = ["thin", "thick"]', ""),
         ('phase = "main" ', "phase = {} "),

@@ -123,7 +123,7 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
         partial(draw_people, panels, above=_scale_words(contrast, result), members=shown),
         numbers_of_panels(panels),
     )
-    title = f"{capitalised(contrast.contrast.measure_words)}"
+    title = f"{capitalised(contrast.contrast.effect_words)}"
     return picture_of(
         study, contrast.contrast.blocks[0], name, title, caption, draw, forms, (f"n = {contrast.n}",), numbers
     )
@@ -142,6 +142,8 @@ def _differences(contrast: ContrastResult) -> dict[str, float]:
 
 def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
+    if contrast.contrast.is_interaction:
+        return f"{'Ratio' if contrast.ratio else 'Difference'}, {contrast.contrast.measure_words}"
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:
         return level_words(result)
     return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points of the scale")

@@ -21,7 +21,7 @@ from scipy.stats import t as student
 
 from study_app import __version__
 from study_app import figure_style as style
-from study_app.analysis.contrasts import LEFT_OUT
+from study_app.analysis.contrasts import LEFT_OUT, equality_limits
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.page_layout import SMALL, Style
@@ -33,6 +33,7 @@ from study_app.analysis.planning.simulated_studies import (
     Counts,
     Plan,
     Planned,
+    contrast_sides,
     people,
 )
 from study_app.analysis.results import enough
@@ -465,17 +466,19 @@ def _between(power: Powers) -> Iterator[str]:
     plan = power.plan
     given = people(plan, _MANY, power.seed, 0) if plan.between else ()
     for contrast, shares in plan.between:
-        place = [block.id for block in plan.blocks].index(contrast.blocks[0])
-        item = [it.id for it in plan.blocks[place].items].index(contrast.measure)
-        spreads = {
-            name: float(given[place].answers(1.0, kind)[:, :, item].mean(axis=1).std(ddof=1))
-            for name, kind in plan.kinds.items()
-        }
-        said = "SD: of the mean answers of simulated participants, in points."
+        spreads = {}
+        for name, kind in plan.kinds.items():
+            answers = [of_block.answers(1.0, kind)[None, None] for of_block in given]
+            first, second = contrast_sides(plan, answers, contrast)
+            numbers = first if contrast.within is None else first - second
+            spreads[name] = float(numbers.std(ddof=1))
+        of = "the mean answers" if contrast.within is None else "the differences within participants"
+        said = f"SD: of {of} of simulated participants, in points."
         rows = [(f"{contrast.measure}, {_people(name)}", f"{spread:.2f}", spread) for name, spread in spreads.items()]
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
-            said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan), largest=STEPS,
+            said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan),
+            largest=equality_limits(contrast, 1.0, ratio=False)[1],
         )  # fmt: skip
 
 

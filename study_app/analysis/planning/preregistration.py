@@ -123,7 +123,8 @@ def _test_of(contrast: Contrast, of: str) -> str:
     """Return the t test of a contrast."""
     if contrast.groups is None:
         return f"paired t test{of}"
-    return f"t test{of} of two groups with unequal variances and the degrees of freedom of the smaller group"
+    differences = "of differences within participants between" if contrast.is_interaction else "of"
+    return f"t test{of} {differences} two groups with unequal variances and the degrees of freedom of the smaller group"
 
 
 def _equality_of(protocol: Protocol, contrast: Contrast) -> str:

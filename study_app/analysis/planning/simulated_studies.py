@@ -408,20 +408,11 @@ def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDA
     """
     if not plan.contrasts:
         return {}
-    blocks = {block.id: (block, answers) for block, answers in zip(plan.blocks, given, strict=True)}
     ps, of_equal, with_bound = [], [], [contrast for contrast in plan.contrasts if contrast.bound is not None]
     members = len(plan.contrasts) + plan.untested
     for contrast in plan.contrasts:
-        sides = []
-        for name, condition in zip(
-            contrast.blocks if len(contrast.blocks) == 2 else contrast.blocks * 2,
-            contrast.conditions or (None, None),
-            strict=True,
-        ):
-            block, answers = blocks[name]
-            rows = [place for place, it in enumerate(block.settings) if condition in (None, it.condition)]
-            sides.append(answers[:, :, :, rows, [it.id for it in block.items].index(contrast.measure)].mean(axis=-1))
-        away = sides[0] - sides[1]
+        first, second = contrast_sides(plan, given, contrast)
+        away = first - second
         ps.append(_p_of_contrast(away, contrast, alpha / members).T)
         if contrast.bound is not None:
             means = means_of(away[0] - away[0].mean(), resamples=resamples_for(alpha / members))
@@ -434,6 +425,24 @@ def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDA
             f"{contrast.described()}, {IF_EQUAL}": equal[..., place] for place, contrast in enumerate(with_bound)
         }
     return shown_of
+
+
+def contrast_sides(plan: Plan, given: Sequence[Array], contrast: Contrast) -> tuple[Array, Array]:
+    """Return each participant's number (effects, studies, participants) in the two conditions or blocks of a contrast.
+
+    ``given`` are each block's answers (effects, studies, participants, settings, items); both numbers are equal in a
+    contrast of groups alone.
+    """
+    blocks = {block.id: (block, answers) for block, answers in zip(plan.blocks, given, strict=True)}
+
+    def numbers(name: str, condition: str | None) -> Array:
+        block, answers = blocks[name]
+        rows = [place for place, setting in enumerate(block.settings) if condition in (None, setting.condition)]
+        item = [item.id for item in block.items].index(contrast.measure)
+        return np.asarray(answers[:, :, :, rows, item].mean(axis=-1))
+
+    first, second = contrast.conditions or (None, None)
+    return numbers(contrast.blocks[0], first), numbers(contrast.blocks[-1], second)
 
 
 def _p_of_contrast(away: Array, contrast: Contrast, strictest: float) -> Array:

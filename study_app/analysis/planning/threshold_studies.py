@@ -367,7 +367,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         what = contrast.measure.replace("d_prime", "d′")
         share = "" if isinstance(first, ThresholdPlan) else f", relative to a mean {what} of {first.value:g}"
         whose = f"one participant's {what}, from the error of the estimate and differences between people"
-        if contrast.groups is None:
+        if contrast.within is not None:
             whose = "one participant's difference, from the errors of both estimates and differences between people"
         yield from smallest_differences(
             contrast, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,

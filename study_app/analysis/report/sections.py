@@ -122,8 +122,9 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
             "first session are used."
         )
-    if len({contrast.contrast.groups is None for contrast in results.contrasts}) == 2:
-        yield "Interactions between groups and blocks or conditions are not tested."
+    hypotheses = [contrast.contrast for contrast in results.contrasts]
+    if len({one.groups is None for one in hypotheses}) == 2 and not any(one.is_interaction for one in hypotheses):
+        yield "No hypothesis tests an interaction between groups and blocks or conditions."
     if results.questions and not (results.blocks or results.levels):
         yield (
             "The answers to these questions are described, not tested: intervals are not corrected for the number of "

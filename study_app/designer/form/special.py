@@ -1,9 +1,10 @@
 """Editors of certain keys: sentences, order, points of a scale, kind and list of questions, hypotheses."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import combinations
 from typing import Any, Final, Literal
 
 from PySide6.QtCore import QRectF, Qt, Signal
@@ -379,17 +380,27 @@ _NOTHING_TO_COMPARE: Final = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Compared:
-    """A block, or a condition or group in a block, with its measures and their texts."""
+    """A block, or a condition or group in a block, with its measures and their texts.
+
+    A group with a ``pair`` of blocks or conditions (the key is ``pair_of``) is a side of an interaction.
+    """
 
     key: str  # the key of the file that names it
     block: str
     name: str
     words: str
     measures: tuple[tuple[str, str], ...]
+    pair_of: str = ""
+    pair: tuple[str, ...] = ()
+
+    @property
+    def place(self) -> tuple[object, ...]:
+        """What tells the item from others: the key, block, name and pair."""
+        return self.key, self.block, self.name, self.pair_of, self.pair
 
     def comparable_with(self, every: tuple["Compared", ...]) -> tuple["Compared", ...]:
         """Return the items it can be compared with: blocks with a common measure, or items of the same block."""
-        alike = (item for item in every if item.key == self.key and item.name != self.name)
+        alike = (item for item in every if item.key == self.key and item.name != self.name and item.pair == self.pair)
         return tuple(
             item for item in alike if self.shared_measures(item) and (self.key == "blocks" or item.block == self.block)
         )
@@ -402,6 +413,7 @@ class Compared:
 def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
     """Return the items that hypotheses can compare, in file order; equal titles get the block's id."""
     every = tuple(_comparable_items(study.document))
+    every += tuple(_interaction_sides(every))
     times = Counter(item.words for item in every)
     every = tuple(
         replace(item, words=f"{item.words} ({item.block})") if times[item.words] > 1 else item for item in every
@@ -426,6 +438,19 @@ def _comparable_items(document: Mapping[str, Any]) -> Iterator[Compared]:
             for condition in inner if isinstance(inner, tuple | list) else ():
                 label = f"{title_of(document, (key, str(condition)))} in {title}"
                 yield Compared(key=key, block=name, name=str(condition), words=label, measures=measures)
+
+
+def _interaction_sides(every: Sequence[Compared]) -> Iterator[Compared]:
+    """Yield each group with each pair of blocks, or of conditions of a block, whose difference can be compared."""
+    groups = {item.name: item.words.partition(" in ")[0] for item in every if item.key == "groups"}
+    for first, second in combinations([item for item in every if item.key != "groups"], 2):
+        if groups and first.comparable_with((second,)):
+            words = f"{first.words} − {second.words}"
+            for group, title in groups.items():
+                yield replace(
+                    first, key="groups", name=group, words=f"{title}, {words}", pair_of=first.key,
+                    pair=(first.name, second.name), measures=first.shared_measures(second),
+                )  # fmt: skip
 
 
 class Hypothesis(QWidget):
@@ -458,11 +483,13 @@ class Hypothesis(QWidget):
 
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
-        key = next((key for key in ("conditions", "groups") if value.get(key)), "blocks")
-        listed = (value.get(key) for key in ("blocks", key))
-        blocks, named = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in listed)
-        at = [(key, name if key == "blocks" else next(iter(blocks), ""), name) for name in named]
-        items = [next((item for item in known if (item.key, item.block, item.name) == place), None) for place in at]
+        key = next((key for key in ("groups", "conditions") if value.get(key)), "blocks")
+        listed = (value.get(key) for key in ("blocks", key, "conditions"))
+        blocks, named, conditions = (tuple(map(str, entry)) if isinstance(entry, tuple) else () for entry in listed)
+        pairs = {"conditions": conditions, "blocks": blocks if len(blocks) > 1 else ()} if key == "groups" else {}
+        pair = next(((of, names) for of, names in pairs.items() if names), ("", ()))
+        at = [(key, name if key == "blocks" else next(iter(blocks), ""), name, *pair) for name in named]
+        items = [next((item for item in known if item.place == place), None) for place in at]
         first, second = (*items, None, None)[:2]
         self.others = () if first is None else first.comparable_with(known)
         self.measures = (
@@ -531,9 +558,8 @@ def _relation_keys(relation: Any, bound: Any) -> dict[str, Any]:
 
 def _comparison_keys(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
     """Return the keys that state the items that a hypothesis compares."""
-    pair = [first.name, second.name]
-    table: dict[str, Any] = {"measure": measure, "blocks": pair if first.key == "blocks" else [first.block]}
-    return table if first.key == "blocks" else {**table, first.key: pair}
+    table: dict[str, Any] = {"measure": measure, "blocks": [first.block]}
+    return table | {first.key: [first.name, second.name]} | ({first.pair_of: [*first.pair]} if first.pair else {})
 
 
 def _relation(value: Mapping[str, Any]) -> Any:
