@@ -10,6 +10,7 @@ REASON: Final = "a session is running"
 CONTINUOUS, SYSTEM, DISPLAY = 0x80000000, 0x1, 0x2  # of SetThreadExecutionState
 USER_INITIATED, LATENCY_CRITICAL, SCREEN_ON = 0x00FFFFFF, 0xFF00000000, 1 << 40  # of NSProcessInfo's activities
 _CONNECTION: Final = "liquid-study-awake"
+_PATIENCE_MS: Final = 1000  # with a desktop that does not answer
 
 
 class Awake:
@@ -50,13 +51,14 @@ def _inhibit_screen_saver() -> bool:
     runtime = os.environ.get("XDG_RUNTIME_DIR", "")
     if "DBUS_SESSION_BUS_ADDRESS" not in os.environ and not (runtime and Path(runtime, "bus").exists()):
         return False
-    from PySide6.QtDBus import QDBusConnection, QDBusInterface, QDBusMessage  # noqa: PLC0415 - loaded by sessions alone
+    from PySide6.QtDBus import QDBus, QDBusConnection, QDBusMessage  # noqa: PLC0415 - loaded by sessions alone
 
     bus = QDBusConnection.connectToBus(QDBusConnection.BusType.SessionBus, _CONNECTION)
     name = "org.freedesktop.ScreenSaver"
-    service = QDBusInterface(name, "/org/freedesktop/ScreenSaver", name, bus)
-    service.setTimeout(1000)
-    return service.call("Inhibit", "liquid-study", REASON).type() == QDBusMessage.MessageType.ReplyMessage
+    request = QDBusMessage.createMethodCall(name, "/org/freedesktop/ScreenSaver", name, "Inhibit")
+    request.setArguments(["liquid-study", REASON])
+    reply = bus.call(request, QDBus.CallMode.Block, _PATIENCE_MS)
+    return reply.type() == QDBusMessage.MessageType.ReplyMessage
 
 
 def _begin_activity() -> int | None:
