@@ -82,7 +82,7 @@ def _checked(**permitted: _Permitted) -> Callable[[Callable[P, R]], Callable[P, 
                 except (TypeError, ValueError, OverflowError) as error:
                     text = " ".join(repr(value).split())
                     shown = text if len(text) <= 60 else f"{text[:59]}…"
-                    raise StudyError(f"{name} = {shown} is not possible: give {permitted[name].phrase}") from error
+                    raise StudyError(f"{name} = {shown} is not possible: specify {permitted[name].phrase}") from error
             return function(*given.args, **given.kwargs)
 
         return call
@@ -208,7 +208,9 @@ def simulate_force(
         try:
             t_s, position_m = (np.asarray(values, np.float64) for values in motion)
         except (TypeError, ValueError) as error:
-            raise StudyError(f"the motion is not possible ({error}): give times (n,) and positions (n, 3)") from error
+            raise StudyError(
+                f"the motion is not possible ({error}): specify times (n,) and positions (n, 3)"
+            ) from error
         return offline.simulate(chosen, motions.Motion(t_s, position_m))
     if str(motion) in motions.NAMES or not (Path(motion).suffix or Path(motion).exists()):
         return offline.simulate(chosen, motions.programmed_motion(str(motion), rate_hz=chosen.rate_hz))
@@ -285,17 +287,17 @@ def fit(
     from study_app.protocol.trials.stimuli import Stimulus
 
     if not isinstance(trials, pd.DataFrame):
-        raise AnalysisError(f"trials are a {type(trials).__name__}: give a DataFrame")
+        raise AnalysisError(f"trials are a {type(trials).__name__}: specify a DataFrame")
     if missing := {"level", "success"} - set(trials.columns):
         raise AnalysisError(f"trials have no column {', '.join(sorted(missing))}: each row needs level and success")
     kinds = [name for name, kind in KINDS.items() if kind.adaptive]
     if design not in kinds:
-        raise AnalysisError(f"design {design!r} has no threshold that can be fitted: give one of {', '.join(kinds)}")
+        raise AnalysisError(f"design {design!r} has no threshold that can be fitted: specify one of {', '.join(kinds)}")
     given = trials["level"]
     if not (pd.api.types.is_numeric_dtype(given) and given.between(0.0, float("inf"), inclusive="left").all()):
-        raise AnalysisError("column level contains an invalid level: give finite numbers that are not negative")
+        raise AnalysisError("column level contains an invalid level: specify finite numbers that are not negative")
     if trials.empty or not trials["success"].isin([True, False]).all():
-        raise AnalysisError("column success holds what is neither true nor false, or no trial: give at least one")
+        raise AnalysisError("column success holds what is neither true nor false, or no trial: specify at least one")
     kind = "difference" if distances else "value"
     try:
         stimulus = Stimulus(vary="level", level=kind, levels=levels, spacing=spacing)
@@ -600,7 +602,7 @@ def open_force(
     first = next(iter(scenes.values()))
     if force_limit_n is not None and not 0 < force_limit_n <= first.force_limit_n:
         raise StudyError(
-            f"force_limit_n = {force_limit_n:g} is not possible: give more than 0 and at most that of the file, "
+            f"force_limit_n = {force_limit_n:g} is not possible: specify more than 0 and at most that of the file, "
             f"{first.force_limit_n:g} N"
         )
     settings = RigSettings(

@@ -200,10 +200,12 @@ class Registry(Mapping[str, T], Generic[T]):
             found.model_json_schema()  # what its keys lack is said now, not by a form
             kind = found.model_fields.get("kind")
             if kind is not None and kind.is_required():
-                raise StudyError("its kind does not have a default: give it the value of its Literal")
+                raise StudyError("its kind does not have a default: set the default to the value of the Literal")
             name = "" if kind is None else kind.default
             if not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
-                raise StudyError(f"its kind is {name!r}: call it '{begins}' and small letters, digits or underscores")
+                raise StudyError(
+                    f"its kind is {name!r}: call it '{begins}' and lowercase letters, digits or underscores"
+                )
         if not isinstance(name, str) or not name:
             raise StudyError(f"{place} does not have {self._key}: add it")
         if name in self.own or name in others:

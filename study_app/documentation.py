@@ -100,7 +100,7 @@ class Section(NamedTuple):
 
     `names` are the title, the heading and its synonyms; `phrases` the begins of the words of each synonym, and of the
     title at its own heading;
-    `text` is its `source` without marks, in small letters.
+    `text` is its `source` without marks, in lowercase letters.
     """
 
     page: str

@@ -57,7 +57,7 @@ def read_as(text: str) -> str:
 
 
 def id_of(text: str, longest: int = MAX_ID) -> str:
-    """Return the id that a text gives: its words in small letters without accents, as many as there is room for.
+    """Return the id that a text gives: its words in lowercase letters without accents, as many as there is room for.
 
     Its first word begins with a letter; "" where there is none.
 

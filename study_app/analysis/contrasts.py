@@ -65,9 +65,10 @@ _WEIGHTED: Final = (
 _SIZES: Final = (
     "Standardised effects weight participants equally: d_z is the mean difference within participants divided by its "
     "standard deviation, g is Hedges' g of two groups; their 95 % intervals invert the noncentral t distribution. "
-    "Bayes factors are two-sided JZS factors (Rouder et al., 2009) of a difference against none, with a Cauchy prior "
-    f"of scale {number(PRIOR_SCALE, 3)}. Cliff's delta is the probability of a larger answer minus the probability of "
-    "a smaller one; within participants it is the share with a larger answer minus the share with a smaller one."
+    "Bayes factors are two-sided JZS factors (Rouder et al., 2009) for a difference against no difference, with a "
+    "Cauchy prior of scale "
+    f"{number(PRIOR_SCALE, 3)}. Cliff's delta is the probability of a larger answer minus the probability of a smaller "
+    "one; within participants it is the proportion with a larger answer minus the proportion with a smaller one."
 )
 _MOST_NAMED: Final = 20
 
@@ -476,7 +477,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
         yield f"{label} ({contrast.contrast.described(contrast.compared)}) was tested by {test}, {sides}."
     if any(contrast.contrast.groups for contrast in contrasts):
         yield "Between groups, t has the degrees of freedom of the smaller group (Hsu 1938)."
-    holm_words = f", adjusted by Holm over {len(contrasts)} hypotheses"
+    holm_words = f", Holm-adjusted across {len(contrasts)} hypotheses"
     yield (
         "Each participant had one number in each comparison. A bootstrap that adds a participant like the most extreme "
         f"one (Gaffke 2005) had to agree: p is the larger of both{holm_words * (len(contrasts) > 1)}."
@@ -486,7 +487,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if any(contrast.standardised is not None for contrast in contrasts):
         yield _SIZES
     if bounds := [contrast for contrast in contrasts if contrast.contrast.bound is not None]:
-        adjusted = f", adjusted by Holm over {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
+        adjusted = f", Holm-adjusted across {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
             "Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree"
             f"{adjusted}, and requires that the sample is large enough to contain a member of a minority that shifts "
@@ -534,14 +535,21 @@ def contrast_section(results: Results) -> Iterator[str]:
     )
     weighted = any(contrast.contrast.measure == "threshold" for contrast in results.contrasts)
     yield paragraph(
-        "The study file states these hypotheses. Each was tested on one number per participant by a t test "
-        "together with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger "
-        f"p, adjusted by Holm over {number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means "
-        "that both tests show, with enough participants, that the mean lies within the stated bound, adjusted "
-        f"by Holm over the bounds. {_WEIGHTED if weighted else ''}{LEFT_OUT}",
+        "The study file states these hypotheses. Each was tested on one number per participant by a t test together "
+        "with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger p, Holm-adjusted "
+        f"across {number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that both tests show, with "
+        "enough participants, that the mean lies within the stated bound, Holm-adjusted across the bounds. "
+        f"{_WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
-    yield paragraph(f"{_SIZES} SD: between participants, of the two compared and of their difference.", "soft")
+    yield paragraph(
+        f"{_SIZES} SD: standard deviation between participants, of the two compared values and of their difference.",
+        "soft",
+    )
+    yield paragraph(
+        f"{_SIZES} SD: standard deviation between participants, of the two compared values and of their difference.",
+        "soft",
+    )
     if rows := [contrast for contrast in results.contrasts if contrast.left_out]:
         yield bullets([f"{question(row)}: left out {_left_out_words(row)}." for row in rows])
 

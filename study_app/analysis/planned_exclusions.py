@@ -111,7 +111,7 @@ def _below_chance(study: Study) -> _Rows:
         for one in below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
             yield (
                 (one.participant, one.session),
-                f"{one.right} of {one.n} answers in {one.block} are correct, fewer than by chance "
+                f"{one.right} of {one.n} answers in {one.block} are correct, fewer than expected by chance "
                 f"({p_equals(one.p)}): the answer keys may have been swapped",
             )
 

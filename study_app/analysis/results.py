@@ -327,7 +327,7 @@ VERDICTS_MEAN: Final = (
     "before the study; this is a lead, not a finding. Not shown: the adjusted p is above {alpha}, which is not "
     "evidence that the answers are the same. Out of reach: no rearrangement of these answers within participants could "
     "have made the adjusted p significant, given the other p values in the family. No adjusted p of a statement is "
-    "below the p of the test over all statements, adjusted by Holm over the blocks of the study."
+    "below the p of the test over all statements, Holm-adjusted across the blocks of the study."
 )
 
 

@@ -57,7 +57,7 @@ def export(
     Ends with exit code 3 if a section of the report that --psych-ds adds could not be computed.
     """
     if validator is not None and not psych_ds:
-        raise click.UsageError("--validator checks the folder that --psych-ds writes: give both")
+        raise click.UsageError("--validator checks the folder that --psych-ds writes: use both options")
     from study_app.analysis.export.table_files import Extra
     from study_app.analysis.export_study import export as export_study
 
@@ -88,7 +88,7 @@ def _run_validator(validator: Path, to: Path) -> None:
     try:
         ended = subprocess.run([validator.absolute(), to / FOLDER], check=False)  # noqa: S603 - named by the user
     except OSError as error:
-        raise click.UsageError(f"{validator} cannot be run: {error.strerror}; give an executable file") from error
+        raise click.UsageError(f"{validator} cannot be run: {error.strerror}; specify an executable file") from error
     exit_if(ended.returncode)
 
 
@@ -96,7 +96,7 @@ def _run_validator(validator: Path, to: Path) -> None:
 @takes_study
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def plot(results: Path, to: Path) -> None:
-    """Draw the responses, with codes for conditions until the study is unblinded, then with names."""
+    """Draw the responses; conditions appear as codes until the study is unblinded, and as names afterwards."""
     from study_app.analysis.report.study_figures import plot as plot_study
 
     with progress() as show:
@@ -130,8 +130,8 @@ def report(results: Path, to: Path) -> None:
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded.
 
-    In a merged study the key of each site is opened; for one site give its folder, such as pooled/sites/A. Ends with
-    exit code 3 if a file was left unchanged; the command states the reason and what to do.
+    In a merged study the command opens the key of each site; to open one key, name the folder of that site, such as
+    pooled/sites/A. It ends with exit code 3 if a file was left unchanged, and states the reason and what to do.
     """
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder
@@ -207,13 +207,15 @@ def include(
 @takes_study
 @PARTICIPANT
 @BY
-@click.option("--reason", required=True, metavar="TEXT", help="Reason; it is kept, so it must not identify the person.")
+@click.option(
+    "--reason", required=True, metavar="TEXT", help="Reason; it is stored, so it must not identify the person."
+)
 @click.option(
     "--also",
     multiple=True,
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     metavar="DIR",
-    help="A folder with copies of the study, at any depth; repeatable.",
+    help="Folder that contains copies of the study, at any depth; you can repeat the option.",
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase the data of a participant; date, operator, reason and checksums remain."""
@@ -297,7 +299,7 @@ def reproduce(session: Path) -> None:
     reproduction = reproduce_session(session)
     for line in (*reproduction.differences, *reproduction.followed):
         click.echo(line)
-    same = "reproduced: trials and statements have the order of the receipt"
+    same = "reproduced: the order of trials and statements is as in the receipt"
     click.echo("orders or levels differ" if reproduction.differences else same)
     exit_if(reproduction.differences)
 
@@ -363,7 +365,7 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
 def proof(
     results: Path, to: Path | None, *, sign: bool, server: str | None, root: Path | None, always: Path | None
 ) -> None:
-    """Prove a study with a line for each session, withdrawal, unblinding and exclusion, to print, scan or mail.
+    """Print a proof of a study: one line for each session, withdrawal, unblinding and exclusion.
 
     Keep the lines where people who can change the results cannot change them; verify --fingerprints compares the
     study with them.
@@ -390,8 +392,8 @@ def proof(
 def replay(session: Path) -> None:
     """Recompute every force from the recording, with the same kernel, and list the seconds that differ.
 
-    Also lists the trials whose recordings are lost, missing or not comparable. Ends with exit code 3 if a force
-    differs, a recording is missing, or nothing could be compared.
+    The command also lists the trials whose recordings are lost, missing or not comparable. It ends with exit code 3 if
+    a force differs, a recording is missing, or nothing could be compared.
     """
     from study_app.session.replay import replay as replay_session
 

@@ -22,13 +22,14 @@ _UNSEEN_PLATFORMS: Final = ("offscreen", "minimal", "minimalegl")
 
 
 @click.command()
-@click.option("--no-window", is_flag=True, help="Do not open the program on the results.")
+@click.option("--no-window", is_flag=True, help="Do not open the program to show the results.")
 @click.pass_context
 def demo(context: click.Context, *, no_window: bool) -> None:
-    """Run the demo study with two simulated participants on an emulated Falcon, report it, and show the results.
+    """Run the demo study with two simulated participants on an emulated Falcon, write the report, and show the results.
 
-    Uses the session runner, the servo, and the Falcon's own driver on an emulated device. Does not need a display; if
-    there is one, the program opens on the results. If it was interrupted, run it again to finish.
+    The demo uses the session runner, the servo, and the Falcon's own driver on an emulated device. It does not need a
+    display; if there is one, the program opens and shows the results. If the demo was interrupted, run it again to
+    finish.
     """
     from study_app.workspace import workspace
 
@@ -56,7 +57,7 @@ def _run_sessions(study: Path) -> None:
 
     protocol = shipped_file(STUDY)
     if not used_ids(StudyFolder(study)).held:
-        click.echo("Preparing the force model: compiled once on this computer, for up to a minute")
+        click.echo("Preparing the force model: it is compiled once on this computer, which takes up to a minute")
         with progress() as show:
             show("compiling")
             _compile_everything(protocol)

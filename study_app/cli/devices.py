@@ -110,10 +110,10 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
 @click.option("--scale", is_flag=True, help="Use a luggage scale instead.")
 @click.option("--geometry", metavar="NAME", help="libnifalcon (default), zm-redux or martin-hillier.")
 def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: bool, geometry: str | None) -> None:
-    """Calibrate a Falcon's force with a known weight or a luggage scale; stored by serial number.
+    """Calibrate a Falcon's force with a known weight or a luggage scale; the result is stored by serial number.
 
-    The Falcon holds its grip at five positions, first without load, then with the weight. Exit code 3 if the
-    measurements are inconsistent; nothing is saved then.
+    The Falcon holds its grip at five positions, first without load, then with the weight. If the measurements are
+    inconsistent, the exit code is 3 and nothing is saved.
     """
     if scale == (grams is not None):
         raise click.UsageError("calibrate needs either --grams G (a weight to hang on the grip) or --scale")
@@ -154,10 +154,10 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
 def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> None:
     """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, stable damping.
 
-    Stay within reach of its power switch: the handle moves by itself, with at most 4 N. Enter, Ctrl+C and the handle's
-    stop button, if it has one, end the force. The report (bench.md, bench.json) can be sent to others; receipts of
-    later sessions on this machine record what was measured. Exit code 3 if the handle was touched; nothing is saved
-    then.
+    Stay within reach of the power switch: the handle moves by itself, with a force of up to 4 N. Enter, Ctrl+C and the
+    handle's stop button, if it has one, end the force. You can send the report (bench.md, bench.json) to others;
+    receipts of later sessions on this machine record what was measured. If the handle was touched, the exit code is 3
+    and nothing is saved.
     """
     from study_app.devices.registry import check_options, descriptor_of
 
@@ -206,7 +206,8 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
         return
     if not results.fits:
         click.echo(
-            "Nothing was stored for receipts, because mass, damping and friction do not explain how the handle moved."
+            "Nothing was stored for receipts, because mass, damping and friction do not explain the motion of the "
+            "handle."
         )
         exit_if(True)
     report = str((folder / "bench.md").resolve())

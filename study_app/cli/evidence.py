@@ -135,7 +135,7 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
         if liquid in thesis or liquid in real:
             return thesis.get(liquid or ""), real.get(liquid or ""), ()
         known = ", ".join(dict.fromkeys([*thesis, *real]))
-        raise click.UsageError(f"--liquid {liquid}: there are {known}; or give the FILE that contains it")
+        raise click.UsageError(f"--liquid {liquid}: known liquids are {known}; or name the FILE that contains it")
     if liquid is None:
         scenes = load_scenes(scene)
         if len(scenes) > 1:
@@ -178,8 +178,8 @@ def _motion_along(path: str, scene: Scene) -> Motion:
     "--refit",
     is_flag=True,
     help=(
-        "Fit the constants of unsteady drag to the stored motions, and print the error of each motion, fitted and "
-        "not fitted; takes about two minutes."
+        "Fit the constants of unsteady drag to the stored motions, and print the error of each motion, fitted and not "
+        "fitted; this takes about two minutes."
     ),
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
@@ -192,8 +192,8 @@ def _motion_along(path: str, scene: Scene) -> Motion:
     "--score",
     is_flag=True,
     help=(
-        "Score the models by the benchmark for other engines (error, time, energy given, tolerated delay); takes "
-        "about five minutes."
+        "Score the models with the benchmark for other engines (error, time, energy given, tolerated delay); this "
+        "takes about five minutes."
     ),
 )
 @takes_workers
@@ -616,7 +616,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     type=click.IntRange(10, 1_000_000),
     default=60,
     show_default=True,
-    help="Number of studies of 20 participants, for each protocol and seed.",
+    help="Number of studies with 20 participants for each protocol and seed.",
 )
 @click.option(
     "--seed",

@@ -28,7 +28,7 @@ _INITIAL = click.option(
 def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, ...]) -> None:
     """Compute the force along a motion, with the servo's own tick, without a device or a clock.
 
-    Every row of the motion is one tick: give rows at the scene's rate (1 kHz unless its rate_hz differs).
+    Every row of the motion is one tick: provide rows at the scene's rate (1 kHz unless its rate_hz differs).
     """
     from study_app import api
     from study_app.store import csv_files
@@ -80,7 +80,7 @@ def scene(scene: str, liquid: str | None, delay: int) -> None:
 @click.command()
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
 def figures(to: Path) -> None:
-    """Redraw the thesis' Figs 3 to 8: force over time on programmed paths, with captions."""
+    """Redraw Figures 3 to 8 of the thesis: force over time on programmed paths, with captions."""
     from study_app.evidence.thesis_figures import figures as draw
 
     echo_files(draw(to))

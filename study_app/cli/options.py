@@ -116,7 +116,7 @@ class Target(click.Path):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the path."""
         if not str(value):
-            self.fail("is empty: give a file or folder (. is the current folder)", param, ctx)
+            self.fail("is empty: specify a file or folder (. is the current folder)", param, ctx)
         return super().convert(value, param, ctx)
 
 
@@ -129,7 +129,7 @@ def exclude_each_other(**given: object) -> None:
     """Raise a usage error if more than one of these options is given (neither None nor False)."""
     names = [f"--{name}" for name, value in given.items() if value is not None and value is not False]
     if len(names) > 1:
-        raise click.UsageError(f"{' and '.join(names)} cannot be combined: give one of them")
+        raise click.UsageError(f"{' and '.join(names)} cannot be combined: specify one of them")
 
 
 def takes_study(function: Command) -> Command:
@@ -161,7 +161,7 @@ def study_at(named: str | None, results: Path | None) -> Path:
     from study_app.workspace import workspace
 
     if (named is None) == (results is None):
-        raise click.UsageError("give one study: RESULTS, or --results DIR (liquid-study studies lists them)")
+        raise click.UsageError("specify one study: RESULTS, or --results DIR (liquid-study studies lists them)")
     if results is not None:
         return results
     path = Path(str(named))
@@ -270,7 +270,7 @@ def takes_workers(function: Command) -> Command:
         metavar="ADDRESS",
         envvar="DASK_SCHEDULER_ADDRESS",
         show_envvar=True,
-        help="Scheduler of a Dask cluster that computes instead, such as tcp://HOST:8786.",
+        help="Dask cluster to use instead of this computer: the address of its scheduler, such as tcp://HOST:8786.",
     )
     @wraps(function)
     def run(*arguments: Any, count: int, cluster: str | None, **options: Any) -> Any:
@@ -286,7 +286,7 @@ def takes_workers(function: Command) -> Command:
 
 def _check_worker_count(_context: click.Context, _option: click.Parameter, value: int) -> int:
     if value == 0:
-        raise click.BadParameter("0 workers cannot compute: give 1 or more, or -1 for one per core")
+        raise click.BadParameter("0 workers cannot compute: specify 1 or more, or -1 for one per core")
     return value
 
 

@@ -23,9 +23,9 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
     try:
         numbers = sorted({int(part) for part in value.split(",")})
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} is not a list of numbers: give {what} such as 5,8,12") from error
+        raise click.BadParameter(f"{value!r} is not a list of numbers: specify {what} such as 5,8,12") from error
     if not numbers or numbers[0] < least or numbers[-1] > most:
-        raise click.BadParameter(f"{value!r}: give {what} from {least} to {most}, such as 5,8,12")
+        raise click.BadParameter(f"{value!r}: specify {what} from {least} to {most}, such as 5,8,12")
     return tuple(numbers)
 
 
@@ -79,7 +79,7 @@ def power(
     if engine == "processes":
         workers = Workers(workers.count)
     elif engine == "dask" and workers.cluster is None:
-        raise click.UsageError("--engine dask needs a cluster: give --cluster tcp://HOST:8786")
+        raise click.UsageError("--engine dask needs a cluster: specify --cluster tcp://HOST:8786")
     from study_app.analysis.planning.power_estimates import estimate_power, planned_sizes
     from study_app.analysis.planning.threshold_studies import plans
     from study_app.protocol.load import load
@@ -142,13 +142,14 @@ def _write_estimate(estimate: PowerEstimate, to: Path | None) -> None:
 @click.command()
 @FILE
 @click.option(
-    "--power", "computed", type=Target(), metavar="DIR", help="Folder written by power --to, whose tables are included."
+    "--power", "computed", type=Target(), metavar="DIR", help="Folder that power --to wrote; its tables are included."
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for preregistration.md; default: print it.")
 def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
     """Write a preregistration from the protocol: hypotheses, design, participants, exclusions, analysis, and its hash.
 
-    If it is in the study's folder (results/<study>), the report compares the study with it and lists every deviation.
+    If the preregistration is in the study's folder (results/<study>), the report compares the study with it and lists
+    every deviation.
     """
     from study_app.analysis.planning.preregistration import FILE as NAME
     from study_app.analysis.planning.preregistration import preregistration
@@ -163,7 +164,8 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
             power_md = (computed / "power.md").read_text(encoding="utf-8")
         except OSError as error:
             raise click.UsageError(
-                f"--power {computed}: power.md cannot be read ({error.strerror}): give a folder that power --to wrote"
+                f"--power {computed}: power.md cannot be read ({error.strerror}): specify a folder that power --to "
+                "wrote"
             ) from error
         if f"({study.study.name} {study.study.version})" not in power_md:
             raise click.UsageError(

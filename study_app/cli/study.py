@@ -43,7 +43,7 @@ _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Nam
     type=click.IntRange(1, MOST_DELAY),
     default=ASSUMED_TICKS,
     show_default=True,
-    help="Delay of the device's force [ticks] for checking levels; the pre-flight uses the measured delay.",
+    help="Force delay of the device [ticks] for which levels are checked; the pre-flight uses the measured delay.",
 )
 def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None:
     """Describe the study or the scenes, or list every problem of the file with its line and a hint."""
@@ -84,7 +84,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         for sentence in delivery.sentences:
             click.echo(f"\nNote: {sentence}, predicted for a delay of {counted(delay_ticks, 'tick')}.")
         if missing:
-            click.echo(f"\nNote: {missing}. Sessions of this study do not start on this computer.")
+            click.echo(f"\nNote: {missing}. Sessions of this study cannot start on this computer.")
 
 
 @click.command()
@@ -284,9 +284,10 @@ def studies() -> None:
 @click.command()
 @click.argument("code", metavar="CODE")
 def language(code: str) -> None:
-    """Check the participant's texts in a language of the lab; begin WORKSPACE/languages/CODE.toml if there is none.
+    """Check the texts for participants in an additional language, in the file WORKSPACE/languages/CODE.toml.
 
-    CODE is two letters, such as es. The file has a line for each text, with the English one as a comment.
+    CODE is two letters, such as es. If the file does not exist, the command creates it, with a line for each text and
+    the English text as a comment.
     """
     from study_app.errors import StudyError
     from study_app.protocol.wording.languages import SHIPPED, language_template, read_language
@@ -294,7 +295,7 @@ def language(code: str) -> None:
     from study_app.workspace import workspace as workspace_here
 
     if len(code) != 2 or not (code.isascii() and code.islower()):
-        raise StudyError(f"{code!r} is not a language: give two small letters, such as es")
+        raise StudyError(f"{code!r} is not a language: specify two lowercase letters, such as es")
     file = workspace_here().folder / "languages" / f"{code}.toml"
     if code in SHIPPED:
         click.echo(f"{SHIPPED[code].english_name} ships with the program")
@@ -323,7 +324,7 @@ def sessions(named: str | None, results: Path | None) -> None:
     folders = list(_study_folders(at)) if named is None and results is None else [study_at(named, results)]
     for folder in folders:
         if not folder.is_dir():
-            raise StoreError(f"{folder} is not a folder: give a study that liquid-study studies lists, or its path")
+            raise StoreError(f"{folder} is not a folder: specify a study that liquid-study studies lists, or its path")
         left_out = {row.what for row in all_exclusions(folder)}
         inside = folder.parent.resolve() == at.resolve()
         for row in participants_of(folder):
@@ -354,7 +355,7 @@ _SECTIONS_SHOWN: Final = 5
 @click.command()
 @click.argument("search_words", metavar="[PAGE | WORDS]", nargs=-1)
 def docs(search_words: tuple[str, ...]) -> None:
-    """Print a page of the documentation with its lists, such as data-dictionary; or the best section for some words.
+    """Print a page of the documentation, such as data-dictionary, or the section that best matches the words.
 
     Without an argument it prints the names of all pages.
     """

@@ -100,7 +100,7 @@ class KnownAnswer:
         return (
             f"Simulated: {self.planted:g} {self.unit} at 75 % correct (after {self.source}). Estimated: "
             f"{self.found:.3g} {self.unit}; in 9 of 10 simulated studies of {self.people} people {self.low:.3g} to "
-            f"{self.high:.3g} {self.unit}. A model, not measured."
+            f"{self.high:.3g} {self.unit}. The numbers come from a model, not from measurements."
         )
 
 
@@ -514,7 +514,7 @@ class _RecoveryBar(Themed, QWidget):
 
 
 FIELD_PX, WORDS_PX = 36, 112
-_NAME_HINT: Final = "small letters and digits"
+_NAME_HINT: Final = "lowercase letters and digits"
 
 
 class Questions(Themed, QWidget):

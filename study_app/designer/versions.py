@@ -162,7 +162,7 @@ class SaveCard(Prompt):
                 add_layout(self.column, hbox(sign, (label(text, "label", wraps=True), 1), spacing=8))
         self.version = _field("Version to save as", standing.version, 110)
         self.name = _field("Short name of the other study", "", 220)
-        self.name.setPlaceholderText("small letters and digits")
+        self.name.setPlaceholderText("lowercase letters and digits")
         self.refusal = label("", "label", "bad", wraps=True)
         self.changes = ActionButton("", "Show in Changes", role="plain", height=40)
         self.another = ActionButton("copy", "Save as another study …", height=40)

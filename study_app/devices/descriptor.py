@@ -119,7 +119,7 @@ class DeviceDescriptor:
 
     Attributes
     ----------
-    name : for ``--device``, receipts and folders: small letters, digits and hyphens
+    name : for ``--device``, receipts and folders: lowercase letters, digits and hyphens
     title : displayed name
     icon : of the theme
     kind : with force, visual only, or not used by participants
@@ -156,7 +156,9 @@ class DeviceDescriptor:
 
     def __post_init__(self) -> None:
         if not re.fullmatch(NAME_PATTERN, self.name):
-            raise DeviceError(f"the device name {self.name!r} is not permitted: use small letters, digits and hyphens")
+            raise DeviceError(
+                f"the device name {self.name!r} is not permitted: use lowercase letters, digits and hyphens"
+            )
         for called, value, permitted in (("icon", self.icon, get_args(Icon)), ("kind", self.kind, get_args(Kind))):
             if value not in permitted:
                 raise DeviceError(f"{called} {value!r} of device '{self.name}': choose one of {', '.join(permitted)}")

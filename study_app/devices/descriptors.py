@@ -12,7 +12,8 @@ from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, Devic
 _FIRMWARE: Final = DeviceOption(
     name="firmware",
     title="Falcon's firmware",
-    help="The Falcon's own program, needed if it was switched off since its last use. Its owner has the file.",
+    help="The Falcon's own program, needed if the Falcon was switched off after its last use. The owner of the Falcon "
+    "has the file.",
     about="A Falcon needs its firmware after it was turned on, and the licence does not allow us to include it. "
     "Choose your own firmware file; it is loaded only if the Falcon needs it.",
     hint="loaded only if the Falcon needs it",

@@ -60,7 +60,7 @@ def descriptor_of(name: str) -> DeviceDescriptor:
         known = ", ".join(device.usage for device in all_devices())
         raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")
     if descriptor.argument_required and not argument:
-        raise DeviceNotFound(f"device '{kind}' needs more than its name: give it as {descriptor.usage}")
+        raise DeviceNotFound(f"device '{kind}' needs more than its name: specify it as {descriptor.usage}")
     return descriptor
 
 

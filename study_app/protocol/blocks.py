@@ -157,7 +157,7 @@ class Block(Table):
         for name in refused:
             if name in self.model_fields_set:
                 elsewhere = (what, name) == ("a stimulus", "repetitions")
-                instead = "give it in the method's table" if elsewhere else "omit it"
+                instead = "set it in the method's table" if elsewhere else "omit it"
                 raise invalid(f"cannot be used in a block with {what}: {instead}", name, kind="surplus")
         if what == "conditions" and (self.standard not in self.conditions or len(self.conditions) < 2):
             raise invalid("must be one of at least two conditions: choose the reference", "standard")

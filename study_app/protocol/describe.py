@@ -94,7 +94,7 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
         ("Force limit", f"{scene.force_limit_n:g} N"),
         ("Servo", f"{scene.rate_hz:g} Hz"),
         ("Scale", f"{scene.scale:g} times the motion of the hand"),
-        ("Ball", f"{ball_mm:g} mm, {ball_mm / scene.scale:.3g} mm of the hand"),
+        ("Ball", f"{ball_mm:g} mm in the scene, {ball_mm / scene.scale:.3g} mm in the hand frame"),
     ]
     effects = ("\n".join(f"  {line}".rstrip() for line in describe_gate(it)) for it in scenes.values())
     head = ("Liquids without a study", *_aligned(rows))
@@ -129,8 +129,8 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
         ("Expected duration", f"about {number_range(minutes)} min"),
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
-        ("Tank", f"{sizes} mm of the hand, {scene.scale:g} times as large in the scene"),
-        ("Ball", f"{ball_mm:g} mm, {ball_mm / scene.scale:.3g} mm of the hand"),
+        ("Tank", f"{sizes} mm in the hand frame, {scene.scale:g} times as large in the scene"),
+        ("Ball", f"{ball_mm:g} mm in the scene, {ball_mm / scene.scale:.3g} mm in the hand frame"),
     ]
     return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
 

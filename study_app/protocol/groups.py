@@ -28,8 +28,8 @@ class Group(Table):
     share: Annotated[int, within(1, _MOST_SHARE, "shares are small whole numbers")] = Field(
         default=1,
         description=(
-            "Number of its participants per randomisation round; for a pre-existing group, its part in the "
-            "planned ratio."
+            "Number of participants of this group in each randomisation block; for a pre-existing group, its part of "
+            "the planned ratio."
         ),
     )
     sequence: Steps = later(
@@ -40,7 +40,7 @@ class Group(Table):
     @model_validator(mode="after")
     def _one_of(self) -> Self:
         if self.sequence and self.sequences:
-            message = "give either sequence or sequences"
+            message = "specify either sequence or sequences"
             raise invalid(message, "sequences")
         return self
 

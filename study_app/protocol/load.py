@@ -190,7 +190,7 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
     resolved: dict[str, Any] = dict(liquids)
     faults: list[Fault] = []
     for name in named:
-        table, alone = liquids[name], Fault((), "belongs in the liquid file", "give only file", kind="surplus")
+        table, alone = liquids[name], Fault((), "belongs in the liquid file", "specify only file", kind="surplus")
         faults += [alone._replace(path=("liquids", name, key)) for key in table if key != "file"]
         try:
             resolved[name] = _liquid_of_file(table["file"], texts)
@@ -220,7 +220,7 @@ def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]
             conditions[path[1]] = {**conditions[path[1]], "footage_sha256": hashes[view]}
         else:
             message = f'there is no file "{view}" in this folder'
-            faults.append(Fault(path, message, "give the path of a video file, relative to this file"))
+            faults.append(Fault(path, message, "specify the path of a video file, relative to this file"))
     return {key: value for key, value in document.items() if key != FOOTAGE_TABLE} | {"conditions": conditions}, faults
 
 
@@ -236,7 +236,7 @@ def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
         raise _LiquidFileFault(fault, "rename the file: a study is shared")
     if file not in texts:
         raise _LiquidFileFault(
-            f'there is no UTF-8 text file "{file}" in this folder', "give the path of the liquid file"
+            f'there is no UTF-8 text file "{file}" in this folder', "specify the path of the liquid file"
         )
     try:
         document, places = read_document(texts[file].encode(), file)

@@ -198,7 +198,8 @@ class PageText(Table):
     min_s: Seconds | None = Field(
         default=None,
         description=(
-            "Minimum duration of a break [s], counted down on the page; default: as long as the participant likes."
+            "Minimum duration of a break [s], counted down on the page; by default the participant can end the break "
+            "at any time."
         ),
     )
 
@@ -373,7 +374,7 @@ class Contrast(Table):
         if len(self.blocks) == 2 and self.conditions is not None:
             raise invalid("give two blocks, or two conditions of one block", "conditions")
         if self.groups is None and self.within is None:
-            raise invalid("give two blocks, or one block and two conditions, or one block and two groups", "blocks")
+            raise invalid("specify two blocks, or one block and two conditions, or one block and two groups", "blocks")
         for first, second in filter(None, (self.groups, self.within)):
             if first == second:
                 raise invalid(f'compares "{first}" with itself', "blocks")
@@ -463,7 +464,7 @@ class ExclusionRule(Table):
         if bounds is None and self.limit is not None:
             raise invalid(f"is not used by the rule {self.rule}", "limit", kind="surplus")
         if bounds is not None and not (self.limit is not None and bounds[0] <= self.limit <= bounds[1]):
-            raise invalid(f"give a number from {bounds[0]:g} to {bounds[1]:g}", "limit")
+            raise invalid(f"specify a number from {bounds[0]:g} to {bounds[1]:g}", "limit")
         return self
 
     @property
@@ -531,7 +532,7 @@ class Analysis(Table):
     @model_validator(mode="after")
     def _looks_end_at_the_last_participant(self) -> Self:
         if self.looks and (len(self.looks) < 2 or self.looks[-1] != self.participants):
-            raise invalid("give two or more numbers; the last must equal analysis.participants", "looks")
+            raise invalid("specify two or more numbers; the last must equal analysis.participants", "looks")
         if any(after <= look for look, after in pairwise(self.looks)):
             raise invalid("each look needs more participants than the previous look", "looks")
         return self

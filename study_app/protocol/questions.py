@@ -167,7 +167,9 @@ class Question(Table):
     figure: ClassVar[str | None] = None
     value_type: ClassVar[ValueType]
 
-    id: Id = Field(description="Name of the item in every table; do not change it after data collection has begun.")
+    id: Id = Field(
+        description="Name of the item in every table. Do not change the name after data collection has begun."
+    )
     text: Localised = Field(description="The statement shown to the participant.")
     short: Localised = Field(description="Short label for figures and tables, one to three words.")
     required: bool = Field(default=True, description="Whether an answer is required to continue.")
@@ -217,7 +219,7 @@ def plain_number(value: float) -> int | float:
 def answer_problem(question: Question, answer: Value, context: Context) -> str | None:
     """Return why a value is not a valid answer, as a sentence; None if it is."""
     if isinstance(answer, bool):
-        return f"answer {answer} is neither a number nor a text: give one of these"
+        return f"answer {answer} is neither a number nor a text: specify one of these"
     texts = answer if isinstance(answer, tuple) else (answer,) if isinstance(answer, str) else ()
     if (letters := sum(map(len, texts))) > _MOST_LETTERS:
         return f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {_MOST_LETTERS:,}"
@@ -446,7 +448,7 @@ class Number(Question):
             return None
         least = "" if self.least is None else " above 0" if self.least == POSITIVE else f" from {self.least:g}"
         most = "" if self.most is None else f" to {self.most:g}"
-        return f"answer {answer} is not permitted: give a {'whole ' if self.whole else ''}number{least}{most}"
+        return f"answer {answer} is not permitted: specify a {'whole ' if self.whole else ''}number{least}{most}"
 
     def bounds(self, context: Context) -> tuple[float, float] | None:
         return None if self.least is None or self.most is None else (self.least, self.most)

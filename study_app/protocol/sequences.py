@@ -64,11 +64,11 @@ class Constraint:
         if repetitions == 1:
             return None
         if self.min_distance is not None and self.min_distance > codes:
-            possible = "one condition only 1" if codes == 1 else f"{codes} conditions only 1 to {codes}"
-            return "min_distance", f"is {self.min_distance}, but with {possible} is possible"
+            possible = "one condition permits only 1" if codes == 1 else f"{codes} conditions permit only 1 to {codes}"
+            return "min_distance", f"is {self.min_distance}, but {possible}"
         if self.max_repeats is not None and codes == 1 and self.max_repeats < repetitions:
-            possible = f"one condition {repetitions} times only {repetitions} or more"
-            return "max_repeats", f"is {self.max_repeats}, but with {possible} is possible"
+            possible = f"one condition presented {repetitions} times permits only {repetitions} or more"
+            return "max_repeats", f"is {self.max_repeats}, but {possible}"
         return None
 
 

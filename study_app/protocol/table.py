@@ -106,7 +106,7 @@ def unprintable_character(text: str, permitted: str = "") -> str | None:
 def _check_printable(text: str) -> str:
     """Return ``text`` if it has visible characters and none that hides or reorders others."""
     if (letter := unprintable_character(text, "\t\n\r")) is not None:
-        raise invalid(f"holds the character U+{ord(letter):04X}, which cannot be printed: remove it")
+        raise invalid(f"contains the character U+{ord(letter):04X}, which cannot be printed: remove it")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
         raise invalid("the text is empty: write a text")
     return text
@@ -183,7 +183,7 @@ class Table(BaseModel):
         for first, other in self.ONE_OF:
             given: list[Any] = [getattr(self, name) for name in (first, other)]
             if sum(value is not None and value != () for value in given) != 1:
-                message = f"give either {first} or {other}"
+                message = f"specify either {first} or {other}"
                 raise invalid(message, first)
         return self
 

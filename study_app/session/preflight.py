@@ -357,7 +357,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
     if facts.ran_otherwise:
         about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"
-        advice = "Give the changed file another study.version; the report states the change in any case."
+        advice = "Set another study.version in the changed file; the report states the change in any case."
         yield Check("Study file", "warning", "changed", about=about, advice=advice)
 
     if facts.untranslated:

@@ -104,7 +104,7 @@ def find_protocol(
         with contextlib.suppress(ProtocolError):
             if parse(source, name).study.name == start.study:
                 return name
-    raise SessionError(f"the protocol was not found for the study {start.study!r}: give its file with --protocol FILE")
+    raise SessionError(f"the protocol was not found for the study {start.study!r}: name its file with --protocol FILE")
 
 
 def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:

@@ -157,7 +157,7 @@ def check_row(row_of: str | None, study: Protocol) -> None:
         )
     if not ID_PATTERN.fullmatch(row_of) or enrolment_number(row_of) is None:
         raise SessionError(
-            f"row of {row_of!r}: rows are assigned by the number in a participant's ID; give the ID of the "
+            f"row of {row_of!r}: rows are assigned by the number in a participant's ID; specify the ID of the "
             "participant to be replaced, such as P007"
         )
 

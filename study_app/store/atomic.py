@@ -317,7 +317,7 @@ def refuse_special_files(path: Path) -> None:
     """
     for inside in (path, *paths_in(path)):
         if inside.is_symlink():
-            raise StoreError(f"{inside} is a link to {inside.readlink()}: replace the link by its target")
+            raise StoreError(f"{inside} is a link to {inside.readlink()}: replace the link with its target")
         if is_there(inside) and not inside.is_file() and not inside.is_dir():
             raise StoreError(f"{inside} is neither a file nor a folder: remove it")
 
@@ -357,7 +357,7 @@ def read_own(path: Path, root: Path) -> bytes:
     try:
         real = Path(os.path.realpath(path, strict=True))  # raises OSError for a loop of links, with every Python
         if not real.is_relative_to(root.resolve()):
-            raise StoreError(f"{path} leads by a link out of {root}, to {real}: replace the link by the file itself")
+            raise StoreError(f"{path} leads by a link out of {root}, to {real}: replace the link with the file itself")
         return read_regular(real)
     except OSError as error:
         raise cannot_read(path, error) from error

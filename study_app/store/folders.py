@@ -167,8 +167,8 @@ def locate_session(path: Path) -> tuple[StudyFolder, SessionFolder]:
     named = number is not None and folder.parent.name.startswith("sub-") and ID_PATTERN.fullmatch(participant)
     if not named or folder.parent.parent.name != "data" or not folder.is_dir():
         raise StoreError(
-            f"{path} is not a session folder: give one such as results/rek2024/data/sub-P007/ses-01, or a name "
-            "that liquid-study sessions lists"
+            f"{path} is not a session folder: specify one such as results/rek2024/data/sub-P007/ses-01, or a name that "
+            "liquid-study sessions lists"
         )
     return StudyFolder(folder.parents[2]), SessionFolder(folder, participant, int(number[1]) if number else 0)
 

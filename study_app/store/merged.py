@@ -93,7 +93,8 @@ def read_merged(folder: Path) -> Merged | None:
         if held["format"] not in (1, _FORMAT):
             shown = shorten_value(held["format"])
             raise StoreError(
-                f"{path} has format {shown}, this version reads 1 and {_FORMAT}: use a newer version of liquid-study"
+                f"{path} has format {shown}, but this version reads 1 and {_FORMAT}: use a newer version of "
+                "liquid-study"
             )
         sites = tuple(Site(**site) for site in held["sites"])
         if sites and all(map(_is_site, sites)) and is_valid_value("protocol_hash", held["protocol_hash"]):
@@ -125,7 +126,7 @@ def _refuse_links(merged: Merged) -> None:
     for folder in map(merged.folder, merged.names):
         if not (real := _resolved_path(folder)).is_relative_to(_resolved_path(merged.path)):
             raise StoreError(
-                f"{folder} leads by a link out of {merged.path}, to {real}: replace the link by the folder itself"
+                f"{folder} leads by a link out of {merged.path}, to {real}: replace the link with the folder itself"
             )
 
 
@@ -161,8 +162,8 @@ def locate_participant(folder: Path, participant: str) -> tuple[Path, str]:
     if (place := folders.get(f"{site}{dash}")) is None or not own:
         known = ", ".join(name.removesuffix(DASH) for name in folders)
         raise StoreError(
-            f"{folder} contains several sites ({known}), and {participant!r} does not state the site: give "
-            f"SITE-ID, such as {next(iter(folders))}P007"
+            f"{folder} contains several sites ({known}), and {participant!r} does not state the site: specify SITE-ID, "
+            f"such as {next(iter(folders))}P007"
         )
     return place, own
 

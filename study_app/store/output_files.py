@@ -158,7 +158,10 @@ def write_output(
         append_line(data_folder() / NAME, json.dumps(line).encode() + b"\n", waits=False)
     except StoreError as error:
         if warn is not None:
-            warn(f"the output in {to} is not in the list of outputs, so withdraw will not name it: note it ({error})")
+            warn(
+                f"the output in {to} could not be added to the list of outputs ({error}), so withdraw will not list "
+                "it: make a note of it"
+            )
     return written
 
 

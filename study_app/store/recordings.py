@@ -176,7 +176,7 @@ def read_checks(path: Path, secret: bytes | None = None) -> Checks:
     """
     facts = read_facts(path, secret)
     if facts["kind"] != "samples":
-        raise StoreError(f"{path} holds {facts['kind']}, not samples: give the recording itself")
+        raise StoreError(f"{path} holds {facts['kind']}, not samples: specify the recording itself")
     checks = facts["crc32"]
     return Checks(checks["rows"], tuple(checks["device_force"]), tuple(checks["effect_force"]))
 
@@ -215,7 +215,7 @@ def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str
     with _opened(path, secret) as file:
         facts = _facts(path, file.metadata)
         if facts["kind"] != kind:
-            raise StoreError(f"{path} holds {facts['kind']}, not {kind}: give the other file of the trial")
+            raise StoreError(f"{path} holds {facts['kind']}, not {kind}: specify the other file of the trial")
         table = file.read().combine_chunks()
     held = facts["format"]
     if kind == "frames":
@@ -255,7 +255,7 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
         if facts["format"] not in range(1, _FORMAT + 1):
             version, readable = facts["format"], f"1 to {_FORMAT}"
             raise StoreError(
-                f"{path} has format {version!r}, this version reads {readable}: use a newer version of liquid-study"
+                f"{path} has format {version!r}, but this version reads {readable}: use a newer version of liquid-study"
             )
         if facts["kind"] == "samples":
             _check_facts_of_samples(facts, metadata.num_rows)

@@ -239,8 +239,8 @@ class Footage:
                 self.size = (stream.width, stream.height)
         except Exception as error:
             raise VideoError(
-                f"{path} cannot be shown: {failure_reason(error)}; give a video file that plays: MP4, MOV, Matroska, "
-                "WebM, AVI, MPEG or Ogg"
+                f"{path} cannot be shown: {failure_reason(error)}; specify a video file that plays: MP4, MOV, "
+                "Matroska, WebM, AVI, MPEG or Ogg"
             ) from error
         self._scaler = Scaler()
         self._changed = threading.Condition()

@@ -220,7 +220,7 @@ def _check_that_something_answers(address: str) -> None:
     parts = _ADDRESS.fullmatch(address)
     if parts is None:
         raise WorkerError(
-            f"{address!r} is not the address of a Dask scheduler: give tcp://HOST:PORT, such as tcp://lab1:8786"
+            f"{address!r} is not the address of a Dask scheduler: specify tcp://HOST:PORT, such as tcp://lab1:8786"
         )
     try:
         place = (parts["ipv6"] or parts["host"], int(parts["port"]))

@@ -82,8 +82,8 @@ def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(sp
 @pytest.mark.parametrize(
     ("looks", "said"),
     [
-        ("[12]", "give two or more numbers; the last must equal analysis.participants"),
-        ("[6, 10]", "give two or more numbers; the last must equal analysis.participants"),
+        ("[12]", "specify two or more numbers; the last must equal analysis.participants"),
+        ("[6, 10]", "specify two or more numbers; the last must equal analysis.participants"),
         ("[12, 6, 12]", "each look needs more participants than the previous look"),
         ("[1, 12]", "looks"),
     ],

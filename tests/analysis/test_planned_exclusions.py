@@ -104,7 +104,7 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     assert thresholds(study) == [None, "P001"], "not in the mean without a decision"
     report(pairs, tmp_path / "open")
     page = (tmp_path / "open" / "report.html").read_text("utf-8")
-    assert "Proposed for exclusion, not decided: P002, session 1 (below chance)." in page
+    assert "Proposed for exclusion but not yet decided: P002, session 1 (below chance)." in page
     assert "two participants" in table_text(page)
     assert "1 participant)" in table_text(page)
     held = json.loads((tmp_path / "open" / "report.json").read_text("utf-8"))
@@ -144,8 +144,8 @@ def test_the_preregistration_quotes_the_rules(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rule", "said"),
     [
-        ('rule = "constant_answers"', "give a number from 1 to 100"),
-        ('rule = "fast_answers"\nlimit = 0', "give a number from 0.05 to 600"),
+        ('rule = "constant_answers"', "specify a number from 1 to 100"),
+        ('rule = "fast_answers"\nlimit = 0', "specify a number from 0.05 to 600"),
         ('rule = "below_chance"\nlimit = 3', "is not used by the rule below_chance"),
         ('rule = "below_chance"', "no main block has correct answers"),
         ('rule = "threshold_beyond_levels"', "no main block has levels"),

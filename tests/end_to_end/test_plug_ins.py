@@ -321,7 +321,7 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
         ("raise SystemExit('no licence')", "SystemExit: no licence"),
         (
             QUESTION.replace(' = "toy-plug:toy"', ""),
-            "its kind does not have a default: give it the value of its Literal",
+            "its kind does not have a default: set the default to the value of the Literal",
         ),
         ("Toy = 3", "toy_plug:Toy is not a class that extends Question"),
         (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': call it 'toy-plug:' and"),
@@ -360,7 +360,7 @@ def test_a_finding_whose_place_is_not_a_number_is_reported_and_left_out(
     """
     install(site, "toy-plug", "finding", {"toy": "toy_plug:Toy"}, toy_plug=source)
     code, said, _ = run("plugins")
-    assert (code, f"toy: Toy has the {name} {value}: give a number; update" in said) == (3, True)
+    assert (code, f"toy: Toy has the {name} {value}: specify a number; update" in said) == (3, True)
     assert "toy" not in {one.key for one in all_findings()}
 
 

@@ -31,6 +31,12 @@ PATTERNS = {
     "refuse": re.compile(r"\brefuse[sd]?\b"),
     "of one's own": re.compile(r"\bof (?:its|their|his) own\b"),
     "said of it": re.compile(r"\b(?:is|are) said\b|\bsuch as it is\b"),
+    "give for specify": re.compile(r"(?:^|[:;,] |\bor )give\b(?! (?:its workers more|this account)\b)"),
+    "another … than": re.compile(r"\b(?:an)?other \w+ than\b"),
+    "replace … by": re.compile(r"\breplace (?:[^.;:]+ )?by\b", re.IGNORECASE),
+    "adjusted by Holm": re.compile(r"\bby (?:Holm|Benjamini)\b"),
+    "comma for but": re.compile(r", this version (?:reads|knows)\b"),
+    "small letters": re.compile(r"\bsmall letters?\b"),
 }
 FINE = {
     "module X has no attribute X": "is no, has no, gives no",  # Python's own sentence
@@ -113,6 +119,12 @@ def found_in(text: str) -> list[str]:
         ("The level; n/a where it was not measured.", "where for if"),
         ("from 125 ms on at the latest", "from … on"),
         ("Use another id and leave it out", "left out"),
+        ("the file is empty: give one with answers", "give for specify"),
+        ("it has other statements than the first", "another … than"),
+        ("replace the link by its target", "replace … by"),
+        ("p is adjusted by Holm over the tests", "adjusted by Holm"),
+        ("has format 3, this version reads 1 and 2", "comma for but"),
+        ("two small letters, such as en", "small letters"),
     ],
 )
 def test_the_patterns_are_found(text: str, name: str) -> None:

@@ -409,7 +409,7 @@ def test_an_output_that_cannot_be_listed_is_mentioned(studied: Path, tmp_path: P
     warnings: list[str] = []
     output_files.write_output(studied / "study", tmp_path / "report", {"report.html": b"report"}, warnings.append)
     assert (tmp_path / "report/report.html").read_bytes() == b"report"
-    assert "is not in the list of outputs, so withdraw will not name it" in warnings[0]
+    assert "so withdraw will not list it" in warnings[0]
 
 
 @pytest.mark.usefixtures("user")

@@ -95,7 +95,7 @@ def test_recordings_of_format_2_are_read_and_one_that_lacks_a_column_is_damaged(
     with pytest.raises(StoreError, match="its columns are not the columns of samples"):
         read_samples(path)
     rewrite(whole, facts | {"format": 5})
-    with pytest.raises(StoreError, match="has format 5, this version reads 1 to 4: use a newer version"):
+    with pytest.raises(StoreError, match="has format 5, but this version reads 1 to 4: use a newer version"):
         read_samples(path)
 
 

@@ -87,9 +87,9 @@ def test_another_program_at_the_address_of_a_cluster_is_one_line_in_time(monkeyp
 @pytest.mark.parametrize(
     ("address", "said"),
     [
-        ("localhost", "'localhost' is not the address of a Dask scheduler: give tcp://HOST:PORT"),
-        ("http://127.0.0.1:8786", "give tcp://HOST:PORT"),
-        ("tcp://127.0.0.1:port", "give tcp://HOST:PORT"),
+        ("localhost", "'localhost' is not the address of a Dask scheduler: specify tcp://HOST:PORT"),
+        ("http://127.0.0.1:8786", "specify tcp://HOST:PORT"),
+        ("tcp://127.0.0.1:port", "specify tcp://HOST:PORT"),
         ("tcp://127.0.0.1:99999", "no Dask scheduler answers at tcp://127.0.0.1:99999"),
         ("tcp://127.0.0.1:1", "(Connection refused)"),
         ("tcp://no-such-host.invalid:8786", "no Dask scheduler answers at tcp://no-such-host.invalid:8786"),

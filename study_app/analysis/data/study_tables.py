@@ -495,18 +495,18 @@ def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
 def _no_sessions(path: Path) -> str:
     if not path.is_dir():
         return (
-            f"{path} is not a folder: give a study's folder, such as results/rek2024, or a name that "
-            "liquid-study studies lists"
+            f"{path} is not a folder: specify a study's folder, such as results/rek2024, or a name that liquid-study "
+            "studies lists"
         )
     inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
     if inside:
         return (
-            f"{path} does not contain sessions itself, but contains studies that do ({', '.join(inside)}): "
-            f"give {path / inside[0]}"
+            f"{path} does not contain sessions itself, but contains studies that do ({', '.join(inside)}): specify "
+            f"{path / inside[0]}"
         )
     return (
-        f"{path} does not contain sessions (data/sub-…/ses-…): give a study's folder, such as results/rek2024, "
-        "with at least one session"
+        f"{path} does not contain sessions (data/sub-…/ses-…): specify a study's folder, such as results/rek2024, with "
+        "at least one session"
     )
 
 
@@ -523,13 +523,13 @@ def _check_alike(first: Session, other: Session) -> None:
         raise AnalysisError(_other_study(other, first))
     if other.visit["key_hash"] != first.visit["key_hash"]:
         raise AnalysisError(
-            f"{other.folder.path} and {first.folder.path} ran under different sealed keys, so the same code may "
-            "stand for different conditions: keep them in separate folders"
+            f"{other.folder.path} and {first.folder.path} used different sealed keys, so the same code may stand for "
+            "different conditions: keep them in separate folders"
         )
     if other.questionnaire != first.questionnaire:
         raise AnalysisError(
-            f"{other.folder.path} (version {other.version}) has other statements than {first.folder.path} "
-            f"(version {first.version}): keep the versions of a study in separate folders"
+            f"{other.folder.path} (version {other.version}) has different statements from {first.folder.path} (version "
+            f"{first.version}): keep the versions of a study in separate folders"
         )
 
 

@@ -115,7 +115,7 @@ def _why_missing(path: Path | None) -> str:
             file.read(1)
     except (OSError, ValueError) as error:
         return f"cannot be read: {system_message(error) if isinstance(error, OSError) else error}"
-    return "the file of this name has another SHA-256"
+    return "the file with this name has a different SHA-256"
 
 
 FOLDER: Final = "psych-ds"

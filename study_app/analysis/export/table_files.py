@@ -62,8 +62,8 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "study": study_head(study),
         "program": f"liquid-study {__version__}",
-        "format": "CSV: UTF-8, comma, decimal point, RFC 4180 quoting; a text that begins with "
-        f"{COMPUTED} has an apostrophe before it",
+        "format": f"CSV: UTF-8, comma, decimal point, RFC 4180 quoting; a text that begins with {COMPUTED} is preceded "
+        "by an apostrophe",
         "missing": MISSING,
         "blinded": not study.revealed,
         "sealed_columns": [] if study.revealed else sorted(SEALED | names_of_sealed(study)),

@@ -121,7 +121,7 @@ _MEASURED: Final = (
     Column(
         "presented_excluded",
         "integer",
-        "Number of further presentations that exclusions.csv excludes individually, with their answers.",
+        "Number of other presentations that exclusions.csv excludes one by one, together with their answers.",
         minimum=0,
     ),
     Column("n", "integer", "Valid answers.", minimum=0),

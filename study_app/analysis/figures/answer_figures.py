@@ -237,7 +237,9 @@ def draw_threshold(
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
     sheet.text(MARGIN_PT, 28, "Answers that agree", size=SMALL, colour=style.TEXT_SOFT)
-    below = "Added delay, ms.   Small points: participants; circles: share of all; diamond: threshold, 95 % interval."
+    below = (
+        "Added delay, ms.   Small points: participants; circles: all participants; diamond: threshold, 95 % interval."
+    )
     sheet.text(MARGIN_PT, sheet.height_pt - 5, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
@@ -314,7 +316,7 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
         names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
         more = f" and {len(names) - _FILES} more" if len(names) > _FILES else ""
         files = counted(len(names), "file is", "files are")
-        yield f"{files} changed since recording, but used: {', '.join(names[:_FILES])}{more}."
+        yield f"{files} used although changed since recording: {', '.join(names[:_FILES])}{more}."
 
 
 def _marks_of_bars(block: Block) -> Iterator[str]:

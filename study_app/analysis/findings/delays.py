@@ -414,9 +414,10 @@ class DetectionThreshold(Finding[Threshold | None]):
         if self.value is not None:
             yield (
                 "The detection threshold is the delay at which a logistic function, fitted to agreement (5 to 7) in "
-                "single answers pooled over participants, lies halfway between the guess rate and one minus "
-                "the lapse rate (posterior median). Its 95 % interval is widened by how far participants differ. It is "
-                "reported only if the statement shows a trend and if the threshold lies within the presented delays."
+                "single answers pooled over participants, lies halfway between the guess rate and one minus the lapse "
+                "rate (posterior median). Its 95 % interval is widened to allow for differences between participants. "
+                "It is reported only if the statement shows a trend and if the threshold lies within the presented "
+                "delays."
             )
 
 
@@ -452,7 +453,7 @@ class NoticedFrom(Finding[None]):
             text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
             is_fitted = fitted is not None and decided.is_primary(fitted) == primary
             if not text and is_fitted:
-                text = "Agreement increases with the delay, but it is not shown that any single delay is noticed."
+                text = "Agreement increases with the delay, but no single delay is shown to be noticed."
             if text:
                 return self.answered(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
         return self.answered("not shown", f"It is not shown that any delay is noticed. {NO_EVIDENCE}")
@@ -473,7 +474,8 @@ class NoticedFrom(Finding[None]):
         ]
         return (
             f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)} participants already tend to rate longer delays "
-            f"{listed(rated)}. Participants may also notice shorter delays. Mean ratings need not change."
+            f"{listed(rated)}. Participants may also notice shorter delays. A trend does not imply that mean ratings "
+            "change."
         )
 
     def _threshold_words(self) -> str:

@@ -249,7 +249,7 @@ def verdict(p: float | None, least: float | None, alpha: float, *, primary: bool
 TESTS: Final = (
     Column("block", "text", "Id of the block."),
     Column("question", "text", "The question."),
-    optional("item", "text", "ID of the statement; n/a if the test is over several."),
+    optional("item", "text", "ID of the statement; n/a if the test covers several statements."),
     optional("comparison", "text", "The conditions tested, if not all."),
     Column("test", "text", "The test."),
     Column("n", "integer", "Participants used.", minimum=0),
@@ -405,7 +405,7 @@ class Finding(Generic[R]):
         super().__init_subclass__()
         for name in ("place", "row_place"):
             if not isinstance(value := getattr(cls, name), int | float):
-                raise StudyError(f"{cls.__name__} has the {name} {value!r}: give a number")
+                raise StudyError(f"{cls.__name__} has the {name} {value!r}: specify a number")
 
     def __init__(self, result: BlockResult, results: Results, pictures: Mapping[str, Picture] | None = None) -> None:
         self.found = result

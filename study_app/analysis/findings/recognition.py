@@ -26,7 +26,7 @@ from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named, recognition
-from study_app.analysis.wording import counted, interval, listed, number, p_equals, p_value
+from study_app.analysis.wording import interval, listed, number, p_equals, p_value
 
 _NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
 
@@ -105,10 +105,9 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         )
         how = "" if outcome.interval is None else f" Interval of kappa: {outcome.interval.method}."
         yield paragraph(
-            f"Intervals of proportions are Clopper–Pearson intervals.{how} p tests whether the name is used for "
-            "the liquid more often than for each other liquid, within participants (McNemar's exact test, "
-            "one-sided); the liquid with the largest p is the closest other liquid. Adjusted p is corrected by "
-            "Holm over the liquids.",
+            f"Intervals of proportions are Clopper–Pearson intervals.{how} p tests whether the name is used for the "
+            "liquid more often than for each other liquid, within participants (McNemar's exact test, one-sided); the "
+            "liquid with the largest p is the closest other liquid. Adjusted p is Holm-corrected across the liquids.",
             "soft",
         )
 
@@ -127,9 +126,8 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             )
         caption = (
             "The name that was rated highest for each liquid "
-            f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and percentages "
-            f"of the row; correct names are framed. Undecided: {counted(2, 'name')} or more were rated equally "
-            f"high.{chance}"
+            f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and percentages of the "
+            f"row; correct names are framed. Undecided: two or more names were rated equally high.{chance}"
         )
         return drawing.picture(
             self.figure_title,
@@ -151,7 +149,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
                 "equal highest ratings are undecided and count as incorrect. The number of correct names was tested "
                 "by permuting the liquids within participants (exact, one-sided). In addition, a liquid was called "
                 "recognised only if its name was used for it more often than for each other liquid (McNemar's exact "
-                "test within participants, one-sided, with p adjusted by Holm over the liquids)."
+                "test within participants, one-sided, with p Holm-adjusted across the liquids)."
             )
 
 
@@ -177,7 +175,7 @@ def _undecided_words(outcome: Recognition) -> str:
     one = outcome.undecided == 1
     return (
         f"{number_text.counted(outcome.undecided, 'undecided answer')} {'counts' if one else 'count'} as incorrect, "
-        f"and {'is' if one else 'are'} not in kappa. "
+        f"and {'is' if one else 'are'} not included in kappa. "
     )
 
 

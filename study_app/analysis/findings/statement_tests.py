@@ -60,7 +60,7 @@ def table_of_tests(
     reasons = dict.fromkeys(outcome.no_interval for outcome in outcomes if outcome.no_interval)
     methods = dict.fromkeys(outcome.method for outcome in outcomes if outcome.p is not None)
     family = dict.fromkeys(
-        f"p adjusted by {test.correction} over {number_text.counted(test.members, 'test')} (“{test.family}”)"
+        f"p adjusted ({test.correction}) across {number_text.counted(test.members, 'test')} (“{test.family}”)"
         for test in tests
     )
     two = isinstance(first.outcome, Paired) and len(compared) == 2
@@ -99,7 +99,7 @@ def families(tests: Sequence[Tested]) -> str:
     several = len(each) > 1
     return "with p adjusted " + listed(
         [
-            f"by {correction} over {counted(members, f'{kind} statement')}"
+            f"by the {correction} method across {counted(members, f'{kind} statement')}"
             for exploratory, members, correction in each
             for kind in [("exploratory" if exploratory else "primary") if several else ""]
         ]
@@ -504,7 +504,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
         )
         yield paragraph(
             "Test: Wilcoxon's signed-rank test, only in statements that show a difference between the "
-            f"{settings_noun(self.found)}s; {pairs[0].tested.outcome.method}; p adjusted by Holm over the "
+            f"{settings_noun(self.found)}s; {pairs[0].tested.outcome.method}; p Holm-adjusted across the "
             f"{pairs[0].tested.members} pairs of this table. A rank-biserial correlation above 0 means that the first "
             "of a pair was rated higher. Intervals: 95 %, by Fisher's z; with up to two dozen pairs they cover about "
             "90 %. There is no interval if all pairs that differ went one way, because −1 and 1 are the ends of the "
@@ -516,8 +516,8 @@ class Pairs(Finding[tuple[Pair, ...]]):
         if self.value:
             yield (
                 "If a statement showed a difference, pairs were compared by Wilcoxon's signed-rank test (exact; equal "
-                "pairs left out), with p adjusted by Holm over all pairs of all such statements; the effect size is "
-                "the matched rank-biserial correlation."
+                "pairs left out), with p Holm-adjusted across all pairs of all such statements; the effect size is the "
+                "matched rank-biserial correlation."
             )
 
 

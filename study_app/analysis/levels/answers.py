@@ -136,8 +136,8 @@ class Settings(LevelStatistic[SettingEstimate]):
         return (
             f"Settings as levels ({level_words(self.found)}). PSE, the point of subjective equality: mean of "
             f"the {in_u}, with Student’s 95 % interval; JND, the just-noticeable difference: standard "
-            f"deviation;{error} hysteresis: settings that started high − settings that started low. Group "
-            "values are means over participants, with the interval over participants for the PSE."
+            f"deviation;{error} hysteresis: settings that started high − settings that started low. Group values are "
+            "means over participants; the group PSE has a 95 % interval."
         )
 
     def compares(self, measure: str) -> bool:

@@ -44,8 +44,8 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     Column(
         "analysed",
         "flag",
-        "true if the row is analysed and does not present the modulus of a magnitude estimation. False in a session "
-        "that answers the block below chance, until a person keeps it.",
+        "true if the row is analysed and does not present the modulus of a magnitude estimation. False if the "
+        "session's answers in the block are below chance, until a person decides to keep the session.",
     ),
     Column("track", "text", "Meaning of the code: standard and number of the track (8/1), or the condition."),
     Column(
@@ -130,7 +130,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
     optional("condition", "text", "The compared condition; n/a in a block of levels."),
-    Column("n", "integer", "Answers that count.", minimum=0),
+    Column("n", "integer", "Number of answers included in the analysis.", minimum=0),
     optional(
         "threshold",
         "number",
@@ -142,13 +142,14 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "open_end",
         "text",
-        "Which end of the interval the answers leave open: the true end lies further out; n/a: neither.",
+        "The end of the interval that the answers leave undetermined: the true end lies further out; n/a if both are "
+        "determined.",
         levels=(("low", "the lower"), ("high", "the upper"), ("both", "both")),
     ),
     optional(
         "beyond",
         "text",
-        "Whether the threshold lies beyond the levels of the stimulus; n/a: within the levels.",
+        "Whether the threshold lies beyond the levels of the stimulus; n/a if it lies within them.",
         levels=(("above", "above the highest"), ("below", "below the lowest")),
     ),
     optional(
@@ -207,7 +208,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "fit_p",
         "number",
-        "p of the function's deviance among simulated sets of answers; below 0.05 the function does not fit.",
+        "p value of the function's deviance, from simulated sets of answers; below 0.05 the function does not fit.",
         minimum=0,
         maximum=1,
     ),
@@ -244,8 +245,8 @@ def dictionary_markdown() -> str:
         "trials of intervals, the last four after unblinding"
     )
     of_tracks = (
-        "one row per trial with a design, after unblinding; its columns in addition to IDs and condition of "
-        "the trial, and force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
+        "one row per trial with a design, after unblinding; it also contains the IDs and the condition of the trial, "
+        "and force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
     )
     tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(

@@ -190,10 +190,10 @@ class _Withheld(LevelStatistic[_Row]):
 
     def explained(self) -> str:
         return (
-            f"{' '.join(self._up_to())} The table shows the proportion of the requested force that limits, "
-            "passivity controller and device held back in the comparisons, including repeated trials. A "
-            "delayed force pushes the hand, and the passivity controller limits the energy that it returns; "
-            "the force held back is then missing from the stimulus."
+            f"{' '.join(self._up_to())} The table shows the proportion of the requested force that the limits, the "
+            "passivity controller and the device held back in the comparisons, including repeated trials. A delayed "
+            "force pushes the hand, and the passivity controller limits the energy that it returns; the force held "
+            "back is then missing from the stimulus."
         )
 
     def _up_to(self) -> Iterator[str]:

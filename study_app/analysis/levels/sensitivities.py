@@ -33,8 +33,8 @@ from study_app.psychophysics.grid import Z_95
 
 _MODELS: Final = {
     "differencing": " d′ uses the differencing model, because standards vary from trial to trial.",
-    "independent": " d′ uses the model of independent observations; the exported table thresholds gives the "
-    "differencing model in the column d_prime_other.",
+    "independent": " d′ uses the model of independent observations; the column d_prime_other of the exported table "
+    "thresholds contains the d′ of the differencing model.",
 }
 _FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
 """Designs whose d′ follows from the share of correct answers alone."""

@@ -521,7 +521,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         reversals = (
             ""
             if percent is None
-            else " The mean of reversals is the classical estimate of an up–down track, at "
+            else " The mean of the reversals, the classical estimate of an up–down track, is the level with "
             f"{percent:.1f} % {result.counts}."
         )
         level = (
@@ -529,19 +529,19 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         )
         function = FAMILIES[result.family or ""]
         return (
-            f"A threshold is the level ({level_words(result)}) at which the {function} function is halfway "
-            f"between guess rate and one minus lapse rate{at}: posterior median with an equal-tailed 95 % "
-            "interval, from all counted answers, at the levels delivered to the hand. The width, from 5 to 95 "
-            "% of the rise, has a log-normal prior; the next column is the threshold under a flat prior. "
-            "“Above” and “below” mark thresholds beyond the levels of the stimulus, “<” and “>” mark ends of "
-            "intervals that the answers leave open. Intervals include that a "
-            f"person’s threshold differs between sessions by a factor of {10**SESSION_SD:.2f} (one standard "
-            "deviation), and a change over the trials. The group is the random-effects mean (Paule–Mandel), "
-            "with the interval of Hartung and Knapp from three participants on. A variance counts as its "
-            f"geometric mean with their median.{level}{reversals} Fit: p of the deviance among {SETS} simulated "
-            "sets of answers. Drift: correlation of trial number and deviance residual, with “!” if the "
-            f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, by how "
-            f"many standard errors thresholds rose or fell after the first trials. n counts answers{catch}."
+            f"A threshold is the level ({level_words(result)}) at which the {function} function is halfway between "
+            f"guess rate and one minus lapse rate{at}: posterior median with an equal-tailed 95 % interval, from all "
+            "analysed answers, at the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a "
+            "log-normal prior; the next column is the threshold under a flat prior. “Above” and “below” mark "
+            "thresholds beyond the levels of the stimulus, “<” and “>” mark ends of intervals that the answers leave "
+            "open. Intervals allow for a difference of a person’s threshold between sessions by a factor of "
+            f"{10**SESSION_SD:.2f} (one standard deviation), and for a change over the trials. The group is the "
+            "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp if there are at least three "
+            "participants. Each variance is replaced by its geometric mean with the median "
+            f"variance.{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: "
+            "correlation of trial number and deviance residual, with “!” if the threshold changes over the trials by "
+            f"more than {BEYOND_CHANCE:g} standard errors; for the group, by how many standard errors thresholds rose "
+            f"or fell after the first trials. n counts answers{catch}."
             + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
@@ -598,16 +598,17 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             if row.participant is None and row.learned:
                 where = "" if row.standard is None else f" at standard {with_unit(self.found, row.standard)}"
                 yield (
-                    f"{title}: the answers do not fit thresholds that stay the same or change evenly: thresholds "
+                    f"{title}: thresholds "
                     f"{'rose' if (row.early_change or 0.0) > 0 else 'fell'} after the first trials{where} by "
-                    f"{abs(row.early_change or 0.0):.1f} standard errors, so that the group's threshold may be biased."
+                    f"{abs(row.early_change or 0.0):.1f} standard errors. The group's threshold may be biased, because "
+                    "the analysis assumes thresholds that are constant or change evenly."
                 )
         if some := [estimate for estimate in own if estimate.drifts]:
             sizes = listed(
                 [f"{100 * (estimate.change or 0.0):+.0f} %".replace("-", "−") for estimate in some[:_MOST_NAMED]]
             )
             yield (
-                f"{title}: the threshold changed over the trials, which the interval includes "
+                f"{title}: the threshold changed over the trials, for which the interval allows "
                 f"({_named_people(own, some)}: {sizes} from the first trial to the last)."
             )
         if (people := len({estimate.participant for estimate in own})) < FEWEST:
@@ -625,8 +626,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if own is None:
             return (
                 f"{result.title}: the device's own damping, friction and mass are unknown, because they were not "
-                "measured. Weber fractions refer to the force that the motors delivered; relative to the sum "
-                "with the device's own they are smaller."
+                "measured. Weber fractions refer to the force that the motors delivered; relative to the sum of this "
+                "force and the device's own resistance they are smaller."
             )
         where = "" if own.sessions == own.of else f" (measured for {own.sessions} of {own.of} sessions)"
         words = (
@@ -649,8 +650,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         median, factor = block.assumed.width_prior
         family, log = FAMILIES[block.assumed.family], block.stimulus.spacing == "log"
         yield (
-            f"A {family} function of the {'logarithm of the ' if log else ''}level was fitted, with a "
-            f"flat prior on the threshold, a log-normal one on the width (median {median:.3g} "
+            f"A {family} function of the {'logarithm of the ' if log else ''}level was fitted, with a flat prior on "
+            f"the threshold, a log-normal prior on the width (median {median:.3g} "
             f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates up to "
             f"{100 * max(ANALYSIS_LAPSES):.0f} %. The participants’ mean lapse rate has an exponential prior (mean "
             f"{100 * MEAN_LAPSE:g} %)."
@@ -662,23 +663,21 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(map(cls.of, blocks)):
             yield (
-                "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all "
-                f"counted answers at the levels delivered to the hand. The deviance was compared with {SETS} "
-                "simulated sets of answers, and drift is the correlation between trial number and deviance "
-                "residual (Wichmann & Hill 2001). Intervals include that a person’s threshold differs between "
-                f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & "
-                f"Wichmann 2006), and how far it changed over the trials if this exceeded {BEYOND_CHANCE:g} "
-                f"standard errors. The posterior averages over linear changes (prior: a factor of {CHANGE_PRIOR:g}), "
-                f"so the threshold refers to the middle of the trials. We assumed that {100 * ALIKE:.0f} % of "
-                "the standard deviation of log widths is between participants and that lapse rates vary about a "
-                "common mean, so each participant’s width and lapse rate depend on the answers of all; the posterior "
-                f"of what participants share was raised to the power of {NEAR_MODE}. Group means are "
-                "random-effects means, with each variance replaced by its "
-                "geometric mean with the median variance, the between-person variance of Paule and Mandel "
-                f"(1982) and, with at least {FEWEST} participants, the interval of Hartung and Knapp (2001), "
-                "widened by the uncertainty of the width and the lapse rate that all have in common. Whether "
-                "thresholds rose or fell after the first trials was tested by the score of a change that fades over "
-                f"{EARLY_TRIALS:g} trials."
+                "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all analysed "
+                f"answers at the levels delivered to the hand. The deviance was compared with {SETS} simulated sets of "
+                "answers, and drift is the correlation between trial number and deviance residual (Wichmann & Hill "
+                "2001). Intervals allow for a difference of a person’s threshold between sessions by a factor of "
+                f"{10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and for its "
+                f"change over the trials if this exceeded {BEYOND_CHANCE:g} standard errors. The posterior averages "
+                f"over linear changes (prior: a factor of {CHANGE_PRIOR:g}), so the threshold refers to the middle of "
+                f"the trials. We assumed that {100 * ALIKE:.0f} % of the standard deviation of log widths is between "
+                "participants and that lapse rates vary about a common mean, so each participant’s width and lapse "
+                "rate depend on the answers of all; the posterior of what participants share was raised to the power "
+                f"of {NEAR_MODE}. Group means are random-effects means, with each variance replaced by its geometric "
+                "mean with the median variance, the between-person variance of Paule and Mandel (1982) and, with at "
+                f"least {FEWEST} participants, the interval of Hartung and Knapp (2001), widened by the uncertainty of "
+                "the width and the lapse rate that all have in common. Whether thresholds rose or fell after the first "
+                f"trials was tested by the score of a change that fades over {EARLY_TRIALS:g} trials."
             )
 
 

@@ -294,7 +294,7 @@ OF_STUDIES: Final = (
 COLUMNS: Final = (
     *OF_BLOCK,
     Column("question", "text", "What is tested."),
-    optional("item", "text", "ID of the statement; n/a if the test is over several."),
+    optional("item", "text", "ID of the statement; n/a if the test covers several statements."),
     optional("over", "text", "Scope of the test, if it covers more than one statement."),
     optional("setting", "text", "The delay tested; n/a if the test is about all delays."),
     Column("people", "text", "Kind of the simulated participants."),
@@ -307,7 +307,7 @@ COLUMNS: Final = (
         maximum=1,
     ),
     Column("power_low", "number", "Lower end of the 95 % interval of that proportion (Wilson).", minimum=0, maximum=1),
-    Column("power_high", "number", "Upper end of that interval.", minimum=0, maximum=1),
+    Column("power_high", "number", "Upper end of the 95 % interval of that proportion (Wilson).", minimum=0, maximum=1),
     optional(
         "without_effect",
         "number",
@@ -394,9 +394,9 @@ def _preface(power: Powers) -> list[str]:
         "power.",
         "",
         f"Tests at α = {decided.alpha:g}{looks}; p values use {PLANNED_DRAWS} random permutations of each "
-        "participant's answers. Primary statements are corrected by Holm, the others by Benjamini and "
-        f"Hochberg. Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's were tried. A power of 80 % "
-        f"is uncertain by ±{50 * (high - low):.1f} percentage points.",
+        "participant's answers. Tests of primary statements are Holm-corrected; for the others the false discovery "
+        f"rate is controlled (Benjamini and Hochberg). Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's "
+        f"were tried. A power of 80 % is uncertain by ±{50 * (high - low):.1f} percentage points.",
         "",
         f"Numbers are for {_people(next(iter(power.kinds)))}, with the lowest and the highest over all kinds of "
         "people in parentheses: "
@@ -407,7 +407,10 @@ def _preface(power: Powers) -> list[str]:
         lines += ["", f"**Ended early: {power.studies} of {power.asked} studies.**"]
     if power.plan.unknown:
         named = ", ".join(power.plan.unknown)
-        lines += ["", f"The model does not know {named}: effects are not simulated there, so detections are chance."]
+        lines += [
+            "",
+            f"The model does not know {named}: effects are not simulated there, so detections occur by chance.",
+        ]
     lines += [
         line
         for block in power.plan.blocks
@@ -473,7 +476,7 @@ def _between(power: Powers) -> Iterator[str]:
             numbers = first if contrast.within is None else first - second
             spreads[name] = float(numbers.std(ddof=1))
         of = "the mean answers" if contrast.within is None else "the differences within participants"
-        said = f"SD: of {of} of simulated participants, in points."
+        said = f"SD: standard deviation of {of} of simulated participants, in points."
         rows = [(f"{contrast.measure}, {_people(name)}", f"{spread:.2f}", spread) for name, spread in spreads.items()]
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
@@ -603,8 +606,8 @@ def _explained(question: Question, found: Powers) -> list[str]:
             return [f"A trend by {by}, one-sided if the protocol states a direction."]
         case "lowest delay":
             return [
-                "Rank correlations are tested again without the longest delay while there is a trend; the "
-                "result is an upper bound of the noticeable delay."
+                "Rank correlations are tested again without the longest delay as long as there is a trend; the result "
+                "is an upper bound of the noticeable delay."
             ]
         case "equivalence":
             bound = found.plan.decided.equivalence_bound or STEPS
@@ -615,9 +618,8 @@ def _explained(question: Question, found: Powers) -> list[str]:
             ]
         case "contrast":
             return [
-                "Paired t tests of each participant's mean answers, with which the bootstrap must agree, "
-                "corrected by Holm over the hypotheses; equivalence by the report's equivalence tests. "
-                f"{LEFT_OUT}"
+                "Paired t tests of each participant's mean answers, Holm-corrected across the hypotheses; the "
+                f"bootstrap must agree. Equivalence is tested as in the report. {LEFT_OUT}"
             ]
 
 

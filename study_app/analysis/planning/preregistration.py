@@ -104,9 +104,9 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         yield (
             f"Hypothesis: {contrast.described(words)}. We test it by a {test} "
             f"({'two-sided' if contrast.expected is None else 'one-sided'}"
-            f"{', weighted as in the group mean' if contrast.measure == 'threshold' else ''}), with one number of each "
-            "participant. A bootstrap that adds a participant like the most extreme one must agree. p is adjusted by "
-            f"Holm over all hypotheses of this kind.{_equality_of(protocol, contrast)}"
+            f"{', weighted as in the group mean' if contrast.measure == 'threshold' else ''}) on one number per "
+            "participant. A bootstrap that adds a participant like the most extreme one must agree. p is Holm-adjusted "
+            f"across all hypotheses of this kind.{_equality_of(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
         yield LEFT_OUT
@@ -116,7 +116,7 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         else:
             yield from _of_statements(protocol, block, language)
     for published in () if protocol.analysis is None else protocol.analysis.published:
-        yield f"Published value to compare with: {published.described()}."
+        yield f"Published value for comparison, block {published.described()}."
 
 
 def _test_of(contrast: Contrast, of: str) -> str:
@@ -135,7 +135,7 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
     reach, largest = equality_limits(contrast, contrast.bound, ratio=contrast.measure in RATIOS)
     alpha = decisions(protocol).alphas[-1] / bounds
     return (
-        " We test equivalence by two one-sided t tests and the bootstrap, adjusted by Holm over "
+        " We test equivalence by two one-sided t tests and the bootstrap, Holm-adjusted across "
         f"{number_text.counted(bounds, 'bound')}; it requires at least {fewest(alpha, reach, largest)} "
         f"participants{' in each group' if contrast.groups else ''}."
     )
@@ -251,12 +251,13 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         )
     yield (
         "A difference in a statement is claimed only if the permutation test over all statements of its block is "
-        "significant, adjusted by Holm over the blocks. Intervals of mean rank correlations and exploratory tests of "
+        "significant, Holm-adjusted across the blocks. Intervals of mean rank correlations and exploratory tests of "
         f"means require at least {FEW} participants."
     )
     yield (
-        f"α = {decided.alpha:g}. p values of primary statements ({', '.join(decided.primary) or 'all'}) are adjusted "
-        "by Holm, those of other statements, which are exploratory, by Benjamini and Hochberg."
+        f"α = {decided.alpha:g}. p values of primary statements ({', '.join(decided.primary) or 'all'}) are "
+        "Holm-adjusted; those of other statements, which are exploratory, are adjusted with the method of Benjamini "
+        "and Hochberg."
         if protocol.analysis is not None
         else "There is no table [analysis], so all results are exploratory."
     )
@@ -283,8 +284,8 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
     lines = [
         f"# Preregistration: {text_in(study.title, language)}",
         "",
-        f"Study {study.name}, version {study.version}; protocol file with SHA-256 `{protocol_hash}`. Written by "
-        f"liquid-study {__version__} only from this file. Register it before the first session.",
+        f"Study {study.name}, version {study.version}; protocol file with SHA-256 `{protocol_hash}`. liquid-study "
+        f"{__version__} generated this text from that file alone. Register the text before the first session.",
         "",
         "## Hypotheses and questions",
         "",
@@ -354,7 +355,7 @@ def _design(protocol: Protocol) -> Iterator[str]:
 
 def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
     """Yield sentences on the planned number of participants and its justification."""
-    planned = "The number of participants is not decided, and there is no stopping rule."
+    planned = "The number of participants has not been decided, and there is no stopping rule."
     if one.participants is not None:
         decided = decisions(protocol)
         planned = (
@@ -409,7 +410,7 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
                 f'Rule "catch": a session with more than {100 * block.catch.wrong_most:g} % incorrect answers to the '
                 f"catch trials of block {block.id} is excluded; the program applies it when the key is opened."
             )
-    limits = "; ".join(f"{what} {value}" for value, what in limit_rows(protocol))
+    limits = "; ".join(f"{what} ({value})" for value, what in limit_rows(protocol))
     has_intervals = any(block.design is not None for block in protocol.main_blocks)
     if has_intervals:
         attempts = protocol.limits.attempts
@@ -426,7 +427,7 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
     for rule in () if protocol.analysis is None else protocol.analysis.exclusions:
         yield (
             f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. A person decides; the report '
-            "names the session and the decision, and gives the conclusions with and without all such sessions."
+            "names the session and the decision, and states the conclusions with and without all such sessions."
         )
     yield f"Limits: {limits}."
     yield "Any other exclusion is a deviation from this preregistration; the report lists it with its reason and date."
@@ -476,8 +477,8 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
         who = listed([f"{row.participant}/{row.session}" for row in other.head(_SHOWN).itertuples()])
         more = "" if len(other) <= _SHOWN else f" and {len(other) - _SHOWN} more"
         yield (
-            f"{counted(len(other), 'session')} ran under another protocol (version {versions}) than the preregistered "
-            f"one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
+            f"{counted(len(other), 'session')} ran under a protocol (version {versions}) that differs from the "
+            f"preregistered one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
         )
     yield from _other_participants(study, committed.participants)
     by_person = [exclusion for exclusion in study.exclusions if exclusion.rule_or_person not in committed.rules]

@@ -99,7 +99,7 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
         for asked, one in zip(trials, changed, strict=False):
             if abs(one.trials - asked) > max(1, asked / 2):
                 raise AnalysisError(
-                    f"{asked} trials cannot be divided among the tracks and levels of {block.id}: give at least "
+                    f"{asked} trials cannot be divided among the tracks and levels of {block.id}: specify at least "
                     f"{one.trials}"
                 )
         planned[block.id] = {one.trials: one for one in changed}
@@ -240,9 +240,9 @@ COLUMNS: Final = (
         minimum=0,
     ),
     optional("precision", "number", "The planned half width; n/a if none is planned.", minimum=0),
-    optional("within", "number", "Proportion of the studies that reach it.", minimum=0, maximum=1),
+    optional("within", "number", "Proportion of the studies that reach the planned half width.", minimum=0, maximum=1),
     optional("within_low", "number", "Lower end of the proportion's 95 % interval.", minimum=0, maximum=1),
-    optional("within_high", "number", "Upper end of it.", minimum=0, maximum=1),
+    optional("within_high", "number", "Upper end of the proportion's 95 % interval.", minimum=0, maximum=1),
 )
 
 
@@ -303,7 +303,7 @@ def threshold_markdown(precisions: Precisions) -> str:
     lines = [
         f"# Expected precision of {text_in(study.title, language)} ({study.name} {study.version})",
         "",
-        f"**SIMULATED.** {precisions.studies} studies for each row (seed {precisions.seed}, liquid-study "
+        f"**SIMULATED.** Each row summarises {precisions.studies} studies (seed {precisions.seed}, liquid-study "
         f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Results are estimated as in the report.",
     ]
     if precisions.studies < precisions.asked:

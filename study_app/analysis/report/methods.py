@@ -82,7 +82,7 @@ def _fewer_settings(study: Study) -> str:
     if not fewer:
         return ", not all of them in all conditions"
     people = counted(len(fewer), "participant")
-    return f"; {people} {'lacks' if len(fewer) == 1 else 'lack'} a condition, because single trials were excluded"
+    return f"; {people} {'lacks' if len(fewer) == 1 else 'lack'} a condition, because individual trials were excluded"
 
 
 def _groups(study: Study) -> str:
@@ -165,7 +165,7 @@ def _apparatus(study: Study) -> str:
     if _WITHOUT_FORCE.issuperset(names):
         device_words = f"a device without force ({listed(names)})"
     velocity = {None: "", "device": "; its velocity was measured by the device"}.get(
-        study.estimator, f"; its velocity was estimated by {study.estimator}"
+        study.estimator, f"; its velocity was estimated with the {study.estimator} filter"
     )
     return (
         f"Participants used {device_words}. "
@@ -322,7 +322,7 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     decided = results.decided
     gated = [block for block in blocks if (overall := OverAll.of(block)) is not None and overall.p is not None]
     if gated:
-        holm = f", adjusted by Holm over {counted(len(gated), 'block')}" if len(gated) > 1 else ""
+        holm = f", Holm-adjusted across {counted(len(gated), 'block')}" if len(gated) > 1 else ""
         yield (
             "An adjusted p value of a statement is at least the p value of the test over all statements of its "
             f"block{holm}."

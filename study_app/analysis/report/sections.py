@@ -296,7 +296,7 @@ def counts_of_answers(results: Results) -> Iterator[str]:
     """Yield the counts of all answers, block by block; nothing without blocks of statements."""
     if not results.blocks:
         return
-    yield heading(2, "Answers, counted")
+    yield heading(2, "Counts of answers")
     for result in results.blocks:
         if result.measures:
             yield heading(3, lead(result))
@@ -509,7 +509,7 @@ def _missing(study: Study) -> Iterator[str]:
     else:
         yield paragraph("All trials were delivered.")
     if len(rows) > _SHOWN:
-        yield paragraph(f"And {counted(len(rows) - _SHOWN, 'more session')}, in report.json.")
+        yield paragraph(f"report.json lists {counted(len(rows) - _SHOWN, 'more session')}.")
     permitted = study.protocol.get("limits", {}).get(MISSING_PERCENT)
     if permitted is not None:
         yield paragraph(

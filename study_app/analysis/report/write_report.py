@@ -340,7 +340,7 @@ def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
                 for proposal in proposals
             ]
         )
-        yield f"Proposed for exclusion, not decided: {who}. See “Planned exclusions”."
+        yield f"Proposed for exclusion but not yet decided: {who}. See “Planned exclusions”."
 
 
 def _page(
@@ -371,10 +371,13 @@ def _page(
         ("Planned exclusions", lambda: sections.planned_section(planned)),
         ("How it was run", lambda: sections.conduct(study, results)),
         ("Preregistration", lambda: preregistration_section(study)),
-        ("Methods, to paste", lambda: (heading(2, "Methods, to paste"), box([paragraph(str(texts["methods"]))]))),
+        (
+            "Methods (text to paste)",
+            lambda: (heading(2, "Methods (text to paste)"), box([paragraph(str(texts["methods"]))])),
+        ),
         ("Reproducing this report", lambda: _again(study, results)),
         ("Licence and citation", lambda: (heading(2, "Licence and citation"), bullets(credit_lines(study)))),
-        ("Answers, counted", lambda: sections.counts_of_answers(results)),
+        ("Counts of answers", lambda: sections.counts_of_answers(results)),
         ("Questions in full", lambda: appendix(recorded_contents(study.folder))),
     ]
     first = attempted(failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn)])
@@ -443,7 +446,7 @@ def _again(study: Study, results: Results) -> Iterator[str]:
         yield table(("File", "SHA-256"), list(hashes.items()), words=2)
     yield paragraph(
         f"The numbers come from {counted(len(hashes), 'file')}; SHA-256 over their hashes and names: "
-        f"{together.hexdigest()}. Each one's hash, and every session's seed, is in report.json."
+        f"{together.hexdigest()}. report.json contains the hash of each file and the seed of each session."
     )
     yield paragraph(
         "Files next to this page: report.json (every number), tests.csv (one row per test), motion.csv, the "

@@ -93,7 +93,7 @@ def tost(
     """
     if not (bound > 0.0 and math.isfinite(bound)):
         raise AnalysisError(
-            f"an equivalence bound of {bound} is not meaningful; give a bound above 0 in points of the scale"
+            f"an equivalence bound of {bound} is not meaningful; specify a bound above 0 in points of the scale"
         )
     array = checked(differences, "participants")
     kept = np.sort(array[~np.isnan(array)])

@@ -35,7 +35,7 @@ SAMPLES: Final = 1999
 FEW: Final = 10
 """Below so many participants there is no percentile bootstrap interval and no test of slopes."""
 
-_TOO_FEW: Final = f"no interval below {FEW} participants: resampling so few has far too low coverage"
+_TOO_FEW: Final = f"no interval below {FEW} participants: the coverage of an interval from so few people is far too low"
 NO_VARIATION: Final = "no variation: every participant gave the same answer in all conditions"
 
 
@@ -79,9 +79,9 @@ def checked(values: ArrayLike, axes: str) -> Array:
     array = np.asarray(values, dtype=np.float64)
     wanted = axes.count(",") + 1
     if array.ndim != wanted:
-        raise AnalysisError(f"answers of shape {array.shape} cannot be tested; give {wanted} axes: {axes}")
+        raise AnalysisError(f"answers of shape {array.shape} cannot be tested; specify {wanted} axes: {axes}")
     if np.isinf(array).any():
-        raise AnalysisError("an answer is infinite; give numbers, and NaN for missing answers")
+        raise AnalysisError("an answer is infinite; specify numbers, and NaN for missing answers")
     return array
 
 
@@ -310,5 +310,5 @@ def _known(ps: Sequence[float | None]) -> dict[int, float]:
     known = {member: p for member, p in enumerate(ps) if p is not None}
     for p in known.values():
         if not 0.0 <= p <= 1.0:
-            raise AnalysisError(f"p = {p} cannot be adjusted; give a p between 0 and 1, or None if a test gave none")
+            raise AnalysisError(f"p = {p} cannot be adjusted; specify a p between 0 and 1, or None if a test gave none")
     return known

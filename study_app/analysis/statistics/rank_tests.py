@@ -65,7 +65,9 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
     """
     first, second = checked(x, "participants"), checked(y, "participants")
     if len(first) != len(second):
-        raise AnalysisError(f"{len(first)} and {len(second)} answers are not pairs; give one of each per participant")
+        raise AnalysisError(
+            f"{len(first)} and {len(second)} answers are not pairs; specify one of each per participant"
+        )
     both = first - second
     differences = both[~np.isnan(both)]
     n, dropped = len(differences), int(np.isnan(both).sum())

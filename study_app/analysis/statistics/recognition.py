@@ -62,7 +62,7 @@ class HitRate:
     """The correct answers for one setting: ``hits`` of ``n``, with a Clopper–Pearson interval.
 
     ``p`` is the largest p over the other settings (reached for ``rival``) that the name is used as often for one of
-    them; ``p_adjusted`` is corrected by Holm over the settings with a name. None without an answer or another setting.
+    them; ``p_adjusted`` is Holm-corrected across the settings with a name. None without an answer or another setting.
     """
 
     setting: int
@@ -143,10 +143,13 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
 def _names(names: ArrayLike, truth: Sequence[int | None], labels: int) -> Whole:
     given = checked(names, "participants, settings")
     if given.shape[1] != len(truth) or not 2 <= len(truth) <= MOST:
-        raise AnalysisError(f"{given.shape[1]} settings with names, {len(truth)} true names; give as many, 2 to {MOST}")
+        raise AnalysisError(
+            f"{given.shape[1]} settings with names, {len(truth)} true names; specify the same number of each, 2 to "
+            f"{MOST}"
+        )
     if not np.isin(given, _columns(labels)).all() or not {*truth} <= {None, *range(labels)}:
         raise AnalysisError(
-            f"a name is not among the {labels} labels; give positions 0 to {labels - 1}, -1 undecided, -2 missing"
+            f"a name is not among the {labels} labels; specify positions 0 to {labels - 1}, -1 undecided, -2 missing"
         )
     return given.astype(np.int64)
 
@@ -248,7 +251,7 @@ def _note(n: int, undecided: int, smallest: float) -> str:
     if n == 0:
         return "no participant rated all labels in any condition"
     if smallest == 1.0:
-        return "no variation: every participant gave all conditions the same name or none"
+        return "no variation: every participant gave the same name to all conditions, or did not name any"
     if undecided:
         return f"{undecided} undecided answer{'s count' if undecided > 1 else ' counts'} as incorrect"
     return ""

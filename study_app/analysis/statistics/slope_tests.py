@@ -110,7 +110,7 @@ def _design(settings: int, columns: ArrayLike | None) -> Array:
     centred = design - design.mean(axis=0) if len(design) else design
     if len(design) != settings or np.isnan(design).any() or np.linalg.matrix_rank(centred) < design.shape[1]:
         raise AnalysisError(
-            f"columns of shape {design.shape} do not distinguish {settings} settings; give one row a setting, without "
-            "NaN, and columns of which none follows from the others"
+            f"columns of shape {design.shape} do not distinguish {settings} settings; specify one row a setting, "
+            "without NaN, and columns of which none follows from the others"
         )
     return design

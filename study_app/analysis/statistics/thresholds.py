@@ -244,7 +244,7 @@ def _remarks(levels: Array, lower: float | None, upper: float | None, people: in
 
 def _open(lower: float | None, upper: float | None) -> str:
     side = "on both sides" if lower is None and upper is None else "below" if lower is None else "above"
-    return f"no interval: the answers do not bound it {side}"
+    return f"no interval: the answers leave it open {side}"
 
 
 SETS: Final = 999

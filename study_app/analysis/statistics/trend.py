@@ -136,7 +136,7 @@ def step_down(
     array = checked(values, "participants, delays")
     if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):
         raise AnalysisError(
-            f"delays {list(delays_ms)} ms do not increase one by one for {array.shape[1]} columns of answers"
+            f"delays {list(delays_ms)} ms must be {array.shape[1]} increasing values, one for each column of answers"
         )
     rows, dropped = complete(array, at_least=2, why=" for a trend")
     steps: list[Step] = []

@@ -133,7 +133,7 @@ def write_new(study: Study, name: str) -> Path:
 
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
-        rule = f"write at most {MAX_SHORT_NAME} small letters and digits, a letter first"
+        rule = f"write at most {MAX_SHORT_NAME} lowercase letters and digits, a letter first"
         raise _refusal(f'"{name}" is not a short name: {rule}', name)
     if fault := file_name_fault(name):
         raise _refusal(f'"{name}" {fault}', name)

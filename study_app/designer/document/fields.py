@@ -199,7 +199,7 @@ def check_id(name: str, free: str = "") -> None:
     """Reject an invalid id and propose a valid one."""
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
-        rule = f"at most {MAX_ID} small letters, digits and underscores, a letter first"
+        rule = f"at most {MAX_ID} lowercase letters, digits and underscores, a letter first"
         proposed = f'; "{free}" is free' if free else ""
         raise Refused(f'"{name}" is not a valid ID: write {rule}{proposed}')
 

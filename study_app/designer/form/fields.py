@@ -606,7 +606,7 @@ def add_button(name: str, accessible_name: str = "") -> ActionButton:
 def kept_value_sentence(value: Any) -> str:
     """Return the sentence about the value that the study keeps while the typed one is rejected."""
     if value is None:
-        return "The study does not use it; Esc clears the field."
+        return "The study does not use this text; Esc clears the field."
     return f"The study keeps {typed_value(value)}; Esc restores it."
 
 

@@ -139,7 +139,7 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
         if isinstance(block, Mapping) and "design" not in block and (other := block.get("questionnaire")) != path[1]:
             instead = "" if other is None else f", instead of {title_of(document, (path[0], str(other)))}"
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
-            yield f"After each trial of {title}\tabout that trial{instead}", asked
+            yield f"After each trial of {title}\twith questions about that trial{instead}", asked
     ends = {
         name: _places_after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)
     }

@@ -159,7 +159,7 @@ def fault_spelling(name: str) -> str:
 def _place(name: str) -> int:
     if name not in _CHANCES:
         raise DeviceError(
-            f"fault '{name}' does not come by chance; choose one of: {', '.join(map(fault_spelling, _CHANCES))}"
+            f"fault '{name}' cannot occur at random; choose one of: {', '.join(map(fault_spelling, _CHANCES))}"
         )
     return _CHANCES.index(name)
 

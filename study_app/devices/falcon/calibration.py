@@ -374,7 +374,8 @@ def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
         counts, units = grip.weigh()
         notes.append((counts, 0.0, units))
         request = (
-            f"Place {number} of {len(PLACES_M)}: pull straight down with the scale, at 200 to 500 g, and hold it so"
+            f"Place {number} of {len(PLACES_M)}: pull straight down with the scale until it shows 200 to 500 g, and "
+            "hold it there"
         )
         grip.wait(ask("pull", request))
         counts, units = grip.weigh()

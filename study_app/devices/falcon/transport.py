@@ -458,7 +458,7 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     why = ""
     if None in serials:
         cause = failures_on(platform).mode("driver" if platform == "win32" else "permission").cause
-        why = f"one does not report its serial number; perhaps {cause}: liquid-study devices doctor finds out"
+        why = f"one does not report its serial number; perhaps {cause}: run liquid-study devices doctor"
     return Backend(
         "falcon", by, state="connected: " + ", ".join(serial or "unnamed" for serial in serials), can=can, why=why
     )
@@ -466,7 +466,7 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
 
 def probe_ftdi(d2xx: Any = None, platform: str = sys.platform) -> Backend:
     """Return whether FTDI's driver can be used on a platform, with its library or the one that loads."""
-    can = "the same, if FTDI's or Novint's driver is bound to it; used automatically if libusb cannot open it"
+    can = "the same device through FTDI's or Novint's driver; used automatically if libusb cannot open the device"
     if platform != "win32":
         return Backend(
             "falcon", "ftd2xx", state=NOT_AVAILABLE, can=can, why="only for Windows, if drivers block libusb"

@@ -56,7 +56,7 @@ class ForceDimensionDevice(FramedDevice):
     ) -> None:
         if serial and not serial.isdecimal():
             raise DeviceError(
-                f"'{serial}' is not a serial number of a Force Dimension device: give digits, as the device's label "
+                f"'{serial}' is not a serial number of a Force Dimension device: specify digits, as the device's label "
                 "shows them, such as force-dimension:10233"
             )
         super().__init__(new_exchange(force_limit_n), workspace_m, force_limit_n, exchange_functions())

@@ -118,7 +118,7 @@ def address(where: str) -> tuple[str, int, str]:
     host, port = parts[:2]
     if len(parts) > 3 or not host or not port.isdecimal() or not 0 < int(port) < 65536:
         raise DeviceError(
-            f"'{where}' is not an address of the Inverse Service: give inverse3, inverse3:ID, inverse3:HOST:PORT or "
+            f"'{where}' is not an address of the Inverse Service: specify inverse3, inverse3:ID, inverse3:HOST:PORT or "
             "inverse3:HOST:PORT:ID, with a port from 1 to 65535"
         )
     return host, int(port), parts[2] if len(parts) == 3 else ""

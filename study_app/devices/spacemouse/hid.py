@@ -122,8 +122,8 @@ _CANNOT_OPEN: Final = {
     "linux": "this account may not open it: put "
     + " and ".join(f"'{rule}'" for rule in _UDEV_RULES)
     + " into /etc/udev/rules.d/60-spacemouse.rules, run 'sudo udevadm control --reload' and plug it in again",
-    "darwin": "3Dconnexion's helper may hold it: quit 3DconnexionHelper (Activity Monitor), or remove 3DxWare",
-    "win32": "another program holds it: close it, and 3DxWare",
+    "darwin": "3Dconnexion's helper may be using it: quit 3DconnexionHelper (Activity Monitor), or remove 3DxWare",
+    "win32": "another program uses it: close that program and 3DxWare",
 }
 _NO_MOTION_INTERFACE: Final = (
     "is connected, but does not have an interface that reports motion (usage page 1, usage 8): switch the "

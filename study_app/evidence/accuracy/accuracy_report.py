@@ -294,13 +294,12 @@ def evidence(accuracy: Accuracy) -> Evidence:
 
 
 _WHAT: Final = (
-    "Times are computation times of one thread, excluding other programs: medians over repeats, in one "
-    "interleaved run, of the median and the 99th percentile of batches of 1,000 ticks. RMS errors are in % of "
-    "the RMS reference force, greatest errors in % of the greatest. Direction is the RMS angle while the "
-    "reference force is perceptible. Rows with fewer ticks per second give only the error of the force, not "
-    "its effect on stability. Unsteady drag is compared with each motion of the fluid solver with constants "
-    "fitted to the other motions. ● no other model is both faster, in real time, and more accurate, each by "
-    "its greatest error; ◎ the model that the program runs."
+    "Times are computation times of one thread, excluding other programs: medians over repeats, in one interleaved "
+    "run, of the median and the 99th percentile of batches of 1,000 ticks. RMS errors are in % of the RMS reference "
+    "force, greatest errors in % of the greatest. Direction is the RMS angle while the reference force is perceptible. "
+    "Rows with fewer ticks per second show only the error of the force, not its effect on stability. Unsteady drag is "
+    "compared with each motion of the fluid solver with constants fitted to the other motions. ● no other model is "
+    "both faster, in real time, and more accurate, each by its greatest error; ◎ the model that the program runs."
 )
 _HEADINGS: Final = (
     "", "model", "ns per tick", "p99", "RMS error [N]", "max [N]", "RMS [%]", "max [%]", "direction [°]",

@@ -386,7 +386,7 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("program", nargs=argparse.REMAINDER)
     asked = parser.parse_args(words)
     if bool(asked.program) == bool(asked.function):
-        parser.error("give either a program or --function MODULE:FUNCTION")
+        parser.error("specify either a program or --function MODULE:FUNCTION")
     try:
         with _engine_of(asked.program, asked.function) as engine:
             over = motions(only=asked.only)

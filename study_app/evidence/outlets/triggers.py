@@ -45,7 +45,7 @@ class _VirtualPort:
     def __init__(self) -> None:
         if not hasattr(os, "openpty"):
             raise StudyError(
-                "this system does not provide virtual ports: give the address of a real one, such as serial:COM3"
+                "this system does not provide virtual ports: specify the address of a real one, such as serial:COM3"
             )
         import tty  # noqa: PLC0415 - not on Windows
 

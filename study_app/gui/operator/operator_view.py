@@ -392,7 +392,7 @@ def _incomplete_recording_sentences(session: Session, progress: Progress, now: M
     """Return a sentence for every trial whose recording lacks samples, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"Recording of {labels[number]} lacks {grouped(count)} samples: the disk does not keep up"
+        f"Recording of {labels[number]} lacks {grouped(count)} samples: the disk is too slow"
         for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
     )
 

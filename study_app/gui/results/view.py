@@ -224,7 +224,7 @@ class _SessionsCard(Card):
         self.details = IconButton("file", "Details of the selected session", size=36, role="plain")
         self.details.setEnabled(False)
         self.details.clicked.connect(self.rows.open_chosen)
-        tip = "What has changed in the study since the selected session"
+        tip = "Changes in the study since the selected session"
         self.version = IconButton("designer", tip, size=36, role="plain")
         self.version.setEnabled(False)
         self.version.clicked.connect(self.rows.ask_for_version)
@@ -324,7 +324,7 @@ class _ExclusionsCard(Card):
         why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
         now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
         by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at.astimezone(now.tzinfo), now)}")
-        by = f"Proposed by the rule “{by.replace('_', ' ')}”, not decided" if proposed else by
+        by = f"Proposed by the rule “{by.replace('_', ' ')}”, not yet decided" if proposed else by
         who = label(by, "small", "text2")
         vbox(hbox((what, 1), *buttons), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
         made.setAccessibleName(f"{exclusion_text(exclusion)}: {exclusion.reason} ({by})")
@@ -594,8 +594,8 @@ class ResultsPlace(Place):
             self,
             self.theme,
             f"Export {self._study_name()}",
-            "Answers, trials and counts of all participants as CSV, with a codebook that explains every column."
-            f"{self._code_note()}",
+            "The answers, trials and counts of all participants as CSV files, with a codebook that explains every "
+            f"column.{self._code_note()}",
             go_on="Export",
             to=self.results.resolve().parent / f"{self._study_name()}-tables",
             extras=extras,
@@ -608,8 +608,8 @@ class ResultsPlace(Place):
             self,
             self.theme,
             f"Report of {self._study_name()}",
-            "One page with figures, tests and conclusions, and every number, table and figure as a file. Large studies "
-            f"take some minutes.{self._code_note()}",
+            "One page with figures, tests and conclusions, and every number, table and figure as a file. A large study "
+            f"takes some minutes.{self._code_note()}",
             go_on="Write the report",
             to=self.results.resolve().parent / f"{self._study_name()}-report",
             opens_file=True,

@@ -28,7 +28,7 @@ Index = QModelIndex | QPersistentModelIndex
 CHIP_ROLE = Qt.ItemDataRole.UserRole + 1
 """Tone, icon and word of a chip, in place of the text."""
 BELOW_ROLE = Qt.ItemDataRole.UserRole + 2
-"""A word in small letters below the text or chip."""
+"""A word in lowercase letters below the text or chip."""
 CARE_ROLE = Qt.ItemDataRole.UserRole + 3
 """Whether the row is tinted because it needs care."""
 

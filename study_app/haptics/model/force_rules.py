@@ -92,7 +92,7 @@ def rules_from(described: Mapping[str, Any]) -> ForceRules:
     version = described.get("force_rules", 1)
     if version not in VERSIONS:
         raise StoreError(
-            f"the receipt states force rules {version!r}, this version knows 1 to {FORCE_RULES}: use a newer version "
-            "of liquid-study"
+            f"the receipt states force rules {version!r}, but this version knows only 1 to {FORCE_RULES}: use a newer "
+            "version of liquid-study"
         )
     return VERSIONS[version]

@@ -76,7 +76,7 @@ LIMITERS: Final = (
         bit=LIMITER_NON_FINITE,
         name="non_finite",
         label="Non-finite force",
-        meaning="a force that was not finite was replaced by zero",
+        meaning="a force that was not finite was replaced with zero",
     ),
     _Limiter(bit=LIMITER_STOP, name="stop", label="Force stopped", meaning="the force was stopped", expected=True),
     _Limiter(
@@ -176,7 +176,9 @@ _FORCE: Final = partial(_VECTOR, unit="N", step=FORCE_STEP_N)
 _CODE: Final = partial(SampleField, stored=np.int32)
 
 SAMPLE_FIELDS: Final = (
-    SampleField("tick", "Number of the servo's tick since its start; gaps are lost samples.", stream="tick"),
+    SampleField(
+        "tick", "Tick number, counted from the start of the servo; missing numbers are lost samples.", stream="tick"
+    ),
     SampleField("time_ns", "Time at which the device was read, on the servo's clock.", unit="ns"),
     SampleField(
         "lateness_ns",

@@ -70,16 +70,18 @@ def read_motion(path: Path) -> Motion:
         refuse_device(path)
         table = split(decoded(path.read_bytes()), PLACES + VELOCITIES)
     except OSError as error:
-        raise StudyError(f"cannot read the motion {path}: {error.strerror}; give a CSV file with {_HEADER}") from error
+        raise StudyError(
+            f"cannot read the motion {path}: {error.strerror}; specify a CSV file with {_HEADER}"
+        ) from error
     except ValueError as error:
-        raise StudyError(f"cannot read the motion {path}: {error}; give a CSV file with {_HEADER}") from error
+        raise StudyError(f"cannot read the motion {path}: {error}; specify a CSV file with {_HEADER}") from error
     header = table.names
     if header not in {PLACES, PLACES + VELOCITIES}:
         permitted = f"the first line must be {','.join(PLACES)}, optionally followed by {','.join(VELOCITIES)}"
         columns = ",".join(header)[:SHOWN] or "nothing"
         raise ProtocolError(str(path), (Problem("header", f"is {columns}; {permitted}", line=1),))
     if not table.lines:
-        raise ProtocolError(str(path), (Problem("rows", "there are none", hint="give at least one"),))
+        raise ProtocolError(str(path), (Problem("rows", "there are none", hint="specify at least one"),))
     rows = _numbers(path, table.lines, len(header))
     return Motion(rows[:, 0], rows[:, 1:4], velocity_mps=rows[:, 4:] if len(header) > len(PLACES) else None)
 
@@ -95,7 +97,7 @@ def refuse_device(path: Path) -> None:
         The system cannot say what it is.
     """
     if path.is_char_device():
-        raise StudyError(f"cannot read {path}: it is a device, which may never end; give a CSV file")
+        raise StudyError(f"cannot read {path}: it is a device, which may never end; specify a CSV file")
 
 
 def _numbers(path: Path, lines: tuple[Line, ...], columns: int) -> Floats:

@@ -177,20 +177,21 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
     scene = _for_device(scene, dynamics)
     if len(scene.liquids) > len(model.liquids):
         raise StudyError(
-            f"the scene needs {len(scene.liquids)} liquids; the model was packed with room for {len(model.liquids)}: "
-            "pack it with a capacity"
+            f"the scene needs {len(scene.liquids)} liquids, but the model was packed for {len(model.liquids)}: pack it "
+            "with a larger capacity"
         )
     if scene.link.acts and len(model.forces_n) == 0:
         raise StudyError(
-            "the scene delays its force; the model was packed without room for that: pack it with a capacity"
+            "the scene delays its force, but the model was packed without room for delayed forces: pack it with a "
+            "capacity"
         )
     rows = _rows_needed(scene)
     for kind in KINDS:
         for name in kind.arrays:
             if rows[name] > len(getattr(model.rows, name)):
                 raise StudyError(
-                    f"the scene needs {rows[name]} {kind.noun}; the model was packed with room for "
-                    f"{len(getattr(model.rows, name))}: pack it with a greater capacity"
+                    f"the scene needs {rows[name]} {kind.noun}, but the model was packed for "
+                    f"{len(getattr(model.rows, name))}: pack it with a larger capacity"
                 )
     _fill(model, scene, _by_delay(scene, dynamics, CURRENT), dynamics, CURRENT)
 

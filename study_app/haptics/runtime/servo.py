@@ -133,8 +133,8 @@ class Servo:
     def _present(self, scene: Scene, *, goes_on: bool) -> int:
         if scene.rate_hz != self.rate_hz:
             raise StudyError(
-                f"the scene is made for {scene.rate_hz:g} Hz but the servo runs at {self.rate_hz:g} Hz: "
-                "give both the same rate_hz"
+                f"the scene is made for {scene.rate_hz:g} Hz but the servo runs at {self.rate_hz:g} Hz: set the same "
+                "rate_hz for both"
             )
         needed = elements_needed(scene)
         if needed > self.elements:

@@ -155,8 +155,8 @@ def _parameter_warnings(
             yield f"{it.name} does not change the {problem.compared}: {it.value:g} is its initial value"
         elif z[k] - problem.least[k] < near or problem.most[k] - z[k] < near:
             yield (
-                f"{it.name} ended at the edge of its range, {values[k]:.6g}{_edge_reason(problem, k, z)}: the best "
-                "value may lie beyond, and the intervals ignore the edge"
+                f"{it.name} reached the end of its range, {values[k]:.6g}{_edge_reason(problem, k, z)}: the best value "
+                "may lie beyond it, and the intervals do not allow for this limit"
             )
         elif k not in paired and half[k] > (
             math.log(_VAGUE) if coordinate(it).relative is False else abs(problem.u(z)[k]) / _VAGUE
@@ -170,5 +170,5 @@ def _edge_reason(problem: Problem, k: int, z: Floats) -> str:
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
         return f" (no less than {NO_LESS_THAN[it.field]})"
     if it.whole and z[k] > problem.least[k]:
-        return " (at most the scaling and the duration of the measurement)"
+        return " (it cannot exceed the scaling or the duration of the measurement)"
     return ""

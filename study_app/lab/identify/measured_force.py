@@ -102,9 +102,9 @@ def read(path: Path) -> Measured | FlowCurve:
         refuse_device(path)
         table = split(decoded(path.read_bytes()), {name for names in _COLUMNS for name in names}, comment="#")
     except OSError as error:
-        raise StudyError(f"cannot read {path}: {error.strerror}; give a CSV file with {_HEADER}") from error
+        raise StudyError(f"cannot read {path}: {error.strerror}; specify a CSV file with {_HEADER}") from error
     except ValueError as error:
-        raise StudyError(f"cannot read {path}: {error}; give a CSV file with {_HEADER}") from error
+        raise StudyError(f"cannot read {path}: {error}; specify a CSV file with {_HEADER}") from error
     names = max(_COLUMNS, key=lambda names: len({*names} & {*table.names}) / len(names))
     if names == PLACES + _FORCES and {*VELOCITIES} <= {*table.names}:
         names += VELOCITIES
@@ -113,7 +113,7 @@ def read(path: Path) -> Measured | FlowCurve:
     if twice := [name for name in names if table.names.count(name) > 1]:
         raise StudyError(f"{path} has two columns {twice[0]}: remove one of them")
     if not table.lines:
-        raise StudyError(f"{path} has a header but no rows: add one row for each measured moment")
+        raise StudyError(f"{path} has a header but no rows: add one row for each sample")
     try:
         rows = rows_of(table, [table.names.index(name) for name in names])
     except ValueError as error:

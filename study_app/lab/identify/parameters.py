@@ -52,12 +52,12 @@ def find_parameters(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple
     """
     tables = dict(_tables(scene, _liquid(scene, liquid_id)))
     if not names:
-        raise StudyError("give at least one parameter to fit, such as drag_coefficient")
+        raise StudyError("specify at least one parameter to fit, such as drag_coefficient")
     parameters = tuple(_parameter(tables, name) for name in names)
     for k, parameter in enumerate(parameters):
         for other in parameters[:k]:
             if (parameter.table, parameter.field) == (other.table, other.field):
-                raise StudyError(f"{other.name} and {parameter.name} are the same parameter: give it once")
+                raise StudyError(f"{other.name} and {parameter.name} are the same parameter: specify it once")
     return tuple(_narrow_range(it, tables[it.table], parameters) for it in parameters)
 
 
@@ -124,7 +124,7 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
             value = getattr(tables[table], field)
             if value is None:
                 raise StudyError(
-                    f"the scene does not contain an initial value of {name}: give one with --set {name}=VALUE"
+                    f"the scene does not contain an initial value of {name}: specify one with --set {name}=VALUE"
                 )
             return Parameter(
                 name=name,

@@ -164,7 +164,7 @@ def _check_liquids(parts: Draft) -> Iterator[Fault]:
         )
         if parts.scene is not None and len({parts.liquids[liquid].body_in(parts.scene) for liquid in known}) > 1:
             message = "its liquids have different balls, but one ball moves through all of them"
-            yield Fault(place, message, "give them the same body")
+            yield Fault(place, message, "use the same ball for all of them")
         if len(condition.liquids) > MAX_LIQUIDS:
             yield Fault(place, f"has {len(condition.liquids)} liquids", f"at most {MAX_LIQUIDS}")
         for liquid in known:

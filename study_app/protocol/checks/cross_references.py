@@ -127,7 +127,7 @@ def check_sequences(document: Document) -> Iterator[Fault]:
             path = (*place, index)
             yield from _unknown_name(path, name, "page or block", {*pages, *blocks, *forms})
             if name in blocks and name in seen:
-                yield Fault(path, f'block "{name}" occurs twice', "give the block repetitions")
+                yield Fault(path, f'block "{name}" occurs twice', "set repetitions in the block instead")
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
                 yield Fault(("questionnaires", name), f"a {other} has this name too", apart)
@@ -161,7 +161,7 @@ def check_items(document: Document) -> Iterator[Fault]:
         if (path[1], name) in seen:
             yield Fault(path, f'a second item "{name}" in this questionnaire', "every item needs its own ID")
         elif statements.setdefault(name, text) != text:
-            yield Fault(path, f'item "{name}" has another text in another questionnaire', "give it another id")
+            yield Fault(path, f'item "{name}" has a different text in another questionnaire', "use another ID")
         seen.add((path[1], name))
 
 
@@ -235,7 +235,7 @@ OWN = ("sequence", "sequences")
 def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Check that there are several groups, and that every block and every sequence is used."""
     if all(key in document for key in OWN):
-        yield Fault(("sequences",), "give either sequence or sequences")
+        yield Fault(("sequences",), "specify either sequence or sequences")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
         if value_at(document, ASSIGNMENT) == "pre-existing":
@@ -345,6 +345,6 @@ def _check_permitted_answers(place: Path, rule: ShowIf, earlier: Question, conte
         if levels and str(value) not in levels:
             yield Fault(place, f'"{value}" is not one of its answers', f"these are: {', '.join(levels)}")
         elif earlier.value_type != "text" and isinstance(value, str):
-            yield Fault(place, f'"{value}" is not one of its answers', "give a number")
+            yield Fault(place, f'"{value}" is not one of its answers', "specify a number")
     if not rule.permitted and earlier.value_type == "text":
         yield Fault(place, f'the answer to "{rule.item}" is not a number', 'write is = "…"')

@@ -122,7 +122,7 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
             yield Fault(
                 (*place, "design"),
                 "has one interval, so there is nothing to compare",
-                'give stimulus = "…" instead of conditions',
+                'specify stimulus = "…" instead of conditions',
             )
         return
     if design.has_standard and standards_of(protocol, block) == (None,):
@@ -309,7 +309,7 @@ def _check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault
     if block.stimulus is None:
         if design.adjusts:
             message = "adjusts a parameter, but the block does not vary one"
-            yield Fault((*place, "design"), message, 'give stimulus = "…" instead of conditions')
+            yield Fault((*place, "design"), message, 'specify stimulus = "…" instead of conditions')
     elif design.adjusts and not method_of(protocol, block).adjusts:
         yield Fault(
             (*place, "method"), f'levels of "{block.design}" are set by the participant', 'method = "adjustment"'

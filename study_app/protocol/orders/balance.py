@@ -89,7 +89,7 @@ def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
     match = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
     if match is None:
         raise StudyError(
-            f"{first!r} cannot be the first participant: give letters and digits that end in a number, such as P061"
+            f"{first!r} cannot be the first participant: specify letters and digits that end in a number, such as P061"
         )
     return tuple(f"{match[1]}{int(match[2]) + more:0{len(match[2])}d}" for more in range(count))
 

@@ -209,9 +209,9 @@ def protocol_file(name_or_path: str | Path) -> Path:
                 return file
         raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, known_protocols()))
     if path.is_dir():
-        raise _not_found(name_or_path, "is a folder, not a protocol file", "give one of the .toml files in it")
+        raise _not_found(name_or_path, "is a folder, not a protocol file", "specify one of the .toml files in it")
     if path.exists():
-        raise _not_found(name_or_path, "is a pipe or a device, not a protocol file", "give a .toml file")
+        raise _not_found(name_or_path, "is a pipe or a device, not a protocol file", "specify a .toml file")
     raise _not_found(name_or_path, "no such file", f"or a name: {', '.join(shipped())}")
 
 

@@ -54,10 +54,10 @@ class Fault(NamedTuple):
 
 
 _PATTERNS = {
-    r"^[a-z][a-z0-9_]*$": "small letters, digits and underscores, a letter first",
-    r"^[a-z0-9][a-z0-9_]*$": "small letters, digits and underscores",
-    r"^[a-z][a-z0-9]*$": "small letters and digits, a letter first, no underscore",
-    r"^[a-z]{2}$": "a language of two small letters, such as en",
+    r"^[a-z][a-z0-9_]*$": "lowercase letters, digits and underscores, a letter first",
+    r"^[a-z0-9][a-z0-9_]*$": "lowercase letters, digits and underscores",
+    r"^[a-z][a-z0-9]*$": "lowercase letters and digits, a letter first, no underscore",
+    r"^[a-z]{2}$": "a language of two lowercase letters, such as en",
     r"^[A-Z]$": "one capital letter",
     r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$": "tank, camera, or a file such as film.mp4",
     r"^[0-9A-Za-z.+-]+$": "letters, digits, dots, plus and minus",

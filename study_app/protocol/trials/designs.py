@@ -75,9 +75,8 @@ class Design(Table):
     )
     feedback: _Feedback | None = Field(
         default=None,
-        description="never: the participant does not see whether an answer was correct; practice: only in "
-        "practice, the default; always: after every answer. If no answer can be correct, the "
-        "default is never.",
+        description="When the participant sees whether an answer was correct. practice (default): only in practice; "
+        "always: after every answer; never: not at all. If no answer can be correct, the default is never.",
     )
     feedback_s: Annotated[float, within(0.2, 10, "people need 0.2 s to see a sign")] = Field(
         default=0.6, description="How long the feedback is shown [s]."

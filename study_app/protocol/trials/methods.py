@@ -195,7 +195,7 @@ Trials = Annotated[int, within(1, 1000, "participants do not answer more in one 
 class _Adaptive(Method):
     """A method that chooses each level from the answers to the levels before."""
 
-    trials: Trials = Field(default=60, description="Maximum number of trials per standard, divided among its tracks.")
+    trials: Trials = Field(default=60, description="Maximum number of trials per standard, divided among the tracks.")
     begin: Annotated[tuple[float, ...], Field(max_length=4)] | float | None = Field(
         default=None, description="The first level, or the first level of each track."
     )
@@ -510,7 +510,8 @@ class UpDown(_Adaptive):
         ),
     )
     ratio: Annotated[float, Field(gt=0, le=10)] | None = Field(
-        default=None, description="Ratio of step down to step up; default: García-Pérez' value for the rule."
+        default=None,
+        description="Ratio of the step down to the step up; default: the value of García-Pérez for the rule.",
     )
     average: Annotated[int, Field(ge=2, le=100)] = Field(
         default=8, description="Maximum number of last reversals to average."

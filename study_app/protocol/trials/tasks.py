@@ -230,9 +230,11 @@ class Reach(Task):
     radius_mm: Radius = Field(description="Radius of a target [mm].")
     dwell_s: float = Field(ge=0, le=10, description="How long the ball must stay in the lit target [s].")
     count: int | None = Field(
-        default=None, ge=1, le=1000, description=("Number of targets to reach; alternatively give duration_s.")
+        default=None, ge=1, le=1000, description=("Number of targets to reach; alternatively specify duration_s.")
     )
-    duration_s: Seconds | None = Field(default=None, description="Duration of the task [s]; alternatively give count.")
+    duration_s: Seconds | None = Field(
+        default=None, description="Duration of the task [s]; alternatively specify count."
+    )
     timeout_s: Seconds = Field(default=120, description="Time after which the task ends in any case [s].")
     instruction: Localised = Field(description="One sentence shown under the tank.")
 

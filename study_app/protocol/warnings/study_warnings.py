@@ -128,8 +128,8 @@ def _practised_liquids(protocol: Protocol) -> Iterator[str]:
         for name in used[block.id]:
             if name in judged:
                 yield (
-                    f"practice {block.id} is in {name}, which block {judged[name]} presents too: participants "
-                    "then know it from practice"
+                    f"practice block {block.id} presents {name}, and so does block {judged[name]}: participants then "
+                    "know it from practice"
                 )
 
 
@@ -164,7 +164,7 @@ def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Itera
     if block.catch is not None and not track.catch:
         share = math.ceil(100 / track.slots) / 100
         yield (
-            f"blocks.{block.id}.catch.share: {block.catch.share:g} of {track.slots} trials is less than one "
+            f"blocks.{block.id}.catch.share: a share of {block.catch.share:g} of {track.slots} trials is less than one "
             f"catch trial; choose {share:g}"
         )
     if design.feedback == "always" and protocol.study.blinding == "double":

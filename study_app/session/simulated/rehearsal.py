@@ -377,7 +377,7 @@ class RehearsedSession(SimulatedParticipant):
             return operator.index(given)  # type: ignore[arg-type]  # of numpy, too
         except TypeError:
             raise SessionError(
-                f"{given!r} is not a valid number of steps: give a whole number, or 0 to leave the level unchanged"
+                f"{given!r} is not a valid number of steps: specify a whole number, or 0 to leave the level unchanged"
             ) from None
 
     def look(self, senses: SensedTrial) -> TankView | None:

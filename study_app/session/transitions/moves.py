@@ -307,7 +307,7 @@ def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
 def end_stalled_session(state: SessionState, _event: EndRequested) -> Result:
     """End without a line in the journal: the session stays unfinished; pending writes are still tried."""
     if state.over:
-        raise SessionError("the session is over; its last lines are still to be written to the disk")
+        raise SessionError("the session is over, but its last lines have not been written to the disk yet")
     ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))
     return ended, (show_page(ended),)
 

@@ -121,7 +121,7 @@ def initial_state(
         known = ", ".join(protocol.study.languages)
         raise SessionError(f"language {language!r}: {protocol.study.name} is available in {known}; choose one of these")
     if not secret and any(block.design is not None for block in protocol.blocks.values()):
-        raise SessionError("the levels of this study are drawn from the sealed key: its secret is required")
+        raise SessionError("the levels of this study are drawn from the sealed key: the secret of the key is required")
     return SessionState(plan=Plan(protocol, schedule, key, language, start, secret))
 
 

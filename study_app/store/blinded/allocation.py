@@ -232,7 +232,7 @@ def check_choice(
     permitted = ", ".join(protocol.groups)
     if protocol.asks_group and group is None and own is None:
         raise StudyError(
-            f"group is missing: {name} has pre-existing groups; give --group with the group of {participant}: "
+            f"group is missing: {name} has pre-existing groups; specify --group with the group of {participant}: "
             f"{permitted}"
         )
     if group is not None and group not in protocol.groups:
@@ -240,7 +240,9 @@ def check_choice(
     if protocol.asks_group and own is not None and own.group not in protocol.groups:
         raise StudyError(f"participant {participant} is recorded in group {own.group}, which {name} no longer has")
     if own is not None and group not in (None, own.group):
-        raise StudyError(f"participant {participant} is recorded in group {own.group}, not {group}; give {own.group}")
+        raise StudyError(
+            f"participant {participant} is recorded in group {own.group}, not {group}; specify {own.group}"
+        )
     if row_of is not None and protocol.groups:
         _check_replaced(held, participant, own, group=group, row_of=row_of)
 
@@ -252,8 +254,8 @@ def _check_replaced(
     if not _has_counted_places(held):
         if enrolment_number(row_of) is None:
             raise StudyError(
-                f"row of {row_of!r}: an earlier version began this folder, in which the number in the ID "
-                "assigns rows; give an ID with a number, such as P007"
+                f"row of {row_of!r}: an earlier version began this folder, in which the number in the ID assigns rows; "
+                "specify an ID with a number, such as P007"
             )
     elif own is not None:
         if own.replaces != row_of:
@@ -261,7 +263,8 @@ def _check_replaced(
             raise StudyError(f"row of {row_of!r}: participant {participant} replaces {now} since the first session")
     elif replaced is None:
         raise StudyError(
-            f"row of {row_of!r}: this ID does not exist in this folder; give the ID of the participant to be replaced"
+            f"row of {row_of!r}: this ID does not exist in this folder; specify the ID of the participant to be "
+            "replaced"
         )
     elif replaced.group != group:
         raise StudyError(

@@ -137,9 +137,9 @@ def check_conditions(folder: Path, protocol: Protocol) -> None:
 def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -> None:
     if key.tables_hash != _tables_hash(protocol):
         raise StoreError(
-            f"{study.key} was sealed for conditions that differ from this protocol (its liquids, conditions, "
-            "stimuli, blocks or groups were changed): undo that change to continue the study, or give the "
-            "changed protocol another study.name or results folder"
+            f"{study.key} was sealed for conditions that differ from this protocol (its liquids, conditions, stimuli, "
+            "blocks or groups were changed): undo that change to continue the study, or set another study.name, or use "
+            "another results folder, for the changed protocol"
         )
 
 
@@ -162,7 +162,7 @@ def reveal(folder: Path, by: str, reason: str) -> Codes:
     study = StudyFolder(folder)
     if not is_there(study.key) and not study.sessions():
         raise StoreError(
-            f"{folder} is not a study folder ({study.key.name} is missing): give one such as results/rek2024"
+            f"{folder} is not a study folder ({study.key.name} is missing): specify one such as results/rek2024"
         )
     key = verified_key(study)
     record = {"by": by, "reason": reason, "key_hash": key.hash}
@@ -275,7 +275,7 @@ def verified_key(study: StudyFolder) -> Key:
     for session in study.sessions():
         if _published_hash(session) not in {None, key.hash}:
             raise StoreError(
-                f"{study.key} is not the key that {session.path} ran under (its SHA-256 differs from the published): "
+                f"{study.key} is not the key of session {session.path} (its SHA-256 differs from the published): "
                 "restore it from a copy"
             )
     return key
@@ -309,7 +309,7 @@ def read_key(folder: Path) -> Key:
         content = parse_json(base64.b64decode(b"".join(sealed.split()), validate=True))
         if content["format"] not in _FORMATS:
             raise StoreError(
-                f"{path} has format {content['format']!r}, this version reads 1 and 2: use a newer version of "
+                f"{path} has format {content['format']!r}, but this version reads 1 and 2: use a newer version of "
                 "liquid-study"
             )
         _check_content(content)

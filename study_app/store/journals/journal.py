@@ -189,7 +189,7 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
     """
     first, hash_before = line["n"] == 1, line.get("previous")
     if first and line.get("format", 1) > FORMAT:
-        return f"has format {line['format']}, this version reads {FORMAT}: use a newer version of liquid-study"
+        return f"has format {line['format']}, but this version reads {FORMAT}: use a newer version of liquid-study"
     if first and "format" not in line and "measures_sealed" in line:  # not of a version with format 1
         return "lacks format: it was changed; restore it from a copy"
     if hash_before is None:

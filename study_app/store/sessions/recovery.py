@@ -296,7 +296,7 @@ def _read_interrupted(study_folder: StudyFolder, folder: SessionFolder, protocol
     place = Place(study_folder, folder, start.study)
     first = receipt.read(folder.receipt)
     if receipt.has_other_format(first, start):
-        raise StoreError(f"{folder.journal} has another format than its receipt states: restore it from a copy")
+        raise StoreError(f"{folder.journal} has a different format from the one in its receipt: restore it from a copy")
     _refuse_truncated_journal(place, contents.lines)
     _same_protocol(place, first, start, protocol, source)
     draw = stream(start.seed, "blinding").random if start.simulated else None

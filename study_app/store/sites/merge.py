@@ -118,7 +118,7 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
 
 def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
     if not given:
-        raise StoreError("sites are missing: give each as A=DIR")
+        raise StoreError("sites are missing: specify each as A=DIR")
     used = {} if merged is None else {name.lower(): name for name in merged.names}
     for name in given:
         if not ID_PATTERN.fullmatch(name) or len(name) > _MAX_SITE_LENGTH:
@@ -137,16 +137,16 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
 def _check_places(given: Mapping[str, Path], to: Path, merged: Merged | None) -> None:
     target = to.resolve()
     if merged is None and is_there(to) and (not to.is_dir() or _entries(to)):
-        raise StoreError(f"{to} is not a merged study and is not empty: give a new folder with --to")
+        raise StoreError(f"{to} is not a merged study and is not empty: specify a new folder with --to")
     for above in (target, *target.parents):
         if described_study(StudyFolder(above)) is not None:
-            raise StoreError(f"{to} is, or lies within, the results folder {above}: give a folder outside it")
+            raise StoreError(f"{to} is, or lies within, the results folder {above}: specify a folder outside it")
     for name, path in given.items():
         if read_merged(path) is not None or merged_above(path) is not None:
-            raise StoreError(f"site {name}: {path} belongs to a merged study: give the folder of the site itself")
+            raise StoreError(f"site {name}: {path} belongs to a merged study: specify the folder of the site itself")
         place = path.resolve()
         if place.is_relative_to(target):
-            raise StoreError(f"site {name}: {path} lies within {to}: give a folder outside it with --to")
+            raise StoreError(f"site {name}: {path} lies within {to}: specify a folder outside it with --to")
 
 
 def _read_source(name: str, path: Path) -> _Source:
@@ -155,8 +155,8 @@ def _read_source(name: str, path: Path) -> _Source:
     described = described_study(study)
     if described is None:
         raise StoreError(
-            f"site {name}: {path} is not the results folder of a study ({study.description.name} is missing): "
-            "give one such as results/rek2024"
+            f"site {name}: {path} is not the results folder of a study ({study.description.name} is missing): specify "
+            "one such as results/rek2024"
         )
     refuse_special_files(path.resolve())
     try:
@@ -171,7 +171,7 @@ def _read_source(name: str, path: Path) -> _Source:
     hashes = dict.fromkeys(str(held["protocol_hash"]) for held in receipts)
     if len(hashes) > 1:
         raise StoreError(
-            f"site {name}: sessions in {path} ran under {len(hashes)} protocols (SHA-256 {', '.join(hashes)}): "
+            f"site {name}: sessions in {path} used {len(hashes)} different protocols (SHA-256 {', '.join(hashes)}): "
             "only sites with exactly the same protocol can be merged"
         )
     return _Source(
@@ -215,7 +215,7 @@ def _check_sessions(sources: tuple[_Source, ...]) -> None:
         for begun, path in source.begun.items():
             if (other := seen.get(begun)) is not None:
                 raise StoreError(
-                    f"{path} is a copy of {other}, so its data would be counted twice: give only one of the two folders"
+                    f"{path} is a copy of {other}, so its data would be counted twice: use only one of the two folders"
                 )
             seen[begun] = path
 

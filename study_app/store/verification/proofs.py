@@ -70,7 +70,7 @@ def read_proof(path: Path) -> Proof:
         lines.
     """
     if not path.is_file():
-        raise StoreError(f"{path} is not a file: give a copy of a study's fingerprints.txt")
+        raise StoreError(f"{path} is not a file: specify a copy of a study's fingerprints.txt")
     text = (read_if_there(path) or b"").decode("utf-8-sig", "replace").replace("\r\n", "\n")
     above, told = "", list[str]()
     for number, line in enumerate(text.splitlines(keepends=True), start=1):

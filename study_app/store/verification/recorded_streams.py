@@ -82,7 +82,7 @@ def _read(file: Path) -> list[Any]:
         raise StoreError("reading an XDF file needs pyxdf: pip install 'liquid-study[lsl]'") from error
     logging.getLogger("pyxdf").setLevel(logging.CRITICAL)
     if not file.is_file():
-        raise StoreError(f"{file} is not a file: give --xdf a recording, for example from LabRecorder")
+        raise StoreError(f"{file} is not a file: specify a recording with --xdf, for example from LabRecorder")
     try:
         with gzip.open(file) if file.suffix in {".gz", ".xdfz"} else file.open("rb") as opened:
             streams, _ = pyxdf.load_xdf(opened, synchronize_clocks=False, dejitter_timestamps=False)

@@ -46,7 +46,7 @@ def reproduce_session(session_folder: Path) -> Reproduced:
     study, folder = locate_session(session_folder)
     ran, lines, key = receipt.read(folder.receipt), journal.read(folder.journal), read_key(study.path)
     if key.hash != ran["key_hash"]:
-        raise StoreError(f"{study.key} is not the key that {folder.path} ran under: restore it from a copy")
+        raise StoreError(f"{study.key} is not the key of session {folder.path}: restore it from a copy")
     if lacking := [name for name in receipt.FIELDS if name not in ran]:
         raise StoreError(f"{folder.receipt} lacks {', '.join(lacking)}: restore it from a copy")
     seed, participant = ran["seed"], ran["participant"]
@@ -163,7 +163,7 @@ class _Compared:
             follows, wrong = bool(line.items) and line.items[0].value == sum(steps), "the answer is not the sum of its"
         else:
             follows = set_to == setting.level(setting.reached(steps))
-            wrong = "the interval ended at another setting than follows from its"
+            wrong = "the interval ended at a setting that does not follow from its"
         if not follows:
             self.differences.append(f"trial {which[0]}, attempt {which[1]}: {wrong} steps")
         self._note(block, which[0], follows)

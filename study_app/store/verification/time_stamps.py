@@ -42,7 +42,7 @@ def request_stamp(lines: str, server: str) -> str:
     client = optional_library("rfc3161_client")
     request = client.TimestampRequestBuilder().data(lines.encode()).build()
     if not server.startswith(("http://", "https://")):
-        raise StoreError(f"{_without_login(server)} is not a time-stamp server: give a URL such as {_EXAMPLE}")
+        raise StoreError(f"{_without_login(server)} is not a time-stamp server: specify a URL such as {_EXAMPLE}")
     answers = queue.SimpleQueue[bytes | Exception]()
     threading.Thread(target=_post_request, args=(server, request.as_bytes(), answers), daemon=True).start()
     try:
@@ -106,7 +106,9 @@ def checked_stamp(path: Path, lines: str, token: str) -> str:
     """Return a text with the time of a file's stamp; raise StoreError if the stamp does not match its lines."""
     client = optional_library("rfc3161_client")
     if workstation.load_or_default()[0].stamp_root is None:
-        raise StoreError(f"{path} is stamped: give the server's root certificate, liquid-study proof --root FILE")
+        raise StoreError(
+            f"{path} is stamped: specify the server's root certificate with liquid-study proof --root FILE"
+        )
     try:
         answer = _verify_stamp(base64.b64decode(token), lines)
     except (client.VerificationError, ValueError, OSError) as error:

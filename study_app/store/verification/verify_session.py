@@ -285,7 +285,8 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
         findings.error(path, "its protocol was changed: restore it from a copy")
     if receipt.has_other_format(held, start):
         findings.error(
-            folder.journal, f"has another format than {path.name} states: it was changed; restore it from a copy"
+            folder.journal,
+            f"has a different format from the one in {path.name}: it was changed; restore it from a copy",
         )
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:

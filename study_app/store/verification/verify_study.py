@@ -101,7 +101,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     name = described_study(study)
     if name is None:
         raise StoreError(
-            f"{folder} is not a study folder ({study.description.name} is missing): give one such as results/rek2024"
+            f"{folder} is not a study folder ({study.description.name} is missing): specify one such as results/rek2024"
         )
     key = None
     with findings.reading(study.key):
@@ -320,7 +320,9 @@ def _check_copy(
     for session in sessions:
         if session.fingerprint and not session.running and place_of(study, session.place.folder) not in known:
             lacks = f"(its fingerprint is {session.fingerprint}) is not in {path}"
-            findings.error(session.place.folder.path, f"{lacks}: it was added, or ended, after that copy was made")
+            findings.error(
+                session.place.folder.path, f"{lacks}: the session was added or ended after that copy was made"
+            )
 
 
 def _with_study_spelling(lines: Proofs, participants: Iterable[str], recorded: Proofs) -> Proofs:
@@ -341,11 +343,11 @@ def _compare_proofs(
             continue
         session, path = by_place.get(place), study.path / place
         if session is None:
-            findings.error(path, f"is missing, but {name} lists it: it was deleted after it had ended")
+            findings.error(path, f"is missing, but {name} lists it: the session was deleted after its end")
             continue
         if proof != session.fingerprint:
             now = f"its fingerprint is {session.fingerprint}" if session.fingerprint else "it no longer has an end"
-            findings.error(path, f"is not the session that {name} lists as {proof}: it was changed ({now})")
+            findings.error(path, f"is not the session that {name} lists as {proof}: it has been changed ({now})")
 
 
 def _check_description(study: StudyFolder, findings: Findings) -> None:

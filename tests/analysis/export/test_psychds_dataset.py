@@ -93,7 +93,7 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
     digest = hashlib.sha256(FOOTAGE).hexdigest()
     footage = tmp_path / "protocols" / "waves.mp4"
     for change, why in (
-        (lambda: footage.write_bytes(b"other waves"), "the file of this name has another SHA-256"),
+        (lambda: footage.write_bytes(b"other waves"), "the file with this name has a different SHA-256"),
         (footage.unlink, "cannot be read: No such file or directory"),
     ):
         change()

@@ -104,9 +104,9 @@ def test_engine_dask_and_its_variable_are_other_words_for_a_cluster(monkeypatch:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--engine", "dask"), "--engine dask needs a cluster: give --cluster tcp://HOST:8786"),
+        (("--engine", "dask"), "--engine dask needs a cluster: specify --cluster tcp://HOST:8786"),
         (("--workers", "2", "--cluster", "tcp://lab1:8786"), "--workers and --cluster cannot be combined"),
-        (("--workers", "0"), "0 workers cannot compute: give 1 or more"),
+        (("--workers", "0"), "0 workers cannot compute: specify 1 or more"),
         (("--jobs", "-2"), "-2 is not in the range x>=-1"),
         (("--engine", "ray"), "'ray' is not one of 'processes', 'dask'"),
     ],

@@ -125,7 +125,7 @@ def test_trials_are_rounded_to_what_the_method_divides_them_into() -> None:
     two = study(("trials = 20", "trials = 20, tracks = 2"))
     assert list(plans(two, (31,))["thicker"]) == [32]
     assert list(plans(two, ())["thicker"]) == [20]
-    with pytest.raises(AnalysisError, match="give at least 7"):
+    with pytest.raises(AnalysisError, match="specify at least 7"):
         plans(constant, (3,))
     assert plans(load("rek2024"), (30,)) == {}
 
@@ -134,7 +134,7 @@ def test_trials_are_rounded_to_what_the_method_divides_them_into() -> None:
     ("words", "line"),
     [
         (("rek2024", "--trials", "30"), "rek2024 does not have a main block of thresholds"),
-        (("viscosityjnd", "--trials", "0"), "give numbers of trials from 1 to 1000"),
+        (("viscosityjnd", "--trials", "0"), "specify numbers of trials from 1 to 1000"),
         (("viscosityjnd", "--trials", "30,few"), "is not a list of numbers"),
     ],
 )

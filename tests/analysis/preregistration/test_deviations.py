@@ -78,7 +78,7 @@ def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
     content = json.loads(first.receipt.read_text(encoding="utf-8"))
     first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8", newline="\n")
     (line,) = evaluate_block(answered)
-    assert line.startswith("1 session ran under another protocol (version 2) than the preregistered one")
+    assert line.startswith("1 session ran under a protocol (version 2) that differs from the preregistered one")
     assert line.endswith("P001/1")
 
 

@@ -77,9 +77,9 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     assert "(comfortable) falls with the delay." in text
     assert "within ±1 point?" in text
     assert "above chance (water by like_water, honey by like_honey and light_oil by like_oil)?" in text
-    assert "α = 0.05. p values of primary statements (all) are adjusted by Holm" in text
+    assert "α = 0.05. p values of primary statements (all) are Holm-adjusted" in text
     assert "exploratory tests of means require at least 10 participants." in text
-    assert "The number of participants is not decided, and there is no stopping rule." in text
+    assert "The number of participants has not been decided, and there is no stopping rule." in text
     assert "`liquid-study power rek2024 --to DIR`" in text
 
 

@@ -622,7 +622,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # First page: delays
     (rf"Over delays of {R} to {R} ms participants already tend to rate longer delays (.*)\.", trend_is_shown),
     (r"Participants may also notice shorter delays\.", always),
-    (r"Mean ratings need not change\.", always),
+    (r"A trend does not imply that mean ratings change\.", always),
     (r"Agreement increases with the delay, but it is not shown that any single delay is noticed\.",
      when(lambda told: told.block["threshold"]["effect"] is not None)),
     (r"It is not shown that any delay is noticed\.", nothing_noticed),
@@ -739,7 +739,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: any(one["contrast"]["groups"] for one in told.contrasts))),
     (r"Each participant had one number in each comparison\.", when(lambda told: bool(told.contrasts))),
     (r"A bootstrap that adds a participant like the most extreme one \(Gaffke 2005\) had to agree: p is the larger of "
-     r"both(?:, adjusted by Holm over (\d+) hypotheses)?\.",
+     r"both(?:, Holm-adjusted across (\d+) hypotheses)?\.",
      lambda match, told: int(match[1] or 1) == len(told.contrasts)),
     (r"Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree(?:, adjusted by Holm "
      r"over (\d+) bounds)?, and requires that the sample is large enough to contain a member of a minority that shifts "
@@ -762,7 +762,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"the effect size is .*\.", family),
     (r"If a statement showed a difference, pairs were compared by Wilcoxon's signed-rank test \(exact; equal pairs "
      r"left "
-     r"out\), with p adjusted by Holm over all pairs of all such statements; the effect size is the matched "
+     r"out\), with p Holm-adjusted across all pairs of all such statements; the effect size is the matched "
      r"rank-biserial correlation\.", when(lambda told: bool(told.block["pairs"]))),
     (r"Participants were taken to have named the liquid whose statement they rated highest; answers with equal highest "
      r"ratings are undecided and count as incorrect\.", when(lambda told: told.block["named"] is not None)),
@@ -770,7 +770,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: told.block["named"] is not None)),
     (r"In addition, a liquid was called recognised only if its name was used for it more often than for each other "
      r"liquid "
-     r"\(McNemar's exact test within participants, one-sided, with p adjusted by Holm over the liquids\)\.",
+     r"\(McNemar's exact test within participants, one-sided, with p Holm-adjusted across the liquids\)\.",
      when(lambda told: told.block["named"] is not None)),
     (r"Trends over the delay were tested by a sign-flip permutation test on the participants' rank correlations of "
      r"answers and delays \(.*\), (one-sided in the direction stated (?:before the first session|by the protocol)|"

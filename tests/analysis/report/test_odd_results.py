@@ -36,7 +36,7 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     results.open()
     study = load_study(results.folder)
     told = methods(study, evaluate(study))
-    both = "p adjusted by Holm over 1 primary statement and by Benjamini-Hochberg over {} exploratory statements"
+    both = "p Holm-adjusted across 1 primary statement and by Benjamini-Hochberg over {} exploratory statements"
     assert both.format("eight") in told
     assert both.format("four") in told
 
@@ -74,7 +74,7 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     report(small.folder, tmp_path / "report")
     told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "in 2 different files); 1 participant lacks a condition, because single trials were excluded. 1 "
+        "in 2 different files); 1 participant lacks a condition, because individual trials were excluded. 1 "
         "excluded session and two excluded trials were excluded from the analysis." in told
     )
     assert (

@@ -143,8 +143,8 @@ def test_new_refuses_to_overwrite(protocols: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (("My study",), "at most 40 small letters and digits"),
-        (("../mine",), "at most 40 small letters and digits"),
+        (("My study",), "at most 40 lowercase letters and digits"),
+        (("../mine",), "at most 40 lowercase letters and digits"),
         (("demo",), "ships with the program"),
         (("mine", "--template", "viscosity-jd"), 'did you mean "viscosity-jnd"'),
     ],

@@ -153,7 +153,7 @@ class TestComingAndGoing:
         [
             ("linux", r"KERNELS==.*uaccess.*udevadm control --reload"),
             ("darwin", "quit 3DconnexionHelper"),
-            ("win32", "close it, and 3DxWare"),
+            ("win32", "close that program and 3DxWare"),
         ],
     )
     def test_one_that_cannot_be_opened_says_what_to_do_on_this_system(self, platform, words, monkeypatch):

@@ -163,7 +163,7 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
 @pytest.mark.parametrize(
     ("names", "said"),
     [
-        ([], "give at least one parameter to fit"),
+        ([], "specify at least one parameter to fit"),
         (["drag_coeficient"], "did you mean 'drag_coefficient'"),
         (["viscosity_pa_s"], "does not contain an initial value of viscosity_pa_s"),
         (["breaking_angle_deg"], "is a threshold"),

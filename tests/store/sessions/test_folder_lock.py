@@ -185,5 +185,5 @@ def test_a_sessions_folder_is_known_from_its_path(tmp_path: Path) -> None:
 def test_other_folders_are_no_sessions(tmp_path: Path, name: str) -> None:
     if name != "gone":
         (tmp_path / name).mkdir(parents=True)
-    with pytest.raises(StoreError, match="is not a session folder: give one such as results/rek2024/data"):
+    with pytest.raises(StoreError, match="is not a session folder: specify one such as results/rek2024/data"):
         locate_session(tmp_path / name)
