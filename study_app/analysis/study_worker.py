@@ -205,13 +205,14 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, _EVALUATION * share))
     send(Proposed(undecided(study, results)))
-    found = chain(pictures(study, results, ("svg",)), summary_pictures(study, results, ("svg",)))
+    numbers = numbers_of(study)
+    found = chain(pictures(study, results, ("svg",)), summary_pictures(study, results, numbers, ("svg",)))
     for number, picture in enumerate(found, start=1):
         drawn.append(picture)
         send(_figure(picture))
         going("drawing", _EVALUATION + (1 - _EVALUATION) * min(1.0, number / 8))
     names = []
-    for place, card in enumerate(cards(results, numbers_of(study))):
+    for place, card in enumerate(cards(results, numbers)):
         figure, answer = card.figure_of(drawn), " ".join(card.sentences)
         if figure is None:
             shown = FigureDrawn(name=f"answer-{place}", title=card.question, caption=answer, verdict=card.verdict)

@@ -14,7 +14,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import Array, quartiles_or_none
@@ -121,6 +120,8 @@ def path_length_m(positions_m: Array) -> float:
 
 def submovements(seconds: Array, positions_m: Array) -> int:
     """Return the number of speed peaks along a path (n, 3) at ``seconds`` (n,); at least 1."""
+    from scipy.signal import butter, find_peaks, sosfiltfilt  # noqa: PLC0415 - 0.2 s of every report without targets
+
     if len(seconds) < _SHORTEST:
         return 1
     rate_hz = (len(seconds) - 1) / (seconds[-1] - seconds[0])

@@ -1,6 +1,6 @@
 """The figures of the first page: hypotheses, estimates of levels, ratings and scores, each with its participants."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -40,6 +40,18 @@ class Estimates(NamedTuple):
     words: str
 
 
+class Numbers(NamedTuple):
+    """A score or a question: each participant's number by the name of each setting.
+
+    ``bounds`` are the ends of its answer scale.
+    """
+
+    title: str
+    bounds: tuple[float, float] | None
+    is_score: bool
+    by_setting: dict[str, dict[str, float]]
+
+
 def estimates_of(result: LevelsResult) -> Estimates | None:
     """Return the estimates that answer a block's question; None if there are none."""
     for statistic, attribute, words in _MEASURES:
@@ -59,14 +71,18 @@ def place_of(one: Any) -> float | str | None:
 
 
 def summary_pictures(
-    study: Study, results: Results, forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
+    study: Study,
+    results: Results,
+    numbers: Mapping[str, Sequence[Numbers]],
+    forms: Sequence[str] = style.FORMATS,
+    failures: Failures | None = None,
 ) -> Iterator[Picture]:
-    """Draw the figures of every hypothesis, of the estimates of blocks of levels, and of scores."""
-    yield from attempted(_pictures(study, results, forms), failures)
+    """Draw the figures of every hypothesis, of the estimates of blocks of levels, and of ``numbers`` (`numbers_of`)."""
+    yield from attempted(_pictures(study, results, numbers, forms), failures)
 
 
 def _pictures(
-    study: Study, results: Results, forms: Sequence[str]
+    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], forms: Sequence[str]
 ) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
     for number, contrast in enumerate(results.contrasts, start=1):
         if any(side.values for side in contrast.sides):
@@ -76,9 +92,9 @@ def _pictures(
         if estimates_of(level) is not None:
             name = f"estimates-{level.block}"
             yield level.block, name, partial(_estimates, study, level, forms, name)
-    for where in numbers_of(study):
+    for where, of_place in numbers.items():
         name = f"answers-{where}"
-        yield where, name, partial(_answers, study, where, forms, name)
+        yield where, name, partial(_answers, study, where, of_place[:MOST_PANELS], forms, name)
 
 
 def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms: Sequence[str], name: str) -> Picture:
@@ -188,18 +204,6 @@ def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: s
     return picture_of(study, result.block, name, title, caption, draw, forms, (f"n = {people}",), numbers)
 
 
-class Numbers(NamedTuple):
-    """A score or a question: each participant's number by the name of each setting.
-
-    ``bounds`` are the ends of its answer scale.
-    """
-
-    title: str
-    bounds: tuple[float, float] | None
-    is_score: bool
-    by_setting: dict[str, dict[str, float]]
-
-
 def numbers_of(study: Study) -> dict[str, list[Numbers]]:
     """Return scores and numeric answers by the place where they were asked, except in blocks of levels."""
     levels = {block.id for block in study.levels}
@@ -247,10 +251,7 @@ def _with_room(low: float, high: float) -> tuple[float, float]:
     return low - 0.06 * (high - low), high + 0.06 * (high - low)
 
 
-def _answers(study: Study, where: str, forms: Sequence[str], name: str) -> Picture | None:
-    found = _numbers_at(study, where)[:MOST_PANELS]
-    if not found:
-        return None
+def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence[str], name: str) -> Picture:
     panels = [
         Panel(
             title=numbers.title,
@@ -260,7 +261,7 @@ def _answers(study: Study, where: str, forms: Sequence[str], name: str) -> Pictu
             ),
             ends=None if numbers.bounds is None else _with_room(*numbers.bounds),
         )
-        for numbers in found
+        for numbers in shown
     ]
     people = len({who for panel in panels for column in panel.columns for who in column.values})
     title = next(question.where.title for question in study.others.questions if question.where.id == where)

@@ -4,6 +4,8 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+import pandas as pd
+
 from study_app.analysis.contrasts import answer, question
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.motion import (
@@ -574,8 +576,10 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
 def _beyond(study: Study, limits: Mapping[str, float]) -> str:
     """Return a sentence on the timing limits that trials violated; "" if there are none."""
     rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
-    records: list[dict[str, Any]] = [dict(row.dropna()) for _, row in rows.iterrows()]
-    broken = [broken_limits(row, limits) for row in records]
+    broken = [
+        broken_limits({str(name): value for name, value in row.items() if pd.notna(value)}, limits)
+        for row in rows.to_dict("records")
+    ]
     if not any(broken):
         return ""
     counts = Counter(limit for one in broken for limit in one)

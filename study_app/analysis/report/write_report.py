@@ -23,7 +23,7 @@ from study_app.analysis.export.table_files import credit_lines, study_head, tabl
 from study_app.analysis.export.tables import deliver
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.question_figures import question_pictures
-from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures
+from study_app.analysis.figures.summary_figures import Numbers, numbers_of, summary_pictures
 from study_app.analysis.findings import FINDINGS, all_findings
 from study_app.analysis.findings.finding import TESTS
 from study_app.analysis.html_page import attempted, box, bullets, chunks, font_face, heading, paragraph, render, table
@@ -290,7 +290,8 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
     drawn = []
-    for picture in _drawn(study, results, failures):
+    numbers = failures.value("numbers of participants", lambda: numbers_of(study), {})
+    for picture in _drawn(study, results, numbers, failures):
         drawn.append(picture)
         progress(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
 
@@ -317,16 +318,19 @@ def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, b
         files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
     files |= failures.value("exported tables", lambda: table_files(study, deliver(study)), {})
-    page_ = _page(study, results, drawn, texts, planned, failures).encode()
-    numbers = document(study, results, texts, failures)
-    return {"report.html": page_, "report.json": numbers, **files}, tuple(failures.found)
+    page_ = _page(study, results, numbers, drawn, texts, planned, failures).encode()
+    return {"report.html": page_, "report.json": document(study, results, texts, failures), **files}, tuple(
+        failures.found
+    )
 
 
-def _drawn(study: Study, results: Results, failures: Failures) -> Iterator[Picture]:
+def _drawn(
+    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], failures: Failures
+) -> Iterator[Picture]:
     yield from pictures(study, results, failures=failures)
     if results.questions:
         yield from question_pictures(study, results.questions, failures=failures)
-    yield from summary_pictures(study, results, failures=failures)
+    yield from summary_pictures(study, results, numbers, failures=failures)
     if results.levels:
         yield from level_pictures(study, results.levels, failures=failures)
 
@@ -346,12 +350,12 @@ def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
 def _page(
     study: Study,
     results: Results,
+    numbers: Mapping[str, Sequence[Numbers]],
     drawn: Sequence[Picture],
     texts: Mapping[str, Any],
     planned: PlannedExclusions | None,
     failures: Failures,
 ) -> str:
-    numbers = failures.value("numbers of participants", lambda: numbers_of(study), {})
     on_first = failures.value("first page, figures", lambda: figures_shown(cards(results, numbers), drawn), set())
     others = [picture for picture in drawn if picture.name not in on_first]
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
