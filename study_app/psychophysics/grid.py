@@ -238,6 +238,8 @@ NEAR_MODE: Final = 2
 so that the mean is too high if few answers are lapses, and thresholds would be too low. [choice]"""
 GROUP_LAPSES: Final = (0.002, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12)
 """The mean lapse rates of a group; each person's is about it as `_lapse_weights` has it."""
+MANY_LAPSES: Final = 0.09
+"""The group's threshold is also given for this mean lapse rate, unless the answers exclude it. [choice]"""
 
 
 def _lapse_weights(lapses: Values, mean: float) -> NDArray[np.float64]:
@@ -273,12 +275,15 @@ class GroupPriors(NamedTuple):
         Mean square error of the mean of the people's thresholds that is due to what they share [u²].
     below, above : float
         How far the 95 % interval of this error extends below and above [u].
+    if_many_lapses : float or None
+        This error if the mean lapse rate is `MANY_LAPSES`; None if the likelihood ratio excludes that (p < .05).
     """
 
     factors: NDArray[np.float64]
     variance: float
     below: float
     above: float
+    if_many_lapses: float | None
 
 
 def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) -> GroupPriors:
@@ -325,11 +330,17 @@ def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
     order = np.argsort(errors)
     places = np.cumsum(shared[order]) - shared[order] / 2
     low, high = np.interp((0.025, 0.975), places, errors[order])
+    of_lapses = shared.reshape(len(widths), -1)  # (centres, means of lapses)
+    likelihoods, many = of_lapses.sum(axis=0) / group_lapse_weights(), GROUP_LAPSES.index(MANY_LAPSES)
+    excluded = math.log(likelihoods.max() / max(likelihoods[many], 1e-300)) > Z_95**2 / 2
     return GroupPriors(
         factors=np.asarray(factors, float),
         variance=float(shared @ errors**2),
         below=max(0.0, -float(low)),
         above=max(0.0, float(high)),
+        if_many_lapses=None
+        if excluded
+        else float(errors.reshape(of_lapses.shape)[:, many] @ of_lapses[:, many] / of_lapses[:, many].sum()),
     )
 
 

@@ -34,6 +34,13 @@ _CHANGE_WEIGHTS: Final = np.exp(-0.5 * _CHANGES**2)
 """The changes over which a posterior is a mean [SD of the prior], and the prior weight of each."""
 EARLY_TRIALS: Final = 15.0
 """Practice is taken to fade to 1/e in so many trials. [choice]"""
+BURST_TRIALS: Final = 10
+"""People are taken to answer at random for at most so many consecutive trials. [choice]"""
+_BURST_ODDS: Final = 1 / 200
+"""Prior odds that such a burst begins at a trial. [choice]"""
+MOST_CLUSTERED: Final = 0.8
+"""Standard errors by which errors may cluster: at most 5 % of groups as the analysis assumes them exceed it. The fit
+takes up part of every cluster. [choice]"""
 _NEWTON_STEPS: Final = 10
 _STEP: Final = 0.01
 """By so many widths a threshold is moved to differentiate the function."""
@@ -196,10 +203,36 @@ def early_change(fits: Sequence[tuple[PersonFit, Posterior]]) -> float | None:
     The time course decays exponentially over `EARLY_TRIALS`, like practice; scores and information are summed over all
     members, each with his or her own posterior.
     """
-    scores = [
-        _time_score(fit.given, found, fit.shifts, -np.exp(-np.arange(len(fit.shifts)) / EARLY_TRIALS))
-        for fit, found in fits
-    ]
+    return _standard_errors(
+        [
+            _time_score(fit.given, found, fit.shifts, -np.exp(-np.arange(len(fit.shifts)) / EARLY_TRIALS))
+            for fit, found in fits
+        ]
+    )
+
+
+def error_bursts(fits: Sequence[tuple[PersonFit, Posterior]]) -> float | None:
+    """Return by how many standard errors more errors than expected follow errors; None: not known.
+
+    Each error, less what the function expects, is weighted by the probability that the person was answering at random
+    just before. Its variance given the answers before is known, even if these chose the level.
+    """
+    return _standard_errors([_burst_score(fit.given.successes, fit.expected(found), found) for fit, found in fits])
+
+
+def _burst_score(successes: NDArray[np.bool_], psi: Floats, found: Posterior) -> tuple[float, float]:
+    """Return the weighted sum of errors beyond those expected, (n,), and its variance."""
+    guesses, n = found.grid.guesses or (), len(psi)
+    chance, evidence = guesses[0] if len(guesses) == 1 else 0.5, np.zeros(n)
+    ratios = np.log(np.where(successes, chance / psi, (1.0 - chance) / (1.0 - psi)))
+    total = np.concatenate(([0.0], np.cumsum(ratios)))
+    for k in range(1, min(BURST_TRIALS, n)):
+        evidence[k:] += np.exp(total[k:n] - total[: n - k])
+    weights = evidence / (evidence + 1.0 / _BURST_ODDS)
+    return float(weights @ (psi - successes)), float(weights**2 @ (psi * (1.0 - psi)))
+
+
+def _standard_errors(scores: Sequence[tuple[float, float]]) -> float | None:
     score, information = np.sum(scores, axis=0)
     return float(score / math.sqrt(information)) if information else None
 

@@ -41,15 +41,18 @@ from study_app.analysis.wording import counted, listed, number
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
-from study_app.psychophysics.grid import ALIKE, MEAN_LAPSE, NEAR_MODE, GroupPriors, Posterior, group_priors
+from study_app.psychophysics.grid import ALIKE, MANY_LAPSES, MEAN_LAPSE, NEAR_MODE, GroupPriors, Posterior, group_priors
 from study_app.psychophysics.person_fit import (
     BEYOND_CHANCE,
+    BURST_TRIALS,
     CHANGE_PRIOR,
     EARLY_TRIALS,
+    MOST_CLUSTERED,
     PREFERENCE_SD,
     Given,
     PersonFit,
     early_change,
+    error_bursts,
 )
 
 FAMILIES: Final = {"weibull": "Weibull", "normal": "cumulative normal", "logistic": "logistic"}
@@ -75,7 +78,8 @@ class ThresholdEstimate:
     ``change`` that of the threshold from the first to the last trial as a share of it, 0 where none is found,
     ``open_end`` the ends of the interval beyond which the answers do not exclude a threshold, and ``compared`` the
     level at the percentage of successes of the published value, see `compared_percent`. Of the group only threshold and
-    ``compared`` are known, each with its interval, and ``early_change``, see `person_fit.early_change`.
+    ``compared`` are known, each with its interval, ``early_change`` and ``error_bursts``, see `person_fit`, and
+    ``if_many_lapses``, the threshold for `grid.MANY_LAPSES`, None if the answers exclude it.
     """
 
     participant: str | None
@@ -94,6 +98,8 @@ class ThresholdEstimate:
     drift: float | None = None
     change: float | None = None
     early_change: float | None = None
+    error_bursts: float | None = None
+    if_many_lapses: float | None = None
     open_end: str | None = None
     reversal_mean: float | None = None
     target_percent: float | None = None
@@ -105,6 +111,11 @@ class ThresholdEstimate:
     def fits(self) -> bool:
         """Whether the fit is acceptable: simulated answers deviate as much as the observed ones; true if unknown."""
         return self.fit_p is None or self.fit_p >= WORST
+
+    @property
+    def clustered(self) -> bool:
+        """Whether errors of the group follow errors more often than expected."""
+        return (self.error_bursts or 0.0) > MOST_CLUSTERED
 
     @property
     def learned(self) -> bool:
@@ -158,7 +169,9 @@ def thresholds(block: LevelBlock, opened: pd.DataFrame) -> Iterator[ThresholdEst
         heard = dict(list(at_standard.groupby("participant")))
         own = [_own(block, stimulus, standard, fit, heard[fit.person]) for fit in fits]
         if priors is not None:
-            yield _group(stimulus, standard, own, priors, early_change([(fit.fit, fit.posterior) for fit in fits]))
+            answers = [(fit.fit, fit.posterior) for fit in fits]
+            group = _group(stimulus, standard, own, priors)
+            yield replace(group, early_change=early_change(answers), error_bursts=error_bursts(answers))
         yield from own
 
 
@@ -315,7 +328,7 @@ def _reversal_mean(block: LevelBlock, stimulus: Stimulus, heard: pd.DataFrame) -
 
 
 def _group(
-    stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], priors: GroupPriors, early: float | None
+    stimulus: Stimulus, standard: Any, own: Sequence[ThresholdEstimate], priors: GroupPriors
 ) -> ThresholdEstimate:
     """Return the random-effects mean of participants, at the published percentage too where all have theirs."""
 
@@ -334,7 +347,7 @@ def _group(
         threshold=stimulus.level_of(found.mean),
         low=level_of(found.low),
         high=level_of(found.high),
-        early_change=early,
+        if_many_lapses=level_of(None if priors.if_many_lapses is None else found.mean + priors.if_many_lapses),
     )
     compared = [estimate.compared for estimate in own if estimate.compared is not None]
     if len(compared) < len(own):
@@ -469,6 +482,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         result, percent, compared = self.found, self._target_percent(), percent_compared(self.found)
 
         def fit(estimate: ThresholdEstimate) -> str:
+            if estimate.error_bursts is not None:
+                return f"{estimate.error_bursts:+.1f} SE{'!' if estimate.clustered else ''}".replace("-", "−")
             return (
                 "–"
                 if estimate.fit_p is None
@@ -538,8 +553,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"{10**SESSION_SD:.2f} (one standard deviation), and for a change over the trials. The group is the "
             "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp if there are at least three "
             "participants. Each variance is replaced by its geometric mean with the median "
-            f"variance.{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers. Drift: "
-            "correlation of trial number and deviance residual, with “!” if the threshold changes over the trials by "
+            f"variance.{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers; for the group, "
+            "by how many standard errors errors follow errors more often than expected, with “!” above "
+            f"{MOST_CLUSTERED:g}. Drift: correlation of trial number and deviance residual, with “!” if the threshold changes over the trials by "
             f"more than {BEYOND_CHANCE:g} standard errors; for the group, by how many standard errors thresholds rose "
             f"or fell after the first trials. n counts answers{catch}."
             + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
@@ -586,6 +602,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             (lambda estimate: not estimate.fits, "the function does not fit the answers, so a threshold may be biased"),
             (lambda estimate: estimate.n < _FEW_ANSWERS, f"fewer than {_FEW_ANSWERS} answers, so intervals are wide"),
         )
+        yield from self._limits_of_lapses()
         for applies, words in kinds:
             if some := [estimate for estimate in own if applies(estimate)]:
                 yield f"{title}: {words} ({_named_people(own, some)})."
@@ -619,6 +636,31 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if self.found.level_kind == "weber":
             yield self._limit_of_device()
         yield f"{title}: {MOTORS}"
+
+    def _limits_of_lapses(self) -> Iterator[str]:
+        groups = [
+            (row, "" if row.standard is None else f" at standard {with_unit(self.found, row.standard)}")
+            for row in self.rows
+            if row.participant is None
+        ]
+        if clusters := [
+            f"{group.error_bursts:.1f} standard errors{where}" for group, where in groups if group.clustered
+        ]:
+            yield (
+                f"{self.found.title}: errors follow errors more often than the fitted functions expect, by "
+                f"{listed(clusters)}, as if participants answered at random for several trials: the group's threshold "
+                "may be too high."
+            )
+        if thresholds := [
+            f"{group.if_many_lapses:.3g} instead of {group.threshold:.3g}{where}"
+            for group, where in groups
+            if group.if_many_lapses is not None
+        ]:
+            yield (
+                f"{self.found.title}: the answers do not exclude a mean lapse rate of {100 * MANY_LAPSES:g} %; the "
+                f"group's threshold would then be {listed(thresholds)}. Catch trials far above the threshold determine "
+                "the lapse rate."
+            )
 
     def _limit_of_device(self) -> str:
         """Return the sentence on the limitation due to the device's own dynamics."""
@@ -677,7 +719,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "mean with the median variance, the between-person variance of Paule and Mandel (1982) and, with at "
                 f"least {FEWEST} participants, the interval of Hartung and Knapp (2001), widened by the uncertainty of "
                 "the width and the lapse rate that all have in common. Whether thresholds rose or fell after the first "
-                f"trials was tested by the score of a change that fades over {EARLY_TRIALS:g} trials."
+                f"trials was tested by the score of a change that fades over {EARLY_TRIALS:g} trials. Whether errors form "
+                "clusters was tested by the errors beyond those expected, each weighted by the probability that the "
+                f"answers before it, at most {BURST_TRIALS - 1}, were random guesses."
             )
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.typing import NDArray
 from scipy.stats import norm
 
 from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds, given_by, thresholds
@@ -15,9 +16,16 @@ from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
 from study_app.protocol.trials.stimuli import SESSION_SD, WIDTH_PRIOR, Stimulus, analysis_grid, assumed_for
-from study_app.psychophysics.families import rise, success
+from study_app.psychophysics.families import Floats, rise, success
 from study_app.psychophysics.grid import evenly, fit, group_priors
-from study_app.psychophysics.person_fit import Given, early_change
+from study_app.psychophysics.person_fit import (
+    BURST_TRIALS,
+    MOST_CLUSTERED,
+    Given,
+    PersonFit,
+    early_change,
+    error_bursts,
+)
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, arranged, block, rows
 
 GRID = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
@@ -239,7 +247,17 @@ def test_a_report_marks_open_ends_and_says_so() -> None:
         level_kind="weber", quantity="damping",
     )  # fmt: skip
     estimates = [
-        ThresholdEstimate(participant=None, standard=None, n=3, threshold=0.5, low=0.3, high=0.9, early_change=-3.14),
+        ThresholdEstimate(
+            participant=None,
+            standard=None,
+            n=3,
+            threshold=0.5,
+            low=0.3,
+            high=0.9,
+            early_change=-3.14,
+            error_bursts=1.52,
+            if_many_lapses=0.444,
+        ),
         ThresholdEstimate(
             participant="P001", standard=None, n=60, threshold=0.5, low=0.2, high=0.95, open_end="high", fit_p=0.5
         ),
@@ -248,9 +266,20 @@ def test_a_report_marks_open_ends_and_says_so() -> None:
     cells = dict(column for column in shown.shown() if column is not None)
     assert [cells["95 % interval"](one) for one in estimates] == ["0.3 – 0.9", "0.2 – > 0.95"]
     assert cells["drift"](estimates[0]) == "−3.1 SE!"
+    assert [cells["fit (p)"](one) for one in estimates] == ["+1.5 SE!", "0.500"]
     sentences = " ".join(shown.limits())
     assert "leave an end of the 95 % interval open" in sentences
     assert "thresholds fell after the first trials by 3.1 standard errors" in sentences
+    assert "errors follow errors more often than the fitted functions expect, by 1.5 standard errors," in sentences
+    assert "a mean lapse rate of 9 %; the group's threshold would then be 0.444 instead of 0.5" in sentences
+
+
+def fitted(u: Floats, right: NDArray[np.bool_]) -> PersonFit:
+    """Return the fit to the answers at the levels of each trial."""
+    levels, places = np.unique(u, return_inverse=True)
+    nothing, done = np.zeros(len(u)), np.linspace(0, 1, len(u))
+    given = Given(levels=levels, places=places, successes=right, towards=nothing, before=nothing, done=done)
+    return given.fit(GRID, two_intervals=False)
 
 
 def test_thresholds_that_fall_after_the_first_trials_are_reported_for_the_group() -> None:
@@ -262,13 +291,7 @@ def test_thresholds_that_fall_after_the_first_trials_are_reported_for_the_group(
             for _ in range(10):
                 u = np.log10(0.2) + draw.choice([-0.3, -0.1, 0.1, 0.3], 80)
                 threshold = np.log10(0.2) + math.log10(factor) * np.exp(-np.arange(80) / 15)
-                right = draw.random(80) < 0.5 + 0.48 * rise("weibull", u, threshold, 0.8)
-                levels, places = np.unique(u, return_inverse=True)
-                given = Given(
-                    levels=levels, places=places, successes=right, towards=np.zeros(80), before=np.zeros(80),
-                    done=np.linspace(0, 1, 80),
-                )  # fmt: skip
-                fits.append(given.fit(GRID, two_intervals=False))
+                fits.append(fitted(u, draw.random(80) < 0.5 + 0.48 * rise("weibull", u, threshold, 0.8)))
             factors = group_priors([fit.flat for fit in fits], WIDTH_PRIOR).factors
             found.append(
                 early_change([(fit, fit.flat.reweighted(one)) for fit, one in zip(fits, factors, strict=True)])
@@ -285,15 +308,44 @@ def test_lapses_of_a_group_are_told_apart_by_answers_that_are_easy() -> None:
         fits = []
         for _ in range(10):
             u = np.concatenate([np.log10(0.1) + draw.choice([-0.3, -0.1, 0.1, 0.3], 60), np.full(20, np.log10(0.6))])
-            right = draw.random(80) < success("weibull", u, math.log10(0.1), 0.6, 0.5, lapse)
-            levels, places = np.unique(u, return_inverse=True)
-            given = Given(
-                levels=levels, places=places, successes=right, towards=np.zeros(80), before=np.zeros(80),
-                done=np.linspace(0, 1, 80),
-            )  # fmt: skip
-            fits.append(given.fit(GRID, two_intervals=False).flat)
+            fits.append(fitted(u, draw.random(80) < success("weibull", u, math.log10(0.1), 0.6, 0.5, lapse)).flat)
         priors = group_priors(fits, WIDTH_PRIOR)
+        assert (priors.if_many_lapses is None) == (lapse == 0.0), "easy answers exclude that many are wrong, or show it"
         own = [fit.reweighted(one) for fit, one in zip(fits, priors.factors, strict=True)]
         estimates[lapse] = [float(np.mean([10**one.threshold for one in own])), own[0].others.lapse]
     assert estimates[0.0] == pytest.approx([0.1, 0.0], abs=0.015)
     assert estimates[0.08] == pytest.approx([0.1, 0.08], abs=0.04)
+
+
+def test_clusters_of_errors_are_reported_and_chance_is_not() -> None:
+    draw, flags = np.random.default_rng(23), []
+    for burst in (0, 10):
+        found = []
+        for _ in range(10):
+            fits = []
+            for _ in range(10):
+                u = np.log10(0.2) + draw.choice([-0.2, 0.0, 0.2, 0.4], 80)
+                psi, begin = 0.5 + 0.49 * rise("weibull", u, math.log10(0.2), 0.9), draw.integers(0, 70)
+                psi[begin : begin + burst] = 0.5
+                fits.append(fitted(u, draw.random(80) < psi))
+            found.append(error_bursts([(fit, fit.flat) for fit in fits]))
+        flags.append(sum((one or 0.0) > MOST_CLUSTERED for one in found))
+    assert flags[0] <= 2
+    assert flags[1] >= 8
+
+
+def test_clusters_are_weighted_by_the_answers_just_before() -> None:
+    draw = np.random.default_rng(24)
+    fits = [fitted(draw.choice([-1.0, -0.7, -0.4], 40), draw.random(40) < 0.75) for _ in range(3)]
+    score = information = 0.0
+    for person in fits:
+        psi, right = person.expected(person.flat), person.given.successes
+        for trial in range(40):
+            evidence = 0.0
+            for begin in range(max(0, trial - BURST_TRIALS + 1), trial):
+                of_answers = np.where(right, psi, 1 - psi)[begin:trial]
+                evidence += 0.5 ** len(of_answers) / np.prod(of_answers)
+            weight = evidence / (evidence + 200)
+            score += weight * (psi[trial] - right[trial])
+            information += weight**2 * psi[trial] * (1 - psi[trial])
+    assert error_bursts([(person, person.flat) for person in fits]) == pytest.approx(score / math.sqrt(information))

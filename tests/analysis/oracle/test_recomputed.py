@@ -49,6 +49,9 @@ PROVED = {
     "test_percent_correct_at_the_mean_of_reversals_in_the_long_run",
     r"results\.levels\.thresholds\.target_percent": "tests/psychophysics/test_grid.py::"
     "test_percent_correct_at_the_mean_of_reversals_in_the_long_run",
+    r"results\.levels\.thresholds\.error_bursts": THRESHOLDS + "test_clusters_are_weighted_by_the_answers_just_before",
+    r"results\.levels\.thresholds\.if_many_lapses": "tests/analysis/statistics/psychometrics/test_people.py::"
+    "test_the_threshold_for_many_lapses_is_right_for_people_who_lapse_so_often",
     r"results\.levels\.thresholds\.compared.*": THRESHOLDS
     + "test_thresholds_are_compared_with_published_ones_at_their_percentage",
 }

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from study_app.psychophysics.grid import MANY_LAPSES
+from study_app.psychophysics.people import Person
 from tests.benchmarks.analysis import people, threshold_coverage
 
 
@@ -29,6 +31,21 @@ def test_levels_and_widths_of_others_leave_thresholds_unbiased(width: float, cha
     draw = np.random.default_rng(2)
     planted = 0.2 * 1.2 ** draw.normal(size=100)
     person = threshold_coverage.KINDS["as assumed"]._replace(width=width)
-    presented = threshold_coverage.answered(person, planted, threshold_coverage.search(), draw, 80)
-    found = [one.threshold for _, *own in threshold_coverage.studies(*presented) for one in own]
+    presented = threshold_coverage.answered(threshold_coverage.Case(person), planted, draw, 80)
+    found = [
+        one.threshold for _, *own in threshold_coverage.studies(threshold_coverage.STIMULUS, *presented) for one in own
+    ]
     assert np.log(found / planted).mean() == pytest.approx(0.0, abs=0.05 + chance)
+
+
+@pytest.mark.slow
+def test_the_threshold_for_many_lapses_is_right_for_people_who_lapse_so_often() -> None:
+    """Levels near the threshold do not show lapses: the estimate is too high, the one for their lapse rate is not."""
+    case, draw = threshold_coverage.Case(Person(lapse=2 * MANY_LAPSES)), np.random.default_rng(3)
+    presented = threshold_coverage.answered(case, np.full(60, 0.2), draw, 80)
+    groups = [group for group, *_ in threshold_coverage.studies(case.stimulus, *presented)]
+    known = [(group.threshold, group.if_many_lapses) for group in groups if group.if_many_lapses is not None]
+    estimate, for_lapses = np.log10(known).mean(axis=0) - np.log10(0.2)
+    assert len(known) >= 0.8 * len(groups)
+    assert estimate > 0.05
+    assert abs(for_lapses) < 0.5 * estimate
