@@ -19,7 +19,7 @@ _SWITCH_INTERVAL_S = 0.0005
 
 
 def application_here() -> QApplication:
-    """Return the application; create it on first use."""
+    """Return the application, creating it on first use."""
     instance = QApplication.instance()
     if isinstance(instance, QApplication):
         instance.setQuitOnLastWindowClosed(False)

@@ -35,11 +35,11 @@ class _Release(NamedTuple):
 
 
 class KeyPresses(QObject):
-    """Filters the keys of the window that has the keyboard, before the window and its shortcuts receive them.
+    """Filters the keys of the focused window before the window and its shortcuts receive them.
 
-    A repeat reaches only the widget that received the press, and only there if it types text or if the key moves
-    something; it is then marked as `isAutoRepeat`. Shortcuts act once per press. ``changed(window, event)`` carries
-    every real press and, up to 30 ms late, every real release.
+    A repeat reaches only the widget that received the press, and only if it types text or the key moves something; it
+    is then marked as `isAutoRepeat`. Shortcuts act once per press. ``changed(window, event)`` carries every real press
+    and, up to 30 ms late, every real release.
     """
 
     changed = Signal(object, object)
@@ -91,7 +91,7 @@ class KeyPresses(QObject):
         return False
 
     def _watch_window(self, window: QWindow | None) -> None:
-        """Filter the events of the focused window, which alone receives keys."""
+        """Filter the events of the focused window, the only one that receives keys."""
         if window is not None and window is not self._window:
             window.removeEventFilter(self)  # a window that becomes active again is filtered once
             window.installEventFilter(self)
@@ -110,7 +110,7 @@ class KeyPresses(QObject):
             self._send_event(window, _marked_repeat(event))
 
     def _hold_back(self, event: QKeyEvent) -> bool:
-        """Hold a release until it is known to be real; pass on releases that no keyboard made."""
+        """Hold a release until it is known to be real; pass on releases that no keyboard caused."""
         if event.isAutoRepeat():
             return True
         self._deliver_release()
@@ -126,7 +126,7 @@ class KeyPresses(QObject):
             self._deliver_release()
 
     def _deliver_release(self) -> None:
-        """Deliver the held release: it is real."""
+        """Deliver a release that turned out to be real."""
         release, self._release = self._release, None
         if release is None:
             return
@@ -143,7 +143,7 @@ class KeyPresses(QObject):
 
 
 def key_presses() -> KeyPresses:
-    """Return the application's filter, made on first use."""
+    """Return the application's filter, creating it on first use."""
     application = QGuiApplication.instance()
     assert isinstance(application, QGuiApplication)  # noqa: S101  # windows need one
     return application.findChild(KeyPresses) or KeyPresses(application)
@@ -164,7 +164,7 @@ def digit_of(event: QKeyEvent) -> int | None:
 
 
 def _physical_key(event: QKeyEvent) -> int:
-    """Return the scan code of a key, which modifiers do not change; the key code if no keyboard made the event."""
+    """Return the scan code of a key, independent of modifiers, or its key code if no keyboard caused the event."""
     return event.nativeScanCode() or -event.key()
 
 

@@ -31,9 +31,9 @@ Begin: TypeAlias = Callable[..., ExaminationClient]
 
 
 class DiagnosisDialog(QDialog):
-    """Examines a device, and shows what is wrong with it. Closing it ends the examination.
+    """Examines a device and shows its problems. Closing it ends the examination.
 
-    ``over(well)`` comes when the examination has said what it found.
+    ``over(well)`` is emitted when the examination is finished.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class DiagnosisDialog(QDialog):
         self._read_answers()
 
     def _read_answers(self) -> None:
-        """Begin once nothing else uses the device; then read the diagnosis' answers."""
+        """Start once nothing else uses the device, then read the diagnosis' answers."""
         if self._wanted and (self.leaving is None or self.leaving.ended):
             self._wanted = False
             self._examination = self._begin(self._name, options=self._options)
@@ -197,7 +197,7 @@ class DiagnosisDialog(QDialog):
             self.leaving, self._examination = self._examination, None
 
     def done(self, result: int) -> None:
-        """End the examination, whichever way the dialog is closed."""
+        """End the examination, however the dialog is closed."""
         self._timer.stop()
         self._wanted = False
         self._end_process()

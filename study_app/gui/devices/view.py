@@ -71,7 +71,7 @@ PATIENCE_S = 5.0
 
 
 class _OptionCard(Card):
-    """The file of a device's option; an empty field is none."""
+    """The file for a device option; an empty field means none."""
 
     def __init__(self, option: DeviceOption) -> None:
         super().__init__(option.title, gap=8)
@@ -84,7 +84,7 @@ class _OptionCard(Card):
 
 
 class _HelpCard(Card):
-    """What to do next with a Falcon: the words that need no window."""
+    """The next steps for a Falcon; a text without a window's state."""
 
     def __init__(self) -> None:
         super().__init__("Before the first session", gap=8)
@@ -100,10 +100,10 @@ class _HelpCard(Card):
 
 
 class DevicesPlace(Place):
-    """Every device with its state; it looks at the machine when it is asked, one look at a time.
+    """All devices with their states; devices are searched for on request, one search at a time.
 
-    ``looked`` comes after that, ``changed`` with a setting and what it is to be, ``troubled`` with a title and a
-    sentence where one could not look.
+    ``looked`` is emitted after a search, ``changed`` with a setting and its new value, ``troubled`` with a title and a
+    sentence if a search failed.
     """
 
     looked = Signal()
@@ -146,7 +146,7 @@ class DevicesPlace(Place):
         vbox(self._area, margins=0, parent=self)
 
     def enter(self) -> None:
-        """Search for devices again: one may have been plugged in."""
+        """Search for devices again, since one may have been plugged in."""
         self.look_for_devices()
 
     def leave(self) -> None:
@@ -159,7 +159,7 @@ class DevicesPlace(Place):
             self.looking.run(lambda: devices_shown(self.backends()))
 
     def stop_looking(self, patience_s: float = PATIENCE_S) -> None:
-        """Stop searching, wait for the running search and ignore its result: the windows close."""
+        """Stop searching, wait for the running search and ignore its result, because the windows close."""
         self._ended = True
         self.looking.wait(min(patience_s, PATIENCE_S))
 
@@ -191,7 +191,7 @@ class DevicesPlace(Place):
             self.troubled.emit("This machine could not be checked", f"{error}.")
 
     def show_devices(self, shown: tuple[DeviceShown, ...]) -> None:
-        """Show devices; existing rows stay, with their keyboard focus."""
+        """Show devices; existing rows are kept with their focus."""
         self.shown = shown
         for device in shown:
             if device.name in self.rows:

@@ -47,7 +47,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
 
 
 def missing_for_windows() -> str:
-    """Return the system library that Qt's X11 plugin lacks and its package, even without a display; "" if none."""
+    """Return the system library that Qt's X11 plugin lacks and its package, even without a display, or ""."""
     try:
         if _platform_is_linux():
             _load_plugin()
@@ -83,7 +83,7 @@ def naming_missing_library() -> Iterator[None]:
 
 
 def _platform_is_linux() -> bool:
-    """Return whether system libraries come as Linux packages here."""
+    """Return whether system libraries are Linux packages on this system."""
     return sys.platform == "linux"
 
 

@@ -17,7 +17,7 @@ _FRAME_LOOKS_MS = (300, 1000, 3000)  # delay before measuring a window manager's
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ScreenShown:
-    """A screen as the system tells it: sizes in logical pixels and, where it knows them (else 0), in millimetres."""
+    """A screen as reported by the system: sizes in logical pixels and, if known (else 0), in millimetres."""
 
     number: int
     name: str
@@ -57,8 +57,8 @@ def screen_shown(screen: QScreen) -> ScreenShown:
 def choose_screens(number: int | None) -> tuple[QScreen, QScreen]:
     """Return the participant's and the operator's screens; the same one twice if there is only one.
 
-    ``number`` is the participant's, from 1; None: the last one, where a second monitor usually is. Do not keep them for
-    later: a screen can be removed, and PySide gives a screen up with the widget whose ``screen()`` returned it last.
+    ``number`` is the participant's, from 1; None: the last one, which is usually a second monitor. Do not store them: a
+    screen can be removed, and PySide releases a screen with the last widget whose ``screen()`` returned it.
 
     Raises
     ------
@@ -87,10 +87,10 @@ def describe_screen(screen: QScreen) -> dict[str, Any]:
 
 
 def place_window(window: QWidget, screen: QScreen, *, corner: bool) -> None:
-    """Give ``window`` its size, at most the screen's, and put it in the middle or the lower right corner.
+    """Give ``window`` its size, at most the screen's, in the centre or the lower right corner.
 
-    The system's frame is not known before the window is shown, and on a busy machine some time later: once it is, the
-    window makes room for it.
+    The system's frame is unknown before the window is shown, and on a busy machine for some time after; then the window
+    makes room for it.
     """
     room = screen.availableGeometry()
     window.setScreen(screen)
@@ -100,7 +100,7 @@ def place_window(window: QWidget, screen: QScreen, *, corner: bool) -> None:
 
 
 def _make_room_for_frame(window: QWidget, *, corner: bool = False) -> None:
-    """Move ``window`` with its frame wholly onto its screen, below its minimum size if necessary."""
+    """Move ``window`` with its frame completely onto its screen, below its minimum size if necessary."""
     room, outer, inner = window.screen().availableGeometry(), window.frameGeometry(), window.geometry()
     if window.isFullScreen() or window.isMaximized() or room.contains(outer):
         return
@@ -150,7 +150,7 @@ def opengl_renderer() -> str | None:
 
 
 def has_graphics_card() -> bool:
-    """Return whether OpenGL uses a graphics card and not software."""
+    """Return whether OpenGL uses a graphics card rather than software."""
     name = opengl_renderer()
     return name is not None and not any(word in name.lower() for word in IN_SOFTWARE)
 
@@ -162,7 +162,7 @@ LOCKED, BY_CLOCK = "locked to the screen's swaps", "by the clock"
 
 
 class Frames(QObject):
-    """Asks for a frame once a refresh of the screen: ``due`` comes when one is to be drawn."""
+    """Requests a frame once per refresh of the screen: ``due`` is emitted when one should be drawn."""
 
     due = Signal()
 
@@ -210,7 +210,7 @@ class Frames(QObject):
             self._start_timer()
 
     def _request_frame(self) -> None:
-        """Request a frame; the timer of the next one already runs, so that a slow frame does not delay it."""
+        """Request a frame; the timer of the next one is already running, so that a slow frame does not delay it."""
         now_ns = self._drawn_ns = self._now_ns()
         missed = max(0, (now_ns - self._next_ns) // self.period_ns)
         self._next_ns += (missed + 1) * self.period_ns

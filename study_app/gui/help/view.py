@@ -59,7 +59,7 @@ _EMPTY_CELL: Final = re.compile(r"(?<=\|) *(?=\|)")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HelpEntry:
-    """One row of the list of pages: its page, its title, whether it heads a section, and where it is opened."""
+    """One row of the list of pages: its page, its title, whether it heads a section, and its anchor."""
 
     page: str
     title: str
@@ -94,7 +94,7 @@ def matching_entries(text: str) -> tuple[HelpEntry, ...]:
 
 @cache
 def page_markdown(page: str) -> str:
-    """Return a page as Markdown without comments, HTML, empty cells, which Qt joins, and bars in cells."""
+    """Return a page as Markdown that Qt can show, without comments, HTML, empty cells and bars in cells."""
     text = _HTML_IMAGE.sub(r"![\2](\1)", _COMMENT.sub("", documentation.page(page)))
     return "\n".join(
         _EMPTY_CELL.sub("\N{NO-BREAK SPACE}", line).replace(r"\|", "\N{DIVIDES}") if line.startswith("|") else line
@@ -132,7 +132,10 @@ def _text_format(used: QFont) -> QTextCharFormat:
 
 
 class _PageReader(Coloured, QTextBrowser):
-    """A page; ``page_asked(name, anchor)`` where a link leads to another one. Other links open outside the program."""
+    """A page of the documentation.
+
+    ``page_asked(name, anchor)`` is emitted for links to other pages; other links open outside the program.
+    """
 
     page_asked = Signal(str, str)
 
@@ -174,7 +177,7 @@ class _PageReader(Coloured, QTextBrowser):
         return picture
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """Draw the page again, since pictures are as wide as the text; the text being read stays visible."""
+        """Redraw the page, since pictures are as wide as the text; the reading position stays visible."""
         at = self.verticalScrollBar().value() / max(1, self.verticalScrollBar().maximum())
         super().resizeEvent(event)
         if self.page and event.size().width() != event.oldSize().width():

@@ -28,7 +28,7 @@ _WAKE_POINTS = 48
 
 
 class DeviceCard(Card):
-    """What sessions begin with, whether it can be felt with now, and the screens."""
+    """The device of new sessions, whether it gives force now, and the screens."""
 
     def __init__(self) -> None:
         super().__init__(padding=20, gap=8)
@@ -58,7 +58,7 @@ class DeviceCard(Card):
 
 
 class LabCard(Card):
-    """The way into the liquid lab, under a picture of a ball and its wake, which is lower in a low window."""
+    """The link to the liquid lab, under a picture of a ball and its wake, which is smaller in a low window."""
 
     def __init__(self) -> None:
         super().__init__(padding=20, gap=6)
@@ -113,7 +113,7 @@ def _paint_wake(painter: QPainter, water: QRectF) -> None:
 
 
 class ResumeBanner(QWidget):
-    """A tinted strip; hidden while there is nothing to go on with. ``resume_asked`` carries the session."""
+    """A tinted strip, hidden if there is no session to resume. ``resume_asked`` carries the session."""
 
     resume_asked = Signal(object)
 
@@ -131,7 +131,7 @@ class ResumeBanner(QWidget):
         self.hide()
 
     def minimumSizeHint(self) -> QSize:
-        """Return the height in the present width: the minimum of words that wrap is that of the narrowest lines."""
+        """Return the height at the current width, since wrapped texts report that of the narrowest lines."""
         hint = super().minimumSizeHint()
         return QSize(hint.width(), self.heightForWidth(max(hint.width(), self.width())))
 
@@ -166,9 +166,9 @@ _NONE = {
 
 
 class SessionsCard(Card):
-    """The table, newest first; a row that needs care stands above all. Where no row is shown it is one line.
+    """The sessions table, newest first; rows that need attention come first. An empty one is a single line.
 
-    ``open_asked`` carries the `SessionFacts` of a session; ``emptied`` comes when the table has come or gone.
+    ``open_asked`` carries the `SessionFacts` of a session; ``emptied`` is emitted when the table appears or disappears.
     """
 
     open_asked = Signal(object)
@@ -257,7 +257,7 @@ Facts: TypeAlias = StudyFacts | BrokenFacts | DraftFacts
 
 
 class _FileCard(Card):
-    """A study: its title, where it is from, and its draft where one was not saved; ``edit`` carries its facts.
+    """A study: its title, its origin, and its unsaved draft, if any; ``edit`` carries its facts.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ class _FileCard(Card):
 class StudyCard(_FileCard):
     """A study that can be run; ``new_session`` and ``rehearsal`` carry its facts.
 
-    ``shipped`` says that it ships with the program, ``first`` that it is what one most likely goes on with.
+    ``shipped`` means that it ships with the program, ``first`` that it is the most likely choice.
     """
 
     new_session = Signal(object)
@@ -330,7 +330,7 @@ class StudyCard(_FileCard):
 
 
 class BrokenCard(_FileCard):
-    """A protocol file that cannot be used, and why, or a study without a file."""
+    """A protocol file that cannot be used, with the reason, or a study without a file."""
 
     def __init__(self, facts: BrokenFacts | DraftFacts, *, first: bool = False) -> None:
         if isinstance(facts, DraftFacts):
@@ -346,7 +346,7 @@ class BrokenCard(_FileCard):
 
 
 class CardGrid(QWidget):
-    """The cards side by side, as many in a row as there is room for; ``laid_out`` comes when heights may differ."""
+    """Cards side by side, as many per row as fit; ``laid_out`` is emitted when heights may differ."""
 
     laid_out = Signal()
 
@@ -359,7 +359,7 @@ class CardGrid(QWidget):
 
     @property
     def row_height(self) -> int:
-        """The height of the first row of cards at their present width."""
+        """The height of the first row of cards at their current width."""
         wide = (self.width() - self._grid.contentsMargins().right() + _GAP) // max(1, self._across) - _GAP
         heights = (
             card.heightForWidth(wide) if card.hasHeightForWidth() else card.sizeHint().height()

@@ -47,9 +47,9 @@ _LISTEN_MS = 40
 
 
 class RehearsalDialog(Work):
-    """How many simulated participants, then how far it is, then the way to their results; Cancel keeps whole sessions.
+    """Asks for the number of simulated participants, then shows progress and a link to the results.
 
-    It is accepted when the results are to be shown.
+    Cancel keeps completed sessions. It is accepted if the results are to be shown.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ class RehearsalDialog(Work):
                     self.show_refused(answer.sentence)
 
     def end(self) -> None:
-        """Stop the rehearsal and wait for it: the windows are closed."""
+        """Stop the rehearsal and wait for it, because the windows are closed."""
         self._listening.stop()
         self.working = False
         if self.worker is not None:
@@ -145,7 +145,7 @@ _GROUP_HINT = "a property of the participant; it is recorded"
 
 @dataclass(frozen=True, slots=True)
 class StudyFolderState:
-    """A study's folder when it was read: which ids are used, and why no session of the study can be put there.
+    """A snapshot of a study's folder: used ids, and the reason if it cannot hold new sessions.
 
     ``held`` are the entries of its participants in groups.
     """
@@ -156,12 +156,12 @@ class StudyFolderState:
     fault: str
 
     def group_of(self, participant: str) -> str | None:
-        """Return the recorded pre-existing group of a participant; None: there is none yet."""
+        """Return the recorded pre-existing group of a participant; None if there is none yet."""
         return next((claim.group for claim in self.held if claim.participant == participant), None)
 
 
 def _read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
-    """Read a study's folder; ``fault`` says why it cannot be used."""
+    """Read a study's folder; ``fault`` is the reason if it cannot be used."""
     folder, fault = StudyFolder(path), ""
     used = UsedIds(path, frozenset(), ())
     try:
@@ -174,7 +174,7 @@ def _read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState
 
 
 class NewSessionDialog(QDialog):
-    """Asks who, with which seed, in which language, on which device and screen.
+    """Asks for participant, seed, language, device and screen of a new session.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ class NewSessionDialog(QDialog):
         QTimer.singleShot(0, self, self._fit_height)  # once the parts have their style
 
     def _fit_height(self) -> None:
-        """Make the dialog as high as its questions, at most the screen's height; then they scroll."""
+        """Make the dialog as high as its questions, at most the screen's height, beyond which they scroll."""
         inside, whole = self._inside.layout(), self.layout()
         assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
         wide = self.minimumWidth() - whole.contentsMargins().left() - whole.contentsMargins().right()
@@ -350,7 +350,7 @@ class NewSessionDialog(QDialog):
             self.editors["results"].show_value(self._suggested)
 
     def _choose_pilot(self) -> None:
-        """Choose a framed window and the pilots' folder; restore both choices if it is no pilot."""
+        """Choose a framed window and the pilots' folder, or restore both choices."""
         pilot, windowed = self._value("pilot"), self.editors["windowed"]
         if pilot:
             self._windowed_without_pilot = windowed.value
@@ -363,7 +363,7 @@ class NewSessionDialog(QDialog):
         return self.editors[name].value
 
     def _check_answers(self) -> None:
-        """Check the answers, and read the folder again outside the windows' thread."""
+        """Check the answers, and reread the folder in the background."""
         self._show_verdict()
         if text := self._value("results"):
             self._reader.run(partial(_read_study_folder_state, Path(text), self.facts.protocol))
@@ -440,7 +440,7 @@ class NewSessionDialog(QDialog):
         return {option.name for option in descriptor_of(self._value("device")).window_options}
 
     def chosen(self) -> NewSession:
-        """Return the chosen session; raise ValueError for values that are not permitted."""
+        """Return the chosen session; raise ValueError for invalid values."""
         asked, options = self._asked_options(), {option.name for option in window_options()}
         values = {name: editor.value for name, editor in self.editors.items() if name in asked or name not in options}
         chosen = {name: values.pop(name) for name in asked}
@@ -452,7 +452,7 @@ class NewSessionDialog(QDialog):
 
 
 class WorkspaceDialog(Question):
-    """Shows the folder that is offered; another can be chosen or typed. Nothing is created until it is accepted."""
+    """Shows the suggested folder; another one can be chosen or typed. Nothing is created until it is accepted."""
 
     def __init__(self, parent: QWidget, theme: Theme, offered: Path) -> None:
         super().__init__(

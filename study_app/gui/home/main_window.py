@@ -26,7 +26,7 @@ _FOCUS_RING = 2  # px
 
 
 class _Destination(NamedTuple):
-    """A place by its name in the program, with its icon, its word, and the word for a narrow rail."""
+    """A page of the main window: its name, icon, label, and the short label for a narrow rail."""
 
     name: str
     icon: str
@@ -46,7 +46,7 @@ DESTINATIONS = (
 
 
 class _RailButton(Themed, PressedByEnter):
-    """A place to go, or a switch, in the rail: icon and word; side by side when wide, one below the other else."""
+    """A page or a switch in the rail: icon and label, side by side if wide, otherwise below each other."""
 
     def __init__(self, icon: str, word: str, short: str) -> None:
         super().__init__(word)
@@ -66,7 +66,7 @@ class _RailButton(Themed, PressedByEnter):
         self.update()
 
     def sizeHint(self) -> QSize:
-        """Return the room for icon and word; a fixed height would not outlast a change of theme."""
+        """Return the size of icon and label; a fixed height would not survive a change of theme."""
         return QSize(NARROW_RAIL - 2 * NARROW_MARGIN, 58) if self._narrow else QSize(WIDE_RAIL - 2 * WIDE_MARGIN, 42)
 
     def minimumSizeHint(self) -> QSize:
@@ -116,7 +116,7 @@ class _RailButton(Themed, PressedByEnter):
 
 
 class _Rail(Coloured, QWidget):
-    """The strip; ``go_asked`` carries the name of a place.
+    """The navigation rail; ``go_asked`` carries the name of a page.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ def bug_sentence(error: BaseException) -> str:
 
 
 class MainWindow(Themed, QMainWindow):
-    """The rail and the places; a place is made when one first goes there.
+    """The navigation rail and the pages, each of which is created at its first visit.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ class MainWindow(Themed, QMainWindow):
         return self._here
 
     def place(self, name: str) -> Place:
-        """Return a place, made on first use; show the error if that fails."""
+        """Return a page, creating it on first use; show the error if that fails."""
         if name not in self._places:
             QGuiApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)
             try:
@@ -234,7 +234,7 @@ class MainWindow(Themed, QMainWindow):
         return self._places[name]
 
     def go(self, name: str) -> None:
-        """Leave the present place and show another one, made at its first visit."""
+        """Leave the current page and show another one, which is created at its first visit."""
         asked = self.place(name)
         if name != self._here or not asked.isVisible():
             if name != self._here:
@@ -247,7 +247,7 @@ class MainWindow(Themed, QMainWindow):
         self._give_keyboard(self.rail.buttons[name], asked)
 
     def _give_keyboard(self, button: QWidget, place: Place) -> None:
-        """Move the keyboard focus from a rail button into its place: to the part that had it last, else the first."""
+        """Move the focus from a rail button into its page: to the last focused part, else the first."""
         if self.focusWidget() is not button:
             return
         if (last := last_focused(place)) is not None:
@@ -270,17 +270,17 @@ class MainWindow(Themed, QMainWindow):
         self._show_notice(notice)
 
     def hide_for_session(self) -> None:
-        """Leave the present place and hide the window during a session."""
+        """Leave the current page and hide the window during a session."""
         self._places[self._here].leave()
         self._had_keyboard = self.focusWidget()
         self._resting = True
         self.hide()
 
     def return_from_session(self) -> None:
-        """Show the window again, at the same place.
+        """Show the window again with the same page.
 
-        A window that becomes the active one while it is hidden, as when the dialog before a session closes, gives the
-        keyboard to the part after the one that had it.
+        A window that is activated while hidden, for example when the dialog before a session closes, gives the focus to
+        the next part instead of the focused one.
         """
         self.show()
         self._resting = False
@@ -291,7 +291,7 @@ class MainWindow(Themed, QMainWindow):
         self._places[self._here].enter()
 
     def show_message(self, title: str, sentence: str, *, of: str = "") -> None:
-        """Show a message with one button; a message of the place ``of`` closes when the place is left."""
+        """Show a message with one button; a message of the page ``of`` closes when the page is left."""
         self._show_notice(Question(self, self.theme, title, sentence), of)
 
     def ask_about_device(

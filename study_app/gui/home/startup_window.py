@@ -24,7 +24,7 @@ FIRST_TIME = (
 
 
 class OpeningWindow(QWidget):
-    """The note; ``cancelled`` when the operator goes back, which ends what has created no session yet."""
+    """The window shown while a session starts: progress, and Cancel (``cancelled``), which ends the preparation."""
 
     cancelled = Signal()
 
@@ -68,7 +68,7 @@ class OpeningWindow(QWidget):
         self._bar.setValue(round(100 * share))
 
     def show_line(self, line: str) -> None:
-        """Show what the device asks for instead of the progress."""
+        """Show the device's request in place of the progress."""
         self._said = True
         self.step.setText(line)
 

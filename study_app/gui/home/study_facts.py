@@ -51,7 +51,7 @@ _FIRST_STUDY: Final = "demo"
 
 @dataclass(frozen=True, slots=True)
 class DraftNote:
-    """What is said of a draft that was not saved, and when it was kept, as ISO 8601."""
+    """The note on an unsaved draft, and the time at which it was stored, as ISO 8601."""
 
     words: str
     kept_at: str
@@ -59,9 +59,9 @@ class DraftNote:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StudyFacts:
-    """A protocol as a card shows it; ``source`` is the name or path it is loaded by.
+    """A study as shown on a card; ``source`` is the name or path by which it is loaded.
 
-    ``origin`` says where it is from ("Shipped study", "Copy of demo"), ``draft`` what of it was not saved, if anything.
+    ``origin`` is its origin ("Shipped study", "Copy of demo"), ``draft`` the note on unsaved changes, if any.
     """
 
     source: str
@@ -77,7 +77,7 @@ class StudyFacts:
 
     @property
     def name(self) -> str:
-        """The study's name, which its sessions state."""
+        """The study's name, as stated in its sessions."""
         return self.protocol.study.name
 
     @property
@@ -88,7 +88,7 @@ class StudyFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BrokenFacts:
-    """A protocol file that cannot be used, and the first thing wrong with it; the rest as of `StudyFacts`."""
+    """A protocol file that cannot be used, and its first problem; other fields as in `StudyFacts`."""
 
     source: str
     problem: str
@@ -98,7 +98,7 @@ class BrokenFacts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DraftFacts:
-    """A study that was never saved: the path of its file, its title, and the rest as of `StudyFacts`."""
+    """A study that was never saved: the path of its file, its title; other fields as in `StudyFacts`."""
 
     source: str
     title: str
@@ -107,7 +107,7 @@ class DraftFacts:
 
 
 def known_sources() -> tuple[str, ...]:
-    """Return the known studies: recent files, the workspace's, then shipped ones; no liquid files."""
+    """Return the known studies: recent files, the workspace's, then shipped ones, without liquid files."""
     names = sorted(known_protocols(), key=lambda name: (is_shipped(name), name != "rek2024", name == "demo", name))
     known = dict.fromkeys((*recent_protocols(), *names))
     return tuple(source for source in known if not holds_liquids_alone(source))
@@ -127,7 +127,7 @@ def file_states(opened: Iterable[str]) -> frozenset[tuple[Path, int, int]]:
 
 
 class DraftWords(typing.Protocol):
-    """What the study designer says of a draft."""
+    """The study designer's description of a draft."""
 
     def draft_title(self, draft: str, folder: Path) -> str: ...
 
@@ -146,7 +146,7 @@ def last_written_ns(session: Path) -> int:
 
 
 def _last_study(results: Path) -> str:
-    """Return the study of the latest session under ``results``, samples excluded; "" if there is none."""
+    """Return the study of the latest session under ``results`` except samples; "" if there is none."""
     folders = results.glob("*/data/sub-*/ses-*")
     with suppress(StudyError, ValueError):
         last = max(
@@ -162,8 +162,8 @@ def read_studies(
 ) -> tuple[StudyFacts | BrokenFacts | DraftFacts, ...]:
     """Return the facts about each known study.
 
-    Drafts come first, the newest first of all, then ``opened`` ones, then the study that was run last under
-    ``results``; before the first session the demo.
+    Drafts come first, newest first, followed by ``opened`` studies and the study that was run last under ``results``,
+    or the demo before the first session.
     """
     opened = tuple(opened)
     last = "" if results is None else _last_study(results)
@@ -191,7 +191,7 @@ def _draft_facts(file: Path, draft_words: LoadWords) -> DraftFacts | None:
 
 
 def holds_liquids_alone(source: str) -> bool:
-    """Return whether a file holds liquids and no study; False if it cannot be read."""
+    """Return whether a file contains only liquids and no study; False if it cannot be read."""
     try:
         path = protocol_file(source)
         state = path.stat()
@@ -209,7 +209,7 @@ def _holds_liquids_alone(path: Path, _changed_ns: int, _size: int) -> bool:
 
 
 def is_shipped(source: str) -> bool:
-    """Return whether a source is a shipped study, not one of the same name in the workspace."""
+    """Return whether a source is a shipped study rather than one of the same name in the workspace."""
     try:
         return source in shipped() and protocol_file(source).resolve() == shipped_file(source).resolve()
     except ProtocolError:
@@ -228,7 +228,7 @@ def _origin_of(source: str) -> str:
 
 
 def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | BrokenFacts:
-    """Load the protocol ``source`` and return the facts by which a researcher chooses."""
+    """Load the protocol ``source`` and return the facts shown on its card."""
     try:
         protocol = load(source)
     except ProtocolError as error:
@@ -295,7 +295,7 @@ def _seconds(moment: str) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Interrupted:
-    """A session that can go on: who, where it stopped and what is on disk, in words; ``folder`` is the session's."""
+    """A session that can be resumed: participant, step and stored data as text; ``folder`` is the session's."""
 
     folder: Path
     source: str
@@ -307,9 +307,10 @@ class Interrupted:
 def interrupted_session(
     sessions: Iterable[SessionFacts], studies: Iterable[StudyFacts | BrokenFacts], now: datetime
 ) -> Interrupted | None:
-    """Return the newest session that can resume here: unfinished, not open in a program, with a known protocol.
+    """Return the newest session that can be resumed here: unfinished, not open, with a known protocol.
 
-    A protocol that cannot be used because its liquid file is lost still resumes: its liquids are sealed in the key.
+    A protocol that cannot be used because its liquid file is lost can still resume, since its liquids are sealed in the
+    key.
     """
     studies = tuple(studies)
     for session in sessions:
@@ -346,7 +347,7 @@ def interrupted_session(
 
 
 def _place_text(protocol: Protocol, schedule: Schedule, step: int) -> str:
-    """Return where a session resumes, without a condition: "in part 2, delay setting 3"."""
+    """Return the point at which a session resumes, without a condition: "in part 2, delay setting 3"."""
     language = operator_language(protocol)
     if step >= len(schedule.steps):
         return "after the last page"

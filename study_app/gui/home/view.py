@@ -66,11 +66,11 @@ CARDS_SHARE, BELOW_SHARE = 4, 3
 
 
 class HomePlace(Place):
-    """Protocols, sessions, device, lab.
+    """The page with studies, sessions, device and lab.
 
-    ``session_asked`` carries what an operator chose, ``results_asked`` the folder of a study, ``protocol_opened`` the
-    file of a study that was opened here, ``edit_asked`` the source of a study that is to be edited, ``new_asked`` that
-    of one that is to be copied, "" for any.
+    ``session_asked`` carries the operator's choices, ``results_asked`` a study folder, ``protocol_opened`` the file of
+    a study that was opened here, ``edit_asked`` the source of a study to edit, ``new_asked`` that of one to copy, ""
+    for any.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class HomePlace(Place):
         self.device.show_screens(_screen_lines(settings))
 
     def enter(self) -> None:
-        """Read protocols and results again; screens may have changed, too."""
+        """Reload protocols and results; screens may also have changed."""
         self.device.show_screens(_screen_lines(self.machine))
         QTimer.singleShot(0, self, self.read_changes)
         QTimer.singleShot(0, self, self.show_sessions)
@@ -145,7 +145,7 @@ class HomePlace(Place):
         return super().event(event)
 
     def read_changes(self) -> None:
-        """Read the protocols again, outside the windows' thread, if a file has changed."""
+        """Reread the protocols in the background if a file has changed."""
         if file_states(self._opened) != self._files:
             self.show_studies()
 
@@ -187,7 +187,7 @@ class HomePlace(Place):
         self._keep_margin(bar=False)
 
     def _keep_margin(self, bar: bool) -> None:
-        """Let an appearing scroll bar take the margin, so that nothing moves."""
+        """Let an appearing scroll bar use the margin, so that nothing moves."""
         self._page.setContentsMargins(MARGIN, 20, MARGIN - BAR_PX * (1 + bar), 12)
 
     @property
@@ -195,12 +195,12 @@ class HomePlace(Place):
         return self._studies.busy or self._reader.busy
 
     def show_results(self, results: Path) -> None:
-        """Show the workspace's protocols and the sessions of another folder from now on."""
+        """Show the workspace's protocols and the sessions of another results folder."""
         self.results = results
         self.show_studies()
 
     def show_studies(self) -> None:
-        """Read the known protocols outside the windows' thread; show a card for each, and the sessions."""
+        """Read the known protocols in the background; show a card for each, and the sessions."""
         self.folder.show_text(f"Workspace: {workspace().folder}")
         self._files, self._unread = file_states(self._opened), False
         self._studies.run(partial(read_studies, tuple(self._opened), self._draft_words, self.results))
@@ -244,7 +244,7 @@ class HomePlace(Place):
             self._focus_card(*held)
 
     def _focused_card(self) -> tuple[int, str, int] | None:
-        """Return place, study and button number of the focused card; None if none has the focus."""
+        """Return position, study and button number of the focused card; None if none has the focus."""
         now = self.window().focusWidget() if self.isVisible() else None
         for at, card in enumerate(self.grid.cards):
             if isinstance(card, StudyCard | BrokenCard) and now in _card_buttons(card):
@@ -252,7 +252,7 @@ class HomePlace(Place):
         return None
 
     def _focus_card(self, at: int, source: str, button: int) -> None:
-        """Focus the card of a study, which may have moved, else the card at its place."""
+        """Focus the card of a study, which may have moved, else the card at its former position."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         card = next(
             (candidate for candidate in cards if candidate.facts.source == source),
@@ -263,7 +263,7 @@ class HomePlace(Place):
             QTimer.singleShot(0, card, lambda: self.cards_area.ensureWidgetVisible(card))  # once it has its place
 
     def _order_focus(self) -> None:
-        """Let Tab follow the reading order: Qt would put new cards last."""
+        """Let Tab follow the reading order, since Qt puts new cards last."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         sessions, device = self.sessions, self.device
         parts: tuple[QWidget, ...] = (
@@ -276,7 +276,7 @@ class HomePlace(Place):
             QWidget.setTabOrder(before, after)
 
     def show_sessions(self) -> None:
-        """Read the results folder again, outside the windows' thread, after the studies."""
+        """Reread the results folder in the background, after the studies."""
         if not self._studies.busy:
             self._reader.run(partial(_read_sessions, self.results, self._facts))
 
@@ -293,7 +293,7 @@ class HomePlace(Place):
                 card.held.setText(session_counts_text(sessions, card.facts.protocol.study.name))
 
     def _fill_next_step(self) -> None:
-        """Fill one button alone: that of the banner, or without an interrupted session that of the first card."""
+        """Fill only one button: that of the banner or, without an interrupted session, that of the first card."""
         cards = [card for card in self.grid.cards if isinstance(card, StudyCard | BrokenCard)]
         first = next((card for card in cards if card.facts.draft is not None or isinstance(card, StudyCard)), None)
         if first is None:
@@ -323,7 +323,7 @@ class HomePlace(Place):
         dialog.accepted.connect(lambda: self.session_asked.emit(dialog.chosen()))
 
     def _ask_to_resume(self, session: Interrupted) -> None:
-        """Ask to resume a session as it was begun, on the present screens."""
+        """Ask to resume a session with its settings on the current screens."""
         try:
             names = [screen.name for screen in screens_shown()]
             chosen = resumed_choices(
@@ -389,8 +389,8 @@ class HomePlace(Place):
     def _share_height(self) -> None:
         """Give the cards at least their first row.
 
-        In a low window the lab, which the sidebar has, and most rows of the sessions give way. If the page still
-        scrolls, the cards get their whole height: one bar is enough.
+        In a low window the lab, which is also in the rail, and most rows of the sessions are hidden. If the page still
+        scrolls, the cards get their full height, so that there is only one scroll bar.
         """
         if (whole := self.grid.whole_height) <= 0:  # cards that came just now have no height yet
             return
@@ -409,7 +409,7 @@ class HomePlace(Place):
         self._page.activate()
 
     def _forget_heights(self) -> None:
-        """Let layouts ask for heights again, which they would do only after the next events."""
+        """Let layouts recompute heights now rather than after the next events."""
         for layout in (self._beside, self._below, self._below_row, self._page):
             layout.invalidate()
         self.below.updateGeometry()
@@ -428,9 +428,9 @@ class HomePlace(Place):
 
 
 class _Below(QWidget):
-    """Sessions, device and lab; if they share the height with the cards, as high as there is room for.
+    """Sessions, device and lab; if they share the height with the cards, they are as high as the room permits.
 
-    A layout gives a widget whose words wrap the height of its hint at least: then the minimum is the hint.
+    A layout gives a widget with wrapped text at least the height of its hint, so the minimum is used as the hint.
     """
 
     shares = True

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QWidget
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What the user can do by keys.
+    """A keyboard command.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Command:
         return tuple(f"{'hold ' * self.held}{_key_label(keys)}" for keys in self.keys)
 
     def action(self, place: QWidget, run: Callable[[], object]) -> QAction:
-        """Add its action to a widget and return it: the keys act anywhere in the window while the widget is shown."""
+        """Add its action to a widget and return it: the keys work anywhere in the window while the widget is shown."""
         made = QAction(self.words, place, toolTip=_with_keys(self), shortcutContext=Qt.ShortcutContext.WindowShortcut)
         made.setShortcuts([QKeySequence(keys) for keys in self.keys])
         made.triggered.connect(lambda _checked=False: run())
@@ -92,7 +92,7 @@ _NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": 
 
 
 def keys_markdown() -> str:
-    """Return every command with its keys, as a table of Markdown."""
+    """Return all commands with their keys as a Markdown table."""
     rows = (
         f"| {', '.join(command.key_labels)} | {command.words}{command.within and f' ({command.within})'} |"
         for command in COMMANDS
@@ -113,7 +113,7 @@ def connect_button(button: QAbstractButton, action: QAction) -> None:
 
 
 def keys_of(action: str) -> tuple[str, ...]:
-    """Return the keys of an action, as Qt names them."""
+    """Return the keys of an action in Qt's notation."""
     return _OF[action].keys
 
 

@@ -31,11 +31,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceShown:
-    """A device: ``name`` is for ``--device``, ``can`` says what it can and cannot do.
+    """A device as shown in windows: ``name`` is for ``--device``, ``can`` describes its capabilities.
 
-    ``tone``, ``sign`` and ``word`` are its state; ``why`` says why it cannot be used now, "" where it can;
-    ``ways`` are the libraries that it is reached by, with what each found.
-    ``choosable`` is whether its name can be taken as it is, ``diagnosable`` whether it can be examined as it is.
+    ``tone``, ``sign`` and ``word`` are its state; ``why`` is the reason why it cannot be used now, or ""; ``ways`` are
+    the libraries for it, each with the result of its probe. ``choosable`` tells whether its name can be used without an
+    argument, ``diagnosable`` whether it can be examined.
     """
 
     name: str
@@ -64,7 +64,7 @@ def devices_shown(backends: Sequence[Backend]) -> tuple[DeviceShown, ...]:
 
 
 def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
-    """Return the description of the preferred device; only its name if it was not searched for."""
+    """Return the description of the preferred device; only its name if no search has found it."""
     try:
         kind = descriptor_of(name).name
     except DeviceError as error:
@@ -85,7 +85,7 @@ def device_named(name: str, shown: Iterable[DeviceShown]) -> DeviceShown:
 
 
 def device_before_look(name: str) -> DeviceShown:
-    """Return the description of a device before the search."""
+    """Return the description of a device before the first search."""
     device = _descriptor(name)
     icon = "device" if device is None else device.icon
     return DeviceShown(
@@ -118,7 +118,7 @@ def window_options() -> tuple[DeviceOption, ...]:
 
 
 def remembered_options() -> tuple[DeviceOption, ...]:
-    """Return the options that this computer remembers."""
+    """Return the options that are stored on this computer."""
     return tuple(option for option in window_options() if option.name in REMEMBERED_OPTIONS)
 
 
@@ -145,7 +145,7 @@ def _device_shown(name: str, ways: Sequence[Backend]) -> DeviceShown:
 
 
 def _rank(backend: Backend) -> int:
-    """Return how close a backend is to being usable; a ready driver has not found a device yet."""
+    """Return how close a backend is to being usable; a ready driver without a device ranks lower."""
     if _is_connected(backend):
         return 0
     return {READY: 1, DRIVER_READY: 1, NONE: 2}.get(backend.state, 3)
@@ -177,7 +177,7 @@ def _sentence(text: str) -> str:
 
 
 def settings_here() -> tuple[MachineSettings, str]:
-    """Return the settings, and why they are the defaults if the file cannot be read ("" if it can)."""
+    """Return the settings, and the reason if they are defaults because the file cannot be read (else "")."""
     settings, trouble = workstation.load_or_default()
     try:
         descriptor_of(settings.device)
@@ -203,9 +203,9 @@ def text_scale_on(settings: MachineSettings, screen: QScreen) -> float:
 
 
 def described_screens(settings: MachineSettings, participant: QScreen, operator: QScreen) -> dict[str, Any]:
-    """Return the receipt's description of both screens, with the measurements of the participant's.
+    """Return the receipt's description of both screens, with measurements of the participant's.
 
-    ``frames`` says what times the participant's frames: the screen's swaps where a graphics card draws, else a clock.
+    ``frames`` names the timing source of the participant's frames: buffer swaps with a graphics card, else a clock.
     """
     shown = screen_shown(participant)
     frames = {"frames": LOCKED if has_graphics_card() else BY_CLOCK}

@@ -22,14 +22,14 @@ REASON: Final = "Please enter a reason; it is recorded."
 
 
 def choose_protocol(parent: QWidget, title: str) -> str:
-    """Ask for a file in the workspace's protocols; return its path, "" if the dialog was cancelled."""
+    """Ask for a file in the workspace's protocols; return its path, or "" if the dialog was cancelled."""
     return QFileDialog.getOpenFileName(parent, title, str(workspace().protocols), "Protocols (*.toml)")[0]
 
 
 class Question(QDialog):
-    """A question with its fields and a way back, or a notice with one button, where no ``go_on`` is given.
+    """A question with fields and Cancel, or a notice with one button if no ``go_on`` is given.
 
-    It blocks nothing: whatever is asked, the force can be stopped behind it.
+    It is not modal, so that the force can be stopped while it is open.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ class Question(QDialog):
         return self.editors[name].value
 
     def accept(self) -> None:
-        """Accept, unless an answer is missing."""
+        """Accept unless an answer is missing."""
         if self.is_complete():
             super().accept()
 
     def is_complete(self) -> bool:
-        """Return whether no answer is missing or refused; else show and focus the first one."""
+        """Return whether all answers are present and valid; else show and focus the first one that is not."""
         for editor in self.editors.values():
             try:
                 _ = editor.value
@@ -129,10 +129,10 @@ class Question(QDialog):
 
 
 class Work(Question):
-    """A question whose answer is worked on: it says how far that is, then leads to what came of it.
+    """A question followed by work: it shows the progress, then a link to the result.
 
-    ``begun`` when the work is to begin, ``stop_asked`` when it is to be given up, `close_stopped` closes the dialog.
-    ``opened`` when what came of it is to be shown.
+    ``begun`` is emitted when the work should begin, ``stop_asked`` when it should be cancelled, and `close_stopped`
+    closes the dialog. ``opened`` is emitted when the result should be shown.
     """
 
     begun = Signal()
@@ -148,7 +148,7 @@ class Work(Question):
         self.working = self.over = False
 
     def show_progress(self, sentence: str, share: float | None = None) -> None:
-        """Show the present activity and the share that is done (0 to 1), if known."""
+        """Show the current activity and the fraction done (0 to 1), if known."""
         self.said.setText(sentence)
         self.bar.setRange(0, 0 if share is None else STEPS)
         self.bar.setValue(round(STEPS * (share or 0.0)))
@@ -162,7 +162,7 @@ class Work(Question):
         self.go_on.setFocus()
 
     def show_refused(self, sentence: str) -> None:
-        """Show why the work was refused; the answers can be changed."""
+        """Show why the work was rejected; the answers can be changed."""
         for editor in self.editors.values():
             editor.show()
         set_ink(self.said, "bad")

@@ -92,7 +92,7 @@ def typed_file(name: str, text: str) -> Path | None:
 
 
 class _Radios(QWidget):
-    """Values of which one is chosen, at first the first, below each other."""
+    """A vertical group of options, of which the first is initially chosen."""
 
     def __init__(self, options: Iterable[tuple[Any, str]]) -> None:
         super().__init__()
@@ -111,7 +111,7 @@ class _Radios(QWidget):
 
 
 class _Line(QLineEdit):
-    """A line that is shown as it was at Esc; ``restored`` asks for it."""
+    """A line edit; ``restored`` is emitted at Esc to restore the displayed text."""
 
     restored = Signal()
 
@@ -125,8 +125,8 @@ class _Line(QLineEdit):
 class Editor(QWidget):
     """A label, a control with its unit or a button, and a line below.
 
-    ``changed(name, value)`` comes for a value that was chosen or typed to its end and is permitted, ``edited(name)`` at
-    every key, too. What is not permitted is said below, unless the form ``judges`` it elsewhere.
+    ``changed(name, value)`` is emitted for a valid value that was chosen or completely typed, ``edited(name)`` also at
+    every key. Invalid values are reported below, unless the form ``judges`` them elsewhere.
     """
 
     changed = Signal(str, object)
@@ -197,7 +197,7 @@ class Editor(QWidget):
 
     @property
     def value(self) -> Any:
-        """The value of the control; raises ValueError if it is not permitted."""
+        """The value of the control; raises ValueError if it is invalid."""
         match self.control:
             case _Radios():
                 return self.control.value
@@ -222,7 +222,7 @@ class Editor(QWidget):
             self.control.addItem(text, value)
 
     def show_value(self, value: Any, hint: str | None = None) -> None:
-        """Show a value with a hint below; text that is being typed stays."""
+        """Show a value with a hint below; text that is being typed is kept."""
         self._hint = self.field.hint if hint is None else hint
         match self.control:
             case QAbstractButton():

@@ -33,7 +33,7 @@ _DASH: dict[str, tuple[float, float] | None] = {"solid": None, "long": (6.0, 3.0
 
 @dataclass(frozen=True, slots=True)
 class _CurveStyle:
-    """A curve: its name, how its colour is found in a theme, and its stroke."""
+    """A curve: its name, its colour in a theme, and its stroke."""
 
     name: str
     colour: Callable[[Theme], str]
@@ -48,7 +48,7 @@ _LIMIT = _CurveStyle("limit", lambda theme: theme.bad, "short", 1.6)
 
 
 class _Legend(Themed, QWidget):
-    """Names of curves, each behind a piece of its stroke."""
+    """Names of curves, each after a sample of its stroke."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -94,7 +94,7 @@ class _Legend(Themed, QWidget):
 
 
 class _CurvePlot(Plot):
-    """Curves from 0 upwards over the last 2.5 s; the height grows at once, and shrinks only by half."""
+    """Curves above 0 over the last 2.5 s; the scale grows at once and shrinks only by half."""
 
     def __init__(self, styles: tuple[_CurveStyle, ...], least: float) -> None:
         super().__init__()
@@ -160,7 +160,7 @@ _SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over
 
 
 class _ReadingCard(Card):
-    """A card whose content is hidden, in the same place, while the comparison is blind."""
+    """A card whose content is hidden, with its space kept, while the comparison is blind."""
 
     def __init__(self, title: str, aside: QLabel, why: str, *, padding: int = 15, gap: int = 6) -> None:
         super().__init__(title, aside, padding=padding, gap=gap)
@@ -176,7 +176,7 @@ class _ReadingCard(Card):
     def show_blind(self, blind: bool) -> bool:
         """Show the content, or that it is hidden; return whether it is hidden.
 
-        Hidden content stays as it was before: its size would tell when another setting is felt.
+        Hidden content is not updated: a change of size would reveal that another setting is felt.
         """
         self.stack.setCurrentIndex(int(blind))
         self.aside.setVisible(not blind)
@@ -184,7 +184,7 @@ class _ReadingCard(Card):
 
 
 class _PlotCard(_ReadingCard):
-    """A plot under its heading and its curves' names."""
+    """A plot below its heading and the names of its curves."""
 
     def __init__(self, title: str, unit: str, plot: Plot, sentence: str) -> None:
         why = "The trace would reveal the settings."
@@ -197,7 +197,7 @@ class _PlotCard(_ReadingCard):
 
 
 class ForceCard(_PlotCard):
-    """The force of both settings on the same motion, and the limit of the one that is felt."""
+    """The force of both settings for the same motion, and the limit of the one that is felt."""
 
     def __init__(self) -> None:
         super().__init__("Force on the hand", f"N, last {SPAN_S:g} s", _CurvePlot((B, A), 1.0), _FORCE_SENTENCE)
@@ -218,7 +218,7 @@ class ForceCard(_PlotCard):
 
 
 class SpeedCard(_PlotCard):
-    """How fast the body is, and the wake that it meets in both settings."""
+    """The speed of the body, and the wake velocity at it in both settings."""
 
     def __init__(self) -> None:
         super().__init__("Body and wake", f"m/s, last {SPAN_S:g} s", _CurvePlot((_BODY, B, A), 0.5), _SPEED_SENTENCE)
@@ -239,7 +239,7 @@ def _vector_sizes(vectors: Floats) -> Floats:
 
 
 def _thinned(t_s: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return the newest time and the largest value of each group of samples, so that no peak is lost."""
+    """Return the newest time and the largest value of each group of samples, so that peaks are kept."""
     step = max(1, len(t_s) // _POINTS)
     first = len(t_s) % step
     return t_s[first:].reshape(-1, step)[:, -1], values[first:].reshape(-1, step).max(axis=1)
@@ -254,7 +254,7 @@ _LimiterState = Literal["acting", "acted", "quiet"]
 
 
 class CostLine(QWidget):
-    """An effect, a bar as long as its share of the most expensive, and its ns."""
+    """An effect, a bar relative to the most expensive effect, and its time in ns."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -282,7 +282,7 @@ class CostLine(QWidget):
 
 
 class AbsentLine(QWidget):
-    """An effect that takes nothing, and why."""
+    """An effect without a cost, and the reason."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -298,7 +298,7 @@ class AbsentLine(QWidget):
 
 
 class CostCard(_ReadingCard):
-    """What each effect takes of a tick."""
+    """The time of each effect per tick."""
 
     def __init__(self) -> None:
         super().__init__("Cost per tick", label("", "small", "text2"), "Costs would reveal the settings.")
@@ -334,14 +334,14 @@ class CostCard(_ReadingCard):
         self.sum.setText(f"{grouped(round(tick_ns))} ns of {period_ms:g} ms" if view.cost else "not measured yet")
 
     def _show_waiting(self) -> None:
-        """Clear the numbers and keep the lines, so that nothing jumps while a slider is dragged."""
+        """Clear the numbers but keep the lines, so that the layout is stable while a slider is dragged."""
         for line in self.lines:
             line.show_waiting()
         self.sum.setText(_UNKNOWN)
 
 
 class ErrorLine(QWidget):
-    """A measure, and its value."""
+    """A measure and its value."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -356,7 +356,7 @@ class ErrorLine(QWidget):
 
 
 class ErrorCard(_ReadingCard):
-    """How far the felt setting is from its reference."""
+    """The deviation of the felt setting from its reference."""
 
     def __init__(self) -> None:
         why = "Errors would reveal the settings."
@@ -378,7 +378,7 @@ class ErrorCard(_ReadingCard):
 
 
 class LimiterLine(Themed, QWidget):
-    """A limiter: a mark, its name, and in how many ticks it acted; tinted while it acts."""
+    """A limiter: a mark, its name, and the number of ticks in which it acted; tinted while it acts."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -421,7 +421,7 @@ class LimiterLine(Themed, QWidget):
 
 
 class LimiterCard(_ReadingCard):
-    """Which limiter acts, and in how many ticks of the last ten seconds each did."""
+    """The active limiters, and the number of ticks in which each acted in the last ten seconds."""
 
     def __init__(self) -> None:
         why = "Limiters would reveal the settings."

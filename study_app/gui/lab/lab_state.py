@@ -32,7 +32,7 @@ SIDES: tuple[Side, Side] = ("A", "B")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Now:
-    """Where the hand is [m, hand frame], the force felt on it [N], the wake that the body meets [m/s, scene]."""
+    """The current hand position [m, hand frame], force on the hand [N], and wake velocity at the body [m/s, scene]."""
 
     position_m: Point
     force_n: Point = (0.0, 0.0, 0.0)
@@ -41,7 +41,7 @@ class Now:
 
 @dataclass(frozen=True, slots=True)
 class CostRow:
-    """An effect and the ns it takes of a tick; ``ns`` None where it is not there, and ``why`` not ("not used")."""
+    """An effect and its time per tick; ``ns`` is None if it is absent, for the reason ``why`` ("not used")."""
 
     effect: str
     ns: float | None
@@ -50,7 +50,7 @@ class CostRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorRow:
-    """A measure of how far the felt setting is from its reference, written out: ("Force, largest", "< 0.001 N")."""
+    """A deviation of the felt setting from its reference as text: ("Force, largest", "< 0.001 N")."""
 
     measure: str
     value: str
@@ -59,9 +59,9 @@ class ErrorRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DeviceShown:
-    """Which devices can be chosen, which is, and how it is: ``state`` is one or two words.
+    """The devices that can be chosen, the chosen one, and its ``state`` in one or two words.
 
-    ``pointer`` is whether the window's pointer moves it, ``diagnosable`` whether it can be examined.
+    ``pointer`` tells whether the mouse pointer moves it, ``diagnosable`` whether it can be examined.
     """
 
     choices: Choices
@@ -74,14 +74,14 @@ class DeviceShown:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LabView:
-    """Everything on the liquid lab's place.
+    """The content of the liquid lab.
 
-    ``liquids`` are what a side can be set to, ``paths`` the programmed motions; ``path`` is the one that runs, None for
-    live motion alone. ``busy`` says what is waited for ("Opening the Falcon"); ``refused`` is the parameter that could
-    not be changed and one line why, a new pair for every refusal; ``said`` tells what was saved or opened last.
-    ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None where nothing has moved yet, a tail also where the setting
-    has no wake. ``cost`` and ``errors`` are of the felt setting, empty until they are measured; ``measuring`` while
-    they are measured anew. ``study`` is the study that is edited and takes changes back, "" without one.
+    ``liquids`` are the possible settings of a side, ``paths`` the programmed motions; ``path`` is the running one, None
+    for live motion. ``busy`` is the current activity ("Opening the Falcon"); ``refused`` is the parameter that could
+    not be changed and the reason, a new pair for every rejection; ``said`` names what was saved or opened last.
+    ``tail_a``, ``tail_b``, ``trace`` and ``now`` are None before the first motion, a tail also if the setting has no
+    wake. ``cost`` and ``errors`` are those of the felt setting, empty until they are measured; ``measuring`` is set
+    during a new measurement. ``study`` is the edited study that takes changes back, or "".
     """
 
     workbench: Workbench

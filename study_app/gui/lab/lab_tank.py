@@ -55,7 +55,7 @@ _LEAST_FOR_HEAD_PX = 46.0  # of a segment's length on the screen
 
 @dataclass(frozen=True, slots=True)
 class TailPlaces:
-    """Runs of one shade from the oldest to the newest, where segments begin, and an arrow head (place, turn) on each.
+    """The screen positions of a tail: runs of one shade from old to new, segment starts, and arrow heads (place, turn).
 
     ``floor`` is the tail's shadow.
     """
@@ -135,7 +135,7 @@ def _shade_style(shade: int) -> tuple[QColor, float]:
 
 
 def _shade_runs(points: list[QPointF], shades: NDArray[np.int_]) -> list[tuple[int, QPolygonF]]:
-    """Return the stretches of one shade, each beginning at the end of the previous one."""
+    """Return the runs of one shade, each beginning at the end of the previous one."""
     cuts = [0, *(int(cut) for cut in np.flatnonzero(np.diff(shades)) + 1), len(points) - 1]
     return [
         (int(shades[start]), QPolygonF(points[start : end + 1]))
@@ -156,7 +156,7 @@ def _arrow_head(pixels: Floats) -> tuple[QPointF, float, int] | None:
 
 
 def _drawn_rows(pixels: Floats) -> NDArray[np.int_]:
-    """Return the rows that are drawn: both ends, and one every few px between."""
+    """Return the rows that are drawn: both ends, and one every few px between them."""
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(pixels, axis=0).T))])
     kept = np.flatnonzero(np.diff(np.floor(arc / _STEP_PX), prepend=-1.0))
     return np.unique(np.append(kept, len(pixels) - 1))
@@ -185,7 +185,7 @@ _PITCH = math.radians(27)  # higher than the participant's eye: wakes are mostly
 
 
 class LabTank(Themed, QWidget):
-    """Draws the tank of a `LabView`; ``moved`` and ``pressed`` are the hand's while the pointer is taken."""
+    """Draws the tank of a `LabView`; ``moved`` and ``pressed`` report the hand while the pointer is captured."""
 
     moved = Signal(float, float, float)
     pressed = Signal(int)
@@ -304,7 +304,7 @@ class LabTank(Themed, QWidget):
         self._paint_corners(painter)
 
     def _still_image(self, camera: Camera) -> Backdrop | None:
-        """Return the image of the still parts at this size; None while it is painted in the background."""
+        """Return the image of the static parts at this size; None while it is painted in the background."""
         wanted = ((self.width(), self.height()), self.devicePixelRatioF(), self.box, camera)
         if wanted != self._wanted:
             self._wanted, self.still = wanted, None
@@ -445,7 +445,7 @@ EDGE, FOOT = 16, 56
 
 
 class TankNote(Card):
-    """One sentence and one button; nothing while all is well. Waiting is shown only after 300 ms."""
+    """One sentence and one button, shown only if there is a problem. Waiting is shown after 300 ms."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(padding=12, gap=8)
@@ -490,7 +490,7 @@ class TankNote(Card):
             self._show_note()
 
     def place(self) -> None:
-        """Put the note in the middle of the tank's lower edge, wide enough for its text and below the tank's top."""
+        """Centre the note at the tank's lower edge, wide enough for its text and below the tank's top."""
         parent = self.parentWidget()
         if parent is not None and not self.isHidden():
             room = parent.width() - 2 * EDGE

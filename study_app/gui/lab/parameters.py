@@ -62,7 +62,7 @@ class _Badge(Themed, QWidget):
 
 
 class _Segment(Themed, QPushButton):
-    """One side: its letter and its name; the felt one is raised, with an accent edge."""
+    """One side: its letter and its name; the felt side is raised, with an accent edge."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -93,11 +93,11 @@ class _Segment(Themed, QPushButton):
         self.setIcon(QIcon(picture))
 
     def nextCheckState(self) -> None:
-        """Leave the choice of the felt side to the view."""
+        """Do nothing: the view decides which side is felt."""
 
 
 class _SideSwitch(QWidget):
-    """Both sides in a track; ``switched`` when the other one is to be felt. The X key does the same."""
+    """A switch between both sides; ``switched`` is emitted when the other one should be felt. X does the same."""
 
     switched = Signal()
 
@@ -128,7 +128,7 @@ _LETTERS = 13  # of a choice before it is cut
 
 
 class _Picker(Choice):
-    """A list with an icon before the word it is at."""
+    """A list with an icon before its current label."""
 
     def __init__(self, icon: str, name: str) -> None:
         super().__init__()
@@ -160,7 +160,7 @@ class _Picker(Choice):
 
 
 class LabHeader(QWidget):
-    """One row in a wide window, two in a narrow one."""
+    """The header: one row in a wide window, two in a narrow one."""
 
     blind_asked = Signal(bool)
     device_chosen = Signal(str)
@@ -200,7 +200,7 @@ class LabHeader(QWidget):
         self._grid.setColumnStretch(2, 1)
 
     def arrange(self, *, narrow: bool) -> None:
-        """Use one row or two; the force stop stays at the right of the first."""
+        """Use one row or two; the force stop stays at the right end of the first."""
         if narrow == self._narrow:
             return
         self._narrow = narrow
@@ -250,7 +250,7 @@ _SWITCHED = {OFF, ON}
 
 @dataclass(frozen=True, slots=True)
 class _FormRow:
-    """A parameter as it is, and as it was when the liquid was chosen."""
+    """A parameter with its current value and its value when the liquid was chosen."""
 
     parameter: Parameter
     value: Value
@@ -262,7 +262,7 @@ class _FormRow:
 
 
 class ParameterRow(QWidget):
-    """What every row has: ``changed(name, value, held)``, and a line below for why something was refused."""
+    """Common base of rows: ``changed(name, value, held)``, and a line below for the reason of a rejection."""
 
     changed = Signal(str, object, bool)
 
@@ -292,13 +292,13 @@ class ParameterRow(QWidget):
         raise NotImplementedError
 
     def show_refused(self, why: str) -> None:
-        """Show in one line why a value is refused; the typed text stays."""
+        """Show in one line why a value is rejected; the typed text is kept."""
         self._refused = why
         self.why.setText(why)
         self._below.setVisible(bool(why))
 
     def let_go(self) -> None:
-        """Release the slider, and hide the refusal, which belongs to another setting."""
+        """Release the slider, and hide the rejection, which belongs to another setting."""
         self.show_refused("")
 
     def parts(self) -> tuple[QWidget, ...]:
@@ -306,7 +306,7 @@ class ParameterRow(QWidget):
 
 
 class _NumberRow(ParameterRow):
-    """A number: slider and field, the unit behind them, the preset's value a tick on the slider."""
+    """A number: slider and field, followed by the unit; the preset's value is a tick on the slider."""
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
@@ -378,7 +378,7 @@ class _NumberRow(ParameterRow):
         self.changed.emit(self.parameter.name, self._value(shown), False)
 
     def _value(self, shown: float) -> float:
-        """Return the shown number in SI units: the preset's or present value itself if it reads the same."""
+        """Return the displayed number in SI units, or the exact preset or current value if it reads the same."""
         row = self._row
         for known in (row.preset, row.value) if row is not None else ():
             if isinstance(known, int | float) and read_number(self._text(known)) == shown:
@@ -402,7 +402,7 @@ class _NumberRow(ParameterRow):
 
 
 class _ChoiceRow(ParameterRow):
-    """One of a few words."""
+    """A choice between a few values."""
 
     def __init__(self, parameter: Parameter) -> None:
         super().__init__(parameter)
@@ -481,7 +481,7 @@ HIDDEN = "Hidden during a blind comparison"
 
 
 class SectionBlock(QWidget):
-    """A heading with its rows, and how many of them are changed; two switches share a line."""
+    """A heading with its rows, and the number of changed ones; two switches share a line."""
 
     def __init__(self, section: Section) -> None:
         super().__init__()
@@ -509,7 +509,7 @@ class SectionBlock(QWidget):
 
 
 class FormPanel(Card):
-    """Liquid and parameters of the side that is felt; while blind, nothing of them in the same place."""
+    """Liquid and parameters of the felt side; hidden, with the space kept, while the comparison is blind."""
 
     changed = Signal(str, object, bool)
     liquid_chosen = Signal(str, object)
@@ -599,7 +599,7 @@ class FormPanel(Card):
             self.blocks[section.title].show_section(section, setting)
 
     def _make_rows(self, form_sections: tuple[Section, ...]) -> None:
-        """Make new rows; the keyboard focus and the scroll position stay."""
+        """Create new rows; focus and scroll position are kept."""
         rows = self.rows.items()
         focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
         scrolled_px = self.area.verticalScrollBar().value()

@@ -31,12 +31,12 @@ _SUFFIX = ".toml"
 
 
 class LabPlace(Place):
-    """The lab as a place of the operator's window.
+    """The lab as a page of the operator's window.
 
-    ``asked(what, details)`` carries requests by their names: of parameters in SI (``held`` while a slider is dragged),
-    of the mouse while it moves the ball [m, hand frame], of files with the `Setting` that was felt, of the device and
-    the force; "enter" and "leave" as the place is shown and hidden. ``put_back_asked`` is the felt side
-    and its `Setting`, for the study that is edited.
+    ``asked(what, details)`` carries named requests: for parameters in SI (``held`` while a slider is dragged), for the
+    mouse while it moves the ball [m, hand frame], for files with the felt `Setting`, for the device and the force;
+    "enter" and "leave" when the page is shown and hidden. ``put_back_asked`` carries the felt side and its `Setting`,
+    for the edited study.
     """
 
     asked = Signal(str, tuple)

@@ -89,7 +89,7 @@ def _hint_text(view: OperatorView) -> str:
 
 
 class _NoteField(QPlainTextEdit):
-    """Where a note is written; Enter keeps it, Shift+Enter begins a line."""
+    """A field for notes; Enter stores the note, Shift+Enter begins a new line."""
 
     entered = Signal()
 
@@ -139,7 +139,7 @@ class NotesCard(Card):
         self.add.clicked.connect(self._add_note)
 
     def show_lines(self, most: int) -> None:
-        """Show at most so many notes; heading and hint are hidden with the first omitted note."""
+        """Show at most ``most`` notes; heading and hint are hidden with the first omitted note."""
         self._shown = most
         self._head.setVisible(most == NOTES_SHOWN)
         self._list.setVisible(most > 0)
@@ -174,7 +174,7 @@ class NotesCard(Card):
 
 
 class _NoteRow(QWidget):
-    """Sign, time and text, of the newest note in two lines; a long text ends in "…" and is whole in the tip."""
+    """Sign, time and text; the newest note has two lines, and elided texts are complete in the tip."""
 
     def __init__(self, *, newest: bool) -> None:
         super().__init__()
@@ -195,7 +195,7 @@ LEAST_WIDTH, LEAST_HEIGHT = 320, 160
 
 
 class _StopButton(Themed, QPushButton):
-    """STOP FORCE, and the other ways to stop it; it acts when pressed, not when released."""
+    """STOP FORCE, with the other ways to stop it; it acts when pressed, not when released."""
 
     def __init__(self, device_button: str) -> None:
         super().__init__()
@@ -228,9 +228,10 @@ class _StopButton(Themed, QPushButton):
 
 
 class StopPanel(Card):
-    """The button under a line that says whether there is force, with the way back after a stop.
+    """The stop button below a line with the state of the force, and after a stop the button to resume.
 
-    Of a device that exerts none (``felt``) the line says so; ``device_button`` stops the force, too, if it has one.
+    For a device without force (``felt``) the line says so; ``device_button`` is the device button that also stops the
+    force, if any.
     """
 
     def __init__(self, *, felt: bool = True, device_button: str = "") -> None:
@@ -286,7 +287,7 @@ class DeviceCard(Card):
         self.rows: list[tuple[QLabel, Elided]] = []
 
     def show_rows(self, most: int) -> None:
-        """Show at most so many rows; the rest is in the card's tip."""
+        """Show at most ``most`` rows; the others are in the card's tip."""
         self._most = most
         if self._view is not None:
             self.show_view(self._view)

@@ -32,7 +32,7 @@ NOTES_SHOWN = 3
 
 @dataclass(frozen=True, slots=True)
 class StepRow:
-    """A row of the rail; ``note`` is its duration, "now" or how far it is."""
+    """A row of the rail; ``note`` is its duration, "now" or its progress."""
 
     label: str
     state: _StepState
@@ -41,7 +41,7 @@ class StepRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrialTime:
-    """Time in the task: ``most_s`` None where the task has no end of its own."""
+    """Time in the task; ``most_s`` is None if the task has no time limit."""
 
     elapsed_s: float
     least_s: float | None
@@ -56,7 +56,7 @@ class TrialTime:
 
 @dataclass(frozen=True, slots=True)
 class DeviceView:
-    """The device's card: its name, whether it answers, and rows of (label, value), the most important ones first."""
+    """The device's card: its name, whether it responds, and rows of (label, value), most important first."""
 
     name: str
     icon: Icon
@@ -66,15 +66,15 @@ class DeviceView:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorView:
-    """Everything on the operator's window except the two plots' points.
+    """The content of the operator's window except the data of the two plots.
 
-    ``elapsed_s`` is the time that was worked: not the gap before a session was resumed. ``main_trials`` counts those
-    that were left behind, and all. ``trial`` is the number of the trial under way or answered.
-    ``waits`` says that the trouble is a disk that takes nothing: the session goes on when it does again. ``beyond``
-    says whether the device is slower than at the start, which outlets and recordings were lost, how many trials were
-    not delivered, then of each trial out of limits which it broke, the newest first. ``may_reconnect`` says that the
-    trouble is a device that can be connected again, ``reconnects`` that it is being so, ``reconnection`` how far that
-    is, or why it failed. ``track`` says how the track of the latest trial with a design is doing, without a level.
+    ``elapsed_s`` is the working time without the gap before a resumption. ``main_trials`` counts finished trials and
+    all. ``trial`` is the number of the trial being presented or answered. ``waits`` means that writing to the disk
+    fails; the session continues when it succeeds again. ``beyond`` lists a slower device than at the start, lost
+    outlets and recordings, undelivered trials, and the limits violated by each trial, newest first. ``may_reconnect``
+    means that a failed device can be reconnected, ``reconnects`` that this is under way, ``reconnection`` is its
+    progress, or why it failed. ``track`` is the progress of the track of the latest trial with a design, without a
+    level.
     """
 
     study: str
@@ -130,7 +130,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """What stays the same through a session and is shown: who, with what, by which limits."""
+    """The constant data of a session that are shown: participant, devices, and limits."""
 
     protocol: Protocol
     schedule: Schedule
@@ -154,12 +154,12 @@ class Session:
         return step if isinstance(step, Trial) else None
 
     def main_trials(self, progress: Progress) -> tuple[int, int]:
-        """Return how many main trials are done, and how many there are."""
+        """Return the number of finished main trials, and their total number."""
         main = [at for at, step in enumerate(self.schedule.steps) if isinstance(step, Trial) and step.phase == "main"]
         return sum(at < progress.here or progress.reached_end for at in main), len(main)
 
     def broken_limits(self, progress: Progress) -> dict[int, tuple[Broken, ...]]:
-        """Return the limits that finished trials broke and the operator may know: lateness and gaps if double-blind."""
+        """Return the limits violated by finished trials that the operator may know: only timing if double-blind."""
         hidden = SEALED if self.protocol.study.blinding == "double" else frozenset()
         return {
             trial: tuple(limit for limit in them if limit[0] not in hidden) for trial, them in progress.broken.items()
@@ -185,11 +185,11 @@ def operator_view(
 ) -> OperatorView:
     """Return the operator's view at ``now_s`` on the session's clock.
 
-    ``trouble`` is what the journal does not say; ``device_ready`` and ``faults`` (how many there were since the program
-    was started) are the servo's own, whatever other trouble there is; ``forces`` are shown where a study is
-    single-blind; ``lost`` says of trials why their recordings were lost, also where no journal tells it yet;
-    ``dropped`` counts the samples that the recording of the trial under way lacks by now; ``outlets_lost`` says why
-    outlets to other programs failed.
+    ``trouble`` is a problem that the journal does not contain; ``device_ready`` and ``faults`` (their number since the
+    program was started) are those of the servo, regardless of other problems; ``forces`` are shown in single-blind
+    studies; ``lost`` maps trials to the reasons for lost recordings, even before the journal contains them; ``dropped``
+    counts the samples missing in the current recording; ``outlets_lost`` are the reasons why outlets to other programs
+    failed.
     """
     trouble = trouble or progress.broke
     state = _state(progress, force_on=force_on, trouble=trouble)
@@ -398,7 +398,7 @@ def _incomplete_recording_sentences(session: Session, progress: Progress, now: M
 
 
 def _limit_sentences(session: Session, progress: Progress) -> tuple[str, ...]:
-    """Return a sentence for every finished trial that broke a limit, newest first."""
+    """Return a sentence for every finished trial that violated a limit, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
         f"{labels[number]} out of limits: " + "; ".join(broken_limit_text(*limit) for limit in beyond)
@@ -408,7 +408,7 @@ def _limit_sentences(session: Session, progress: Progress) -> tuple[str, ...]:
 
 
 def stages(protocol: Protocol, schedule: Schedule) -> tuple[Stage, ...]:
-    """Return the rows of the rail: a row for each page and setting, and one for a long block."""
+    """Return the rows of the rail: one for each page and setting, but only one for a long block."""
     language = operator_language(protocol)
     rows: list[Stage] = []
     index = 0

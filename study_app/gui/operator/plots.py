@@ -31,9 +31,9 @@ _FILL_ALPHA = 46
 
 
 class _ForcePlot(TracePlot):
-    """Force on the hand along x, y, z, its size as a field behind them, and the limit.
+    """Force on the hand along x, y, z, its magnitude as an area behind them, and the limit.
 
-    The scale follows the force of the last ten seconds, up to the limit: most liquids stay far below it.
+    The scale follows the force of the last ten seconds, up to the limit, since most liquids stay far below it.
     """
 
     limits: tuple[pg.InfiniteLine, ...] = ()
@@ -150,7 +150,7 @@ class PositionCard(Card):
 
 
 class HiddenForceCard(Card):
-    """In the place and size of the force's plot while the study is double-blind: nothing about the force."""
+    """A placeholder of the force plot's size while the study is double-blind: nothing about the force."""
 
     TITLE = "Hidden while the study is double-blind"
     WHY = "The trace would reveal the liquid."

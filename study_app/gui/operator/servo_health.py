@@ -21,10 +21,10 @@ _TRACE_STEP_S = 0.02
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vitals:
-    """Figures of the tiles; a rate or percentile is None while too little has been measured.
+    """Figures of the tiles; a rate or percentile is None until enough has been measured.
 
-    ``refreshes_missed`` are those of the participant's screen, out of so many, that brought no new frame of the tank.
-    ``delay_ticks`` is the delay of a force that the servo assumes now, ``first_delay_ticks`` the one at the start.
+    ``refreshes_missed`` are the refreshes of the participant's screen, out of the total, without a new frame of the
+    tank. ``delay_ticks`` is the force delay that the servo currently assumes, ``first_delay_ticks`` that at the start.
     """
 
     rate_hz: float | None = None
@@ -40,7 +40,7 @@ class Vitals:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tile:
-    """A number with its unit, a verdict and a line that says what the verdict compares with."""
+    """A number with its unit, a verdict, and a line with the reference for the verdict."""
 
     title: str
     value: str
@@ -50,9 +50,9 @@ class Tile:
 
 
 class ServoHealth:
-    """Takes telemetry and painted frames as they come; gives figures, a histogram and traces when asked.
+    """Collects telemetry and painted frames, and provides figures, a histogram and traces.
 
-    Rates are what was asked for; ``overruns`` is the servo's own count, set by whoever asks it.
+    Rates are requested rates; ``overruns`` is the servo's own count, set by the caller.
     """
 
     def __init__(self, rate_hz: float, refresh_hz: float = 60.0) -> None:
@@ -87,7 +87,7 @@ class ServoHealth:
         self._ticks += count
 
     def add_hand_position(self, at_s: float, position_m: Any) -> None:
-        """Add the hand's position [m, hand frame]; positions more frequent than the trace's resolution are ignored."""
+        """Add the hand's position [m, hand frame]; positions beyond the trace's resolution are dropped."""
         if self._path_rows and at_s < self._path[(self._path_rows - 1) % len(self._path), 0] + _TRACE_STEP_S:
             return
         self._path[self._path_rows % len(self._path)] = (at_s, *position_m)
@@ -96,7 +96,7 @@ class ServoHealth:
     def add_frame(self, painted_ns: int) -> None:
         """Add the time at which a frame of the tank was painted; refreshes since the last one were missed.
 
-        Whether what a frame shows is late is another matter: the trial's row has that (``frames_late``).
+        The lateness of a frame's content is in the trial's row (``frames_late``).
         """
         if self._last_frame_ns:
             gap = painted_ns - self._last_frame_ns
@@ -161,7 +161,7 @@ def _into_ring(ring: NDArray[Any], written: int, rows: NDArray[Any]) -> None:
 
 
 def health_tiles(vitals: Vitals, rate_hz: float, limit_s: float) -> tuple[Tile, ...]:
-    """Return the tiles of the operator's window; ``rate_hz`` was asked for, ``limit_s`` is the limit of lateness."""
+    """Return the tiles of the operator's window; ``rate_hz`` is the requested rate, ``limit_s`` the lateness limit."""
     rate = vitals.rate_hz
     p99 = vitals.lateness_p99_s
     p99_value, _, p99_unit = duration_words(p99).partition(" ") if p99 is not None else ("–", "", "")
@@ -211,7 +211,7 @@ FORCE, SIZE = slice(0, 3), 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceFigures:
-    """Of the trial under way, or the last: the force's share of its limit (now, most), and ticks by limiter.
+    """For the current or last trial: the force relative to its limit (now, maximum), and ticks by limiter.
 
     ``withheld`` is the share of the force so far that limits, passivity controller and device withheld.
     """
@@ -223,7 +223,7 @@ class ForceFigures:
 
 
 def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
-    """Return share of the limit, limiters and withheld force, or that they are hidden; equally many rows."""
+    """Return share of the limit, limiters and withheld force, or as many rows that say they are hidden."""
     share, limiters = f"Force relative to {protocol.device.force_limit_n:g} N", "Limiters acted"
     withheld = f"Force held back, limit {protocol.limits.withheld_percent:g}{THIN_SPACE}%"
     if protocol.study.blinding == "double":
@@ -239,7 +239,7 @@ def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[s
 
 
 class Forces:
-    """Takes telemetry as it comes; of every 20 ms it keeps the strongest force, so that no peak is missed."""
+    """Collects telemetry; for every 20 ms it keeps the strongest force, so that no peak is missed."""
 
     def __init__(self, limit_n: float) -> None:
         self.limit_n = limit_n

@@ -39,7 +39,7 @@ def _shown_state(view: OperatorView) -> tuple[Tone, str, str]:
 
 
 class _ThemeButton(IconButton):
-    """Changes between light and dark; a moon in light, a sun in dark."""
+    """Toggles light and dark; it shows a moon in light mode, a sun in dark mode."""
 
     def __init__(self) -> None:
         super().__init__("moon", "Switch between light and dark theme", "Light or dark", size=40, role="plain")
@@ -50,7 +50,7 @@ class _ThemeButton(IconButton):
 
 
 class Header(QWidget):
-    """The strip at the top; ``page`` brings the participant's window to the front, which covers it on one screen."""
+    """The strip at the top; ``page`` raises the participant's window, which covers it on a single screen."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -121,7 +121,7 @@ _WAITS_AT_END = (
 
 
 class Banner(QWidget):
-    """A tinted strip with a sign, what happened, what to do, and a button where the device can be reconnected."""
+    """A tinted strip with a sign, the problem, its remedy, and a button if the device can be reconnected."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -152,9 +152,9 @@ HEIGHT = 52
 
 
 class Strip(QWidget):
-    """State, where the session is, the way to the operator's window and the force stop; it never takes the keyboard.
+    """Session state, progress, a button for the operator's window, and the force stop; it never takes the focus.
 
-    A session that is ``played`` has no operator's window; its stop ends it.
+    A session that is ``played`` has no operator's window; its stop button ends it.
     """
 
     def __init__(self, *, played: bool = False) -> None:
@@ -180,7 +180,7 @@ _HEADINGS: tuple[TypeRole, ...] = ("display", "title", "title_dense", "card")
 
 
 class _Now(QWidget):
-    """Part, trial, what is done in it, and for how long."""
+    """Current part, trial, activity, and elapsed time."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -239,7 +239,7 @@ class _Now(QWidget):
 
 
 class Tally(QWidget):
-    """What is on disk, how many trials were within limits, marks and repeats; the limit broken last; the track."""
+    """Stored answers, trials within limits, marks and repeats; the limit violated last; the track."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -256,7 +256,7 @@ class Tally(QWidget):
         self._place_counts()
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the counts, the newest broken limit (the tip lists all), and the track's state."""
+        """Show the counts, the newest violated limit (the tip lists all), and the track's state."""
         if len(self.counts) < len(view.counts):
             for _ in range(len(view.counts) - len(self.counts)):
                 value = figures("", "label", weight=600)
@@ -290,7 +290,7 @@ _DOT = 11
 
 
 class StepLine(Themed, QWidget):
-    """One step: a dot on the line that joins all steps, its name, and its time or place."""
+    """One step: a dot on the line that connects all steps, its name, and its time or position."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -304,11 +304,11 @@ class StepLine(Themed, QWidget):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Preferred)
 
     def sizeHint(self) -> QSize:
-        """Return the room that a row likes; where there are many, each takes less."""
+        """Return the preferred size; with many steps, each is smaller."""
         return QSize(super().sizeHint().width(), _ROW_HEIGHT)
 
     def set_slim(self, yes: bool) -> None:
-        """Show the dot alone; its text is in the tip."""
+        """Show only the dot; its text is in the tip."""
         self._layout.setContentsMargins(0 if yes else 37, 0, 0, 0)
         for part in (self.name, self.note):
             part.setVisible(not yes)
@@ -357,7 +357,7 @@ class StepLine(Themed, QWidget):
 
 
 class Rail(Card):
-    """Now, steps and counts; slim, the steps' dots alone."""
+    """Current step, steps and counts; in slim mode only the steps' dots."""
 
     def __init__(self) -> None:
         super().__init__(gap=10)
@@ -373,7 +373,7 @@ class Rail(Card):
         self.take_back_panels()
 
     def take_back_panels(self) -> None:
-        """Show the present step and the counts above and below the steps."""
+        """Show the current step and the counts above and below the steps."""
         for part in (self.now, self.tally):
             part.set_flat(False)
         self.column.insertWidget(0, self.now)
@@ -381,7 +381,7 @@ class Rail(Card):
         self._set_slim(slim=False)
 
     def give_away_panels(self) -> None:
-        """Show only the steps' dots: the present step and the counts are elsewhere."""
+        """Show only the steps' dots; the current step and the counts are elsewhere."""
         for part in (self.now, self.tally):
             part.set_flat(True)
         self._set_slim(slim=True)
@@ -400,7 +400,7 @@ class Rail(Card):
             line.set_slim(slim)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show the steps; ``now`` and ``tally`` are shown separately, since each may fail alone."""
+        """Show the steps; ``now`` and ``tally`` are shown separately, since each may fail on its own."""
         rows = view.steps
         while len(self.lines) < len(rows):
             line = StepLine()

@@ -46,7 +46,7 @@ _ENDS: Final = (("aborted", "Another reason"), ("withdrawn", "The participant wi
 
 
 class _Arrangement(QWidget):
-    """The window's whole content: header, rail, middle and side."""
+    """The content of the window: header, rail, middle and side."""
 
     def __init__(self, window: "OperatorWindow") -> None:
         super().__init__()
@@ -136,7 +136,7 @@ _PASSED_ON: Final = re.compile(r"^(Error calling Python override of [\w:]+\(\): 
 
 
 class OperatorWindow(Themed, QMainWindow):
-    """The cockpit.
+    """The operator's window during a session.
 
     Parameters
     ----------
@@ -231,7 +231,7 @@ class OperatorWindow(Themed, QMainWindow):
             self.ask("failed", what, error)
 
     def show_view(self, view: OperatorView) -> None:
-        """Show everything but the plots; the problem first, since a part may fail to show."""
+        """Show everything except the plots; the problem comes first, since another part may fail."""
         if view == self._view:
             return
         self.banner.show_view(view)
@@ -314,7 +314,7 @@ class OperatorWindow(Themed, QMainWindow):
         self._take_keyboard()
 
     def _take_keyboard(self) -> None:
-        """Take the keyboard focus after a dialog: Esc must work without a window manager, too."""
+        """Take the focus after a dialog, since Esc must also work without a window manager."""
         if QGuiApplication.focusWindow() is None:
             self.activateWindow()
 
@@ -322,7 +322,7 @@ class OperatorWindow(Themed, QMainWindow):
         apply_theme(self, LIGHT if self.theme.dark else DARK)
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Close at once after the session; else leave it to the listener and keep the window open."""
+        """Close at once after the session; otherwise let the listener decide and keep the window open."""
         if self.may_close:
             event.accept()
         else:
@@ -331,5 +331,5 @@ class OperatorWindow(Themed, QMainWindow):
 
 
 def _setting_name(view: OperatorView) -> str:
-    """Return the neutral name of the present trial, with its number so that it is unique."""
+    """Return the neutral name of the current trial, with its number so that it is unique."""
     return f"{view.setting_line.split('  ·  ')[0]} ({view.heading.lower()})"

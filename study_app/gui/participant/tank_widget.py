@@ -65,7 +65,7 @@ def _tank_and_camera(page: TaskPage, captions: Captions, width: int, height: int
 
 
 def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, ratio: float) -> Thread:
-    """Paint the still images of a coming page in a thread of their own, so that it appears at once."""
+    """Paint the static images of the next page in a separate thread, so that it appears at once."""
     width, height = size.width(), size.height()
     box, camera = _tank_and_camera(page, Captions(page, wording, text_scale), width, height)
     painting = Thread(target=paint_backdrop, args=((width, height), ratio, box, camera), name="backdrop")
@@ -74,13 +74,13 @@ def paint_ahead(page: TaskPage, wording: Words, text_scale: float, size: QSize, 
 
 
 class TankWidget(QWidget):
-    """Draws a task page and, on it, the views that it is shown, at once.
+    """Draws a task page and, on it, each new view at once.
 
-    ``painted(sample_ns)`` comes once for every view with the time of what was drawn: when it was painted and handed to
-    the window's system, or with ``on_card``, on a surface of the graphics card, when that swapped. ``swapped`` comes
-    with each swap. ``photodiode`` is whether a corner toggles with each movement that begins;
-    ``by_mouse`` whether a mouse moves the hand: a click goes on, there is no force to switch off, and where only the
-    depth is wrong, a line says which way to turn the wheel.
+    ``painted(sample_ns)`` is emitted once per view with the time that it shows: when it was painted and passed to the
+    window system, or with ``on_card``, on a graphics card's surface, after the buffer swap. ``swapped`` is emitted
+    after each swap. ``photodiode`` adds a corner that toggles at each movement onset. With ``by_mouse`` a mouse moves
+    the hand: a click continues, there is no force to stop, and if only the depth is wrong, a line tells which way to
+    turn the wheel.
     """
 
     painted = Signal(object)
@@ -171,7 +171,7 @@ class TankWidget(QWidget):
             announce(self, self.accessibleName() if self._page.adjusts else interval.announced)
 
     def paint_ahead(self) -> None:
-        """Paint the still images now, so that the first frame does not wait."""
+        """Paint the static images now, so that the first frame is not delayed."""
         self._still_images()
 
     def show_view(self, view: TankView) -> None:
@@ -252,7 +252,7 @@ class TankWidget(QWidget):
     def _hint_text(self) -> str:
         """Return how the ball reaches the target; nearer or further if a wheel moves it and only the depth is wrong.
 
-        In a rest that waits for the ball, that it is to come back; otherwise "".
+        In a rest that waits for the ball it says to return; otherwise it is "".
         """
         todo, view, wording = self._page.task, self.view, self._words
         if self._page.adjusts:
@@ -269,7 +269,7 @@ class TankWidget(QWidget):
         return wording.back_to_target if self.resting and math.hypot(x, y, z) > todo.radius_m else ""
 
     def _still_images(self) -> Backdrop:
-        """Return the still images for the present size and screen; lay everything out if they changed."""
+        """Return the static images for the current size and screen; update the layout if they changed."""
         ratio = self.devicePixelRatioF()
         if self.camera is None:
             self._lay_out(ratio)

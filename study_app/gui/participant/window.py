@@ -60,10 +60,10 @@ _BUTTONS = {Qt.MouseButton.LeftButton: 1 << 0, Qt.MouseButton.RightButton: 1 << 
 
 
 class PointerCapture(QObject):
-    """Holds the pointer while a widget is shown.
+    """Captures the pointer while a widget is shown.
 
-    ``moved(x, y, z)`` is the hand's place [m, hand frame], which stays from one capture to the next; ``pressed(bits)``
-    are the buttons held, bit 0 the left one. Wheel and Shift with motion are depth: forwards is away.
+    ``moved(x, y, z)`` is the hand's position [m, hand frame], which is kept between captures; ``pressed(bits)`` are the
+    held buttons, bit 0 the left one. Wheel, and motion with Shift, change the depth: forwards is away.
     """
 
     moved = Signal(float, float, float)
@@ -84,7 +84,7 @@ class PointerCapture(QObject):
         return self._widget is not None
 
     def capture(self, widget: QWidget, workspace_m: tuple[float, float, float]) -> None:
-        """Hide the pointer in ``widget`` and turn its motion into the hand's, within the workspace (full sizes)."""
+        """Hide the pointer in ``widget`` and convert its motion into the hand's, within the workspace (full sizes)."""
         self.release()
         self._widget = widget
         width, height, depth = workspace_m
@@ -136,7 +136,7 @@ class PointerCapture(QObject):
         return self._widget.mapToGlobal(self._widget.rect().center())
 
     def _follow_pointer(self, place: QPoint, modifiers: Qt.KeyboardModifier) -> None:
-        """Move the hand by the pointer's step; recentre a pointer that strays."""
+        """Move the hand by the pointer's step; recentre a pointer far from the centre."""
         assert self._widget is not None  # noqa: S101  # events come only while held
         middle = self._middle_of_widget()
         if self._returning and _distance_px(place, middle) < _distance_px(place, self._last):
@@ -152,11 +152,11 @@ class PointerCapture(QObject):
             self._recentre_pointer(middle)
 
     def _recentre_pointer(self, middle: QPoint) -> None:
-        """Put the pointer into the middle and follow it from there.
+        """Move the pointer to the centre and follow it from there.
 
-        On X11 the answer to the question where it is comes after the jump, and Qt then delivers only the last of all
-        motions, so that the next one is counted from the middle. Elsewhere motions from before may still come: until
-        one is nearer to the middle than to the last place, they are counted from there.
+        On X11 the query of its position is answered after the jump, and Qt then delivers only the last motion, so that
+        the next one is counted from the centre. On other systems earlier motions may still arrive: until one is closer
+        to the centre than to the last position, they are counted from there.
         """
         QCursor.setPos(middle)
         if QGuiApplication.platformName() == "xcb":
@@ -194,7 +194,7 @@ _SETTLING_MS = 100  # longest time without a focused window when the focus moves
 
 
 class ParticipantWindow(QWidget):
-    """Shows pages and says what the participant does.
+    """Shows pages and emits the participant's actions.
 
     Parameters
     ----------
@@ -279,7 +279,7 @@ class ParticipantWindow(QWidget):
 
     @property
     def page(self) -> Page | None:
-        """The shown page; None before the first and while "Time is up" is shown."""
+        """The current page; None before the first and while "Time is up" is shown."""
         return None if self.time_up.isActive() else self._page
 
     @property
@@ -311,7 +311,7 @@ class ParticipantWindow(QWidget):
         self.activateWindow()
 
     def show_page(self, page: Page) -> None:
-        """Replace the present page at once; the tank stays throughout a trial's intervals."""
+        """Replace the current page at once; the tank is kept throughout a trial's intervals."""
         tank = self.tank
         if isinstance(page, TaskPage) and page.interval and tank is not None and tank.page.trial == page.trial:
             self._page = page
@@ -406,7 +406,7 @@ class ParticipantWindow(QWidget):
         self._ahead.start()
 
     def closeEvent(self, event: QCloseEvent) -> None:
-        """Pause instead of closing: the participant must not end a session by accident."""
+        """Pause instead of closing, since the participant must not end a session by accident."""
         if not self.may_close and not isinstance(self._page, EndPage | None):
             event.ignore()
             self._ask_to_pause()
@@ -424,7 +424,7 @@ class ParticipantWindow(QWidget):
         painter.end()
 
     def _paint_ahead(self) -> None:
-        """Paint the tank that follows a text or a pause while that is shown."""
+        """Paint the tank that follows a text or a pause while that page is shown."""
         if isinstance(self._page, TextPage | PausePage) and self._page.coming is not None:
             size, ratio = self._room().size(), self.devicePixelRatioF()
             self.painting = paint_ahead(self._page.coming, self._words, self.text_scale, size, ratio)
@@ -493,7 +493,7 @@ class ParticipantWindow(QWidget):
         return self.tank is not None and self.tank.may_leave
 
     def _take_click(self, bits: int) -> None:
-        """Handle a click of the mouse that is the device: as Space to continue, else as a device button."""
+        """Handle a click of a mouse that is the device: as Space to continue, else as a device button."""
         if bits and ignores_clicks(self._widget):
             return
         if bits & _BUTTONS[Qt.MouseButton.LeftButton] and self._may_leave_tank():
@@ -502,7 +502,7 @@ class ParticipantWindow(QWidget):
             self.buttons.emit(bits)
 
     def _pause_if_left(self) -> None:
-        """Pause if the pointer is the device and left for another program; the operator's window does not count."""
+        """Pause if the pointer is the device and another program (not the operator's window) becomes active."""
         if self.tank is None or self._capture.is_held:
             self.settling.stop()
         elif QGuiApplication.focusWindow() is None:

@@ -46,9 +46,9 @@ _WAITING = "measuring …"
 
 @dataclass(frozen=True, slots=True)
 class PreflightView:
-    """Everything on the window.
+    """The content of the window.
 
-    ``rows`` are (label, value) of what will run, ``facts`` what was measured; while ``busy`` nothing can be begun.
+    ``rows`` are (label, value) of the coming session, ``facts`` the measurements; while ``busy`` it cannot be started.
     """
 
     study: str
@@ -82,7 +82,7 @@ class PreflightView:
 
 
 def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event]) -> tuple[tuple[str, str], ...]:
-    """Return where the session with these journal lines resumes, and how much of it is kept.
+    """Return the point at which the session with these journal lines resumes, and how much of it is kept.
 
     Raises
     ------
@@ -107,8 +107,8 @@ def planned_rows(
 ) -> tuple[tuple[str, str], ...]:
     """Return the rows about the coming session.
 
-    ``error_n`` is the largest difference of a scene's force from the exact definition [N], None while it is not
-    known; where no one was asked (``asked_error``) its line is left out.
+    ``error_n`` is the largest difference of a scene's force from the exact definition [N], None until it is known; its
+    line is omitted unless ``asked_error``.
     """
     extent = extent_of(protocol)
     ends = now + timedelta(seconds=max(extent.expected_s))
@@ -138,7 +138,7 @@ def computer_checks(
     """Return the checks of a computer.
 
     ``facts`` were measured with the simulated hand, for which ``compiled`` functions had to be compiled; the protocol's
-    limits apply; ``cache`` is the folder of compiled code, None where nothing can be stored.
+    limits apply; ``cache`` is the folder of compiled code, None if nothing can be stored.
     """
     of_servo = {check.name: check for check in preflight_checks(facts, protocol)}
     results = [of_servo[name] for name in OF_THE_COMPUTER]
@@ -176,7 +176,7 @@ _LOOKS: dict[str, tuple[str, Ink, str]] = {
 
 
 class CheckRow(Themed, QWidget):
-    """A check; one that needs a decision is tinted and says below what to do."""
+    """A check; if it needs a decision, it is tinted and has an advice below."""
 
     def __init__(self, check: Check, *, last: bool) -> None:
         super().__init__()
@@ -225,7 +225,7 @@ class CheckRow(Themed, QWidget):
 
 
 def _check_rows(checks: Sequence[Check], before: list[CheckRow], column: QBoxLayout) -> list[CheckRow]:
-    """Return the rows of checks, placed in a column in place of ``before``."""
+    """Return the rows of checks, which replace ``before`` in a column."""
     for row in before:
         remove_widget(row)
     made = [CheckRow(check, last=check is checks[-1]) for check in checks]
@@ -244,10 +244,10 @@ _NOTHING_YET = "Nothing is created until you start."
 
 
 class PreflightWindow(QWidget):
-    """The checks of a session whose device and servo are ready, at rest.
+    """The checks before a session; device and servo are ready, at rest.
 
-    ``start_asked`` accepts the warnings shown; ``again_asked`` has everything measured anew; ``cancelled`` goes back.
-    With ``asks_masking`` the window asks whether the device's motors are masked.
+    ``start_asked`` accepts the displayed warnings; ``again_asked`` requests a new measurement; ``cancelled`` goes back.
+    With ``asks_masking`` the window asks whether the device's motor noise is masked.
     """
 
     start_asked = Signal()
@@ -380,7 +380,7 @@ class PreflightWindow(QWidget):
 
 
 class _MaskingQuestion(QWidget):
-    """A choice, and for noise its level in dB."""
+    """A choice and, for masking noise, its level in dB."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -413,7 +413,7 @@ _MEASURING = "Measuring … The force model is compiled at the first use, which 
 
 
 class ComputerWindow(Question):
-    """The checks; ``asked`` when they are to be made again. It is closed by hand."""
+    """The checks of this computer; ``asked`` requests to repeat them. The user closes it."""
 
     asked = Signal()
 

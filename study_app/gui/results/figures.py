@@ -68,7 +68,7 @@ def exclusion_text(exclusion: Exclusion) -> str:
 
 
 def time_of(text: object) -> datetime | None:
-    """Return a time read from a file, None if it is none: people may have edited it."""
+    """Return a time read from a file, None if it is invalid, since people may have edited it."""
     try:
         return datetime.fromisoformat(str(text))
     except ValueError:
@@ -77,7 +77,7 @@ def time_of(text: object) -> datetime | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trouble:
-    """Why there is nothing to show, in one sentence, with the words on the button and what it does."""
+    """The reason why there is nothing to show, with the text and action of a button."""
 
     title: str
     sentence: str
@@ -87,13 +87,12 @@ class Trouble:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ResultsView:
-    """Everything the window shows.
+    """The content of the window.
 
-    ``trials`` are the main trials of each session (participant, number), with the words for them. ``colours`` are the
-    figures' colours in print, by the role in the theme that takes their place. ``sealed`` is None while it is not
-    known, ``opened`` says how the key was opened; ``listed`` says whether the study's sessions are read. ``drawing``
-    goes on where there are no figures yet, ``testing`` besides those there are; ``untested`` says that this was
-    stopped.
+    ``trials`` are the main trials of each session (participant, number), with their labels. ``colours`` are the
+    figures' print colours, by the theme role that replaces them. ``sealed`` is None while unknown, ``opened`` describes
+    how the key was opened; ``listed`` tells whether the study's sessions are read. ``drawing`` is the activity while
+    there are no figures yet, ``testing`` while there are; ``untested`` means that it was stopped.
     """
 
     studies: tuple[StudyAt, ...] = ()
@@ -130,7 +129,7 @@ class ResultsView:
 
 
 def figure_counts(sessions: Sequence[SessionFacts]) -> tuple[str, str]:
-    """Return how many sessions the figures include, and why others are left out; empty without sessions."""
+    """Return the number of sessions in the figures, and why others are excluded; empty without sessions."""
     inside = [session for session in sessions if session.is_counted]
     head = f"{len(inside)} of {counted(len(sessions), 'session')} in the figures"
     if not sessions:
@@ -161,8 +160,8 @@ BAND_LIGHT, BAND_DARK = 0.22, 0.34
 def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
     """Return a figure with its print colours (role → ``#rrggbb``) replaced by those of ``theme``.
 
-    White is the paper and what stands on it, but in letters, which stand on coloured bars. The levels of agreement keep
-    their colours everywhere; on dark paper they get an edge. Qt takes one family of a list: the first is written.
+    White is paper, except in letters, which are on coloured bars. The levels of agreement keep their colours
+    everywhere; on dark paper they get an edge. Qt uses only one font family of a list, so the first is written.
     """
     letters = {colour.lower().encode(): _ink(theme, role).encode() for role, colour in colours.items()}
     edge = theme.ctl if theme.dark else theme.surface
@@ -205,7 +204,7 @@ def drawn_svg(svg: bytes, size: QSize, ratio: float) -> QImage:
 
 
 class _FigureView(Coloured, QWidget):
-    """One figure as wide as it is given room, with its true proportions."""
+    """A figure as wide as its room permits, with its aspect ratio."""
 
     def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         super().__init__()
@@ -224,7 +223,7 @@ class _FigureView(Coloured, QWidget):
         return not self._drawing.busy and not self._image.isNull()
 
     def show_figure(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
-        """Draw another figure; the previous one stays visible until then."""
+        """Draw another figure; the previous one is visible until then."""
         self._figure, self._colours = figure, colours
         size = _SIZE.search(figure.svg)
         self.width_pt = float(size[1]) if size else 516.0
@@ -317,10 +316,10 @@ def _save_figure(figure: FigureDrawn, path: Path) -> None:
 
 
 class FigureCard(Card):
-    """One figure below the answer that it shows, or why it is not there.
+    """A figure below the answer that it shows, or the reason why it is missing.
 
-    Its caption is shown where that is asked for. Figure and numbers can be copied, the figure saved. ``failed`` carries
-    why it was not saved.
+    Its caption is shown on request. Figure and numbers can be copied, the figure saved. ``failed`` carries the reason
+    if saving failed.
     """
 
     failed = Signal(str)
@@ -389,7 +388,7 @@ class FigureCard(Card):
             self.more.raise_()
 
     def fit_width(self, width: int) -> None:
-        """Make the figure so wide, a narrow one less."""
+        """Set the figure's width; narrow figures stay narrower."""
         if self.drawing is not None:
             width = min(width, round(_MOST_SCALE * self.drawing.width_pt))
         size = QSize(width, 0 if self.drawing is None else self.drawing.heightForWidth(width))
@@ -418,7 +417,7 @@ class FigureCard(Card):
         dialog.open()
 
     def save_to(self, path: Path, form: str = "PDF") -> None:
-        """Save the figure; a path without a known ending gets that of ``form``."""
+        """Save the figure; a path without a known suffix gets that of ``form``."""
         if path.suffix.lower() not in (".pdf", ".svg", ".png"):
             path = path.with_name(f"{path.name}.{form[:3].lower()}")
         try:
@@ -428,7 +427,7 @@ class FigureCard(Card):
 
 
 class _WorkLine(Card):
-    """What is being done and how far it is, with a way to stop it."""
+    """The current activity with its progress and a stop button."""
 
     def __init__(self) -> None:
         super().__init__(padding=14, gap=0)
@@ -440,7 +439,7 @@ class _WorkLine(Card):
         add_layout(self.column, row)
 
     def show_going(self, going: Progress | None, *, untested: bool) -> None:
-        """Show the progress; ``untested``: the work was stopped, and what is missing."""
+        """Show the progress; with ``untested``, that the work was stopped and what is missing."""
         self.setVisible(going is not None or untested)
         self.bar.setVisible(going is not None)
         self.stop.setVisible(going is not None)
@@ -455,7 +454,7 @@ class _WorkLine(Card):
 
 
 class _TroubleCard(Card):
-    """Why there is nothing to show: one sentence and one button; ``asked`` carries what the button does."""
+    """The reason why there is nothing to show, and one button; ``asked`` carries its action."""
 
     asked = Signal(str)
 
@@ -491,9 +490,9 @@ class _TroubleCard(Card):
 
 
 class FiguresPanel(QScrollArea):
-    """The cards of the figures; while there are none, what is going on or why.
+    """The cards of the figures or, while there are none, the activity or the reason.
 
-    ``asked`` carries what the button of a sentence does, ``failed`` why a figure was not saved.
+    ``asked`` carries a button's action, ``failed`` the reason why a figure was not saved.
     """
 
     asked = Signal(str)
@@ -518,7 +517,7 @@ class FiguresPanel(QScrollArea):
         self._whole = False
 
     def show_view(self, view: ResultsView) -> None:
-        """Show the figures; a card stays while its figure is drawn again."""
+        """Show the figures; a card is kept while its figure is redrawn."""
         names = [figure.name for figure in view.figures]
         if [card.figure.name for card in self.cards] != names:
             self._order_cards(view)
@@ -534,7 +533,7 @@ class FiguresPanel(QScrollArea):
         self.fit_width()
 
     def _order_cards(self, view: ResultsView) -> None:
-        """Keep the cards of present figures and make the others, in the figures' order."""
+        """Keep the cards of existing figures and create the others, in the figures' order."""
         kept = {card.figure.name: card for card in self.cards}
         self.cards = []
         for place, figure in enumerate(view.figures):
@@ -548,14 +547,14 @@ class FiguresPanel(QScrollArea):
             remove_widget(gone)
 
     def set_whole(self, yes: bool) -> None:
-        """Be as high as the figures, for a page that scrolls as a whole."""
+        """Be as high as all figures, for a page that scrolls as a whole."""
         self._whole = yes
         off = Qt.ScrollBarPolicy.ScrollBarAlwaysOff
         self.setVerticalScrollBarPolicy(off if yes else Qt.ScrollBarPolicy.ScrollBarAsNeeded)
         self.fit_width()
 
     def fit_width(self) -> None:
-        """Set the figures' width; smaller if two of them fit side by side then."""
+        """Set the figures' width, reduced if this lets two of them fit side by side."""
         bar = 0 if self._whole else self.verticalScrollBar().sizeHint().width()  # reserved: figures would flicker
         width = min(self.width() - bar - _AROUND, MOST_WIDTH)
         first = [card.drawing for card in self.cards if card.drawing is not None][:_AT_ONCE]

@@ -77,7 +77,7 @@ _WARNED = 3
 
 
 class _Extra(NamedTuple):
-    """Something that is written where it is asked for: its name in the command, its words, and why it cannot be."""
+    """An optional output: its name in the command, its label, and the reason if it is unavailable."""
 
     name: str
     words: str
@@ -85,7 +85,7 @@ class _Extra(NamedTuple):
 
 
 class WriteDialog(Work):
-    """Asks for a folder and what to write there; Cancel leaves nothing behind.
+    """Asks for a folder and the outputs to write there; Cancel writes nothing.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def _decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:
 
 
 class LeaveOutDialog(Question):
-    """Asks which session, or which trial of it, by whom and why.
+    """Asks which session, or which trial of it, to exclude, by whom and why.
 
     Parameters
     ----------
@@ -205,7 +205,7 @@ _EVERY = "All states"
 
 
 class _SessionsCard(Card):
-    """The study's sessions; below, how many are in the figures and why the others are not."""
+    """The study's sessions; below, how many are in the figures and why others are not."""
 
     def __init__(self) -> None:
         super().__init__(gap=8, padding=14)
@@ -265,10 +265,10 @@ class _SessionsCard(Card):
 
 
 class _ExclusionsCard(Card):
-    """What is left out, each with its reason.
+    """The exclusions with their reasons.
 
-    ``take_back_asked`` carries the `Exclusion` that is to count again, or that is proposed and is not to be made;
-    ``exclude_asked`` one that is proposed and is to be made.
+    ``take_back_asked`` carries the `Exclusion` to reverse, or a proposed one to reject; ``exclude_asked`` a proposed
+    one to accept.
     """
 
     take_back_asked = Signal(object)
@@ -291,7 +291,7 @@ class _ExclusionsCard(Card):
         self.show_left_out(())
 
     def show_left_out(self, listed: Sequence[Exclusion], proposed: Sequence[Exclusion] = ()) -> None:
-        """Show the exclusions, those proposed and the latest first; the keyboard focus survives a removed line."""
+        """Show the exclusions, proposed ones first, then the latest; the focus survives a removed line."""
         self.open.setVisible(bool(listed))
         listed = (*listed, *reversed(proposed))
         at = self.window().focusWidget()
@@ -308,7 +308,7 @@ class _ExclusionsCard(Card):
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
 
     def _exclusion_row(self, exclusion: Exclusion) -> QWidget:
-        """Return the row of one exclusion: what, why, who and when; or which rule proposes it."""
+        """Return the row of one exclusion: what, why, who and when; or the rule that proposes it."""
         proposed = not exclusion.excluded_at
         back = ActionButton("undo", "Keep …" if proposed else "Include again …", role="plain", height=30)
         back.setAccessibleName(f"{'Keep' if proposed else 'Include again'}: {exclusion_text(exclusion)}")
@@ -369,10 +369,10 @@ _REFUSALS: Final = {
 
 
 class ResultsPlace(Place):
-    """The studies, and what is asked of the process that reads and evaluates them while the place is shown.
+    """The results page: the studies, and requests to the process that reads and evaluates them while it is shown.
 
-    Reports and tables are written by a process of their own. Nothing here waits. ``version_asked`` carries the
-    `SessionFacts` of a session, to compare the study with its version.
+    Reports and tables are written by a separate process, so that nothing here waits. ``version_asked`` carries the
+    `SessionFacts` of a session with whose version the study should be compared.
 
     Parameters
     ----------
@@ -469,7 +469,7 @@ class ResultsPlace(Place):
         self._update_view(drawing=None, testing=None)
 
     def show_view(self, view: ResultsView) -> None:
-        """Show a view; only changed parts are made anew."""
+        """Show a view; only changed parts are recreated."""
         before, self.view = self.view, view
         if view.studies != before.studies or view.chosen != before.chosen:
             self._show_studies()
@@ -640,7 +640,7 @@ class ResultsPlace(Place):
 
     @property
     def is_busy(self) -> bool:
-        """Whether a request has not ended."""
+        """Whether a request is still running."""
         return bool(self._orders) or self._writer is not None
 
     def show_results(self, results: Path) -> None:
@@ -650,11 +650,11 @@ class ResultsPlace(Place):
             self.read_studies()
 
     def read_studies(self) -> None:
-        """Read the list of studies, and the chosen study again."""
+        """Reread the list of studies and the chosen study."""
         self._send_order(FindStudies(self.results), "looking for studies")
 
     def choose_study(self, folder: Path) -> None:
-        """Show this study the next time the place is entered."""
+        """Show this study the next time the page is entered."""
         self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
 
     def _send_order(self, order: Order, what: str) -> None:
@@ -753,7 +753,7 @@ class ResultsPlace(Place):
             self._read_study(folder)
 
     def _read_study(self, folder: Path) -> None:
-        """Read a study; its present view stays until then."""
+        """Read a study; its current view is shown until then."""
         if folder != self.view.chosen:
             self.show_view(ResultsView(studies=self.view.studies, chosen=folder))
             self._blocks = 0

@@ -37,12 +37,12 @@ SAMPLE = "sample-"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SessionFacts:
-    """A session as a row shows it.
+    """A session as shown in a row.
 
-    ``status`` is the table's, or "running" where a program has the session open. ``excluded`` is why the analysis
-    excludes all of it, None where it does not; ``lost`` counts recordings that could not be stored, ``reconnected`` how
-    often the device failed and was connected again, ``outlets_lost`` streams and ports that failed. ``missing`` are
-    the trials that were not delivered, None if all were.
+    ``status`` is the table's, or "running" if a program has the session open. ``excluded`` is the reason why the
+    analysis excludes it completely, otherwise None; ``lost`` counts recordings that could not be stored,
+    ``reconnected`` how often the failed device was reconnected, ``outlets_lost`` failed streams and ports. ``missing``
+    are the undelivered trials, None if all were delivered.
     """
 
     participant: str
@@ -64,7 +64,7 @@ class SessionFacts:
 
     @property
     def version(self) -> str:
-        """The study's version in the session's receipt, which is read on first use; "" if there is none."""
+        """The study's version from the session's receipt, read on first use; "" if there is none."""
         run = run_of(SessionFolder(self.folder, self.participant, self.session).receipt)
         return "" if run is None else run.version
 
@@ -73,7 +73,7 @@ class SessionFacts:
         """The kind "sample", "simulated" or "pilot"; "" for a participant's session.
 
         Samples are the simulated sessions that ship with the program, in a folder whose name begins with "sample-". A
-        pilot stays one where its first steps or its device were simulated.
+        pilot is still a pilot if its first steps or its device were simulated.
         """
         if self.simulated and self.folder.parents[2].name.startswith(SAMPLE):
             return "sample"
@@ -96,9 +96,9 @@ class SessionFacts:
 
 
 def sessions(results: Path, answers_of: Mapping[str, int]) -> tuple[SessionFacts, ...]:
-    """Return the sessions in all study folders under ``results``: those that need care first, then the newest.
+    """Return the sessions in all study folders under ``results``: first those that need attention, then the newest.
 
-    ``answers_of`` says how many answers a whole session of a study has. Folders that hold no study are passed over.
+    ``answers_of`` returns the number of answers in a complete session of a study. Folders without a study are skipped.
     """
     facts: list[SessionFacts] = []
     for data in sorted(results.glob("*/data")):
@@ -151,7 +151,7 @@ def _missing_trials(session: SessionFolder) -> MissingTrials | None:
 
 
 def _beginning_of(row: Mapping[str, Any], session: SessionFolder) -> object:
-    """Return the time at which a session began; for a pilot played from a later step, the time of playing."""
+    """Return the start time of a session; for a pilot played from a later step, the time of playing."""
     if row["pilot"] and row["simulated"] and row.get("resumed"):
         with contextlib.suppress(StoreError):
             return receipt.began_at(receipt.read(session.receipt))
@@ -159,7 +159,7 @@ def _beginning_of(row: Mapping[str, Any], session: SessionFolder) -> object:
 
 
 def _start_time(time: object, folder: Path) -> datetime:
-    """Return the time at which a session began; for a damaged journal, the time of the folder's last change."""
+    """Return the start time of a session; for a damaged journal, the time of the folder's last change."""
     with contextlib.suppress(ValueError):
         return datetime.fromisoformat(str(time))
     with contextlib.suppress(OSError):
@@ -175,7 +175,7 @@ def _exclusions(study: Path) -> tuple[Exclusion, ...]:
 
 
 def start_time_text(started: datetime, now: datetime) -> str:
-    """Return the start of a session in words: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
+    """Return the start of a session as text: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
     days = (now.date() - started.date()).days
     day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
     year = "" if started.year == now.year else f" {started.year}"
@@ -218,13 +218,13 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
 
 
 def broken_limit_text(measure: str, value: float, limit: float) -> str:
-    """Return a sentence about a broken limit."""
+    """Return a sentence about a violated limit."""
     what, unit = LIMIT_WORDS[measure]
     return f"{what}: {value:.3g} {unit}, limit {limit:g} {unit}"
 
 
 class Column(NamedTuple):
-    """What a column holds, its heading, and its share of the width; at least ``least`` px of it."""
+    """A column: its content, its heading, and its share of the width; at least ``least`` px."""
 
     name: _Name
     heading: str
@@ -238,7 +238,7 @@ def status_chip(facts: SessionFacts) -> _Chipped:
 
 
 def validity_chip(facts: SessionFacts) -> _Chipped:
-    """Return the chip about a session's limits and recordings, or that the session is excluded."""
+    """Return the chip about a session's limits and recordings, or its exclusion."""
     if facts.excluded is not None:
         return "neutral", "cross", "Excluded"
     if facts.validity != "invalid" and (facts.missing or facts.lost):
@@ -317,7 +317,7 @@ def _form_title(protocol: Protocol, form: str, language: str) -> str:
 class Extent:
     """Parts, settings, answers and expected duration [s] of each kind of session of a study.
 
-    ``setting`` is the word for what a trial presents: a "setting", or a "trial" where blocks have designs.
+    ``setting`` is the noun for a trial's content: "setting", or "trial" if blocks have designs.
     """
 
     parts: tuple[int, ...]
@@ -328,7 +328,7 @@ class Extent:
 
     @property
     def duration(self) -> str:
-        """The expected duration, from that of the shortest kind of session to that of the longest."""
+        """The expected duration, as a range over the kinds of sessions."""
         return duration_range(min(self.expected_s), max(self.expected_s))
 
 

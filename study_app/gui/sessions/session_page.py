@@ -54,10 +54,10 @@ from study_app.store.tables.study_files import row_of
 class TrialRecord:
     """One presentation of a trial.
 
-    ``broken`` has a sentence for each limit that was broken; ``valid`` is None where nothing was measured; ``excluded``
-    is why it is excluded from the analysis, None where it is not. ``unconfirmed`` are choices on a page that was left
-    before they were confirmed, as "item: value": they are in no table. ``lost`` is why the recording could not be
-    stored, "" where it was or none was requested.
+    ``broken`` has a sentence for each violated limit; ``valid`` is None if nothing was measured; ``excluded`` is the
+    reason for its exclusion from the analysis, otherwise None. ``unconfirmed`` are choices on a page that was left
+    before they were confirmed, as "item: value": they are in no table. ``lost`` is the reason why the recording could
+    not be stored, or "".
     """
 
     number: int
@@ -75,7 +75,7 @@ class TrialRecord:
 
 @dataclass(frozen=True, slots=True)
 class SessionRecord:
-    """A session's page."""
+    """The content of a session's page."""
 
     facts: SessionFacts
     about: str
@@ -288,7 +288,7 @@ def _trial_cell(trial: TrialRecord, heading: str) -> dict[int, Any]:
 
 
 def _trial_chip(trial: TrialRecord) -> Any:
-    """Return the chip about a trial's limits, or that it is excluded."""
+    """Return the chip about a trial's limits, or its exclusion."""
     if trial.excluded is not None:
         return "neutral", "cross", "Excluded"
     return VALIDITY[None if trial.valid is None else "valid" if trial.valid else "invalid"]
@@ -311,7 +311,7 @@ def _trial_limits_text(trial: TrialRecord) -> str:
 
 
 class SessionPage(Themed, QDialog):
-    """One session in full, read in a thread; ``watched`` is the window of the trial that was watched last."""
+    """The complete record of one session, read in a thread; ``watched`` is the window of the last watched trial."""
 
     def __init__(self, parent: QWidget, theme: Theme, facts: SessionFacts, opener: Callable[[Path], object]) -> None:
         super().__init__(parent)

@@ -25,7 +25,7 @@ _ROLE = Qt.ItemDataRole
 
 
 def _session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, Any]:
-    """Return the values of a session's cell in the column of a name, by their roles."""
+    """Return the values of a session's cell in the named column, by their roles."""
     chip = {"status": status_chip, "validity": validity_chip}.get(name)
     incident = "device reconnected" if facts.reconnected else "outlet failed" if facts.outlets_lost else ""
     missing = facts.missing
@@ -63,8 +63,8 @@ def _session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, An
 class SessionsTable(QWidget):
     """The table of sessions, or a sentence in its place; ``opened`` carries the `SessionFacts` of a row.
 
-    ``version_asked`` carries those of the row whose version was clicked; ``chosen_changed`` comes when another row, or
-    none, is chosen.
+    ``version_asked`` carries those of the row whose version was clicked; ``chosen_changed`` is emitted when another
+    row, or none, is selected.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class SessionsTable(QWidget):
         return None if row is None else self.shown[row]
 
     def show_rows(self, sessions: Sequence[SessionFacts], now: datetime) -> None:
-        """Show these sessions as far as they match the filter; the chosen one stays chosen."""
+        """Show these sessions as far as they match the filter, keeping the selection."""
         self._every, self._now = tuple(sessions), now
         self.show_matching(self._matches)
 

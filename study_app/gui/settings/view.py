@@ -65,7 +65,7 @@ _LATE: Final = 1.5  # gap in refreshes from which at least one was missed
 
 
 class FrameTimes:
-    """Takes the time of every frame.
+    """Records the time of every frame.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class FrameTimes:
             self._times.popleft()
 
     def figure_texts(self) -> tuple[str, ...]:
-        """Return rate, median gap, 99th percentile of the gaps and missed refreshes; dashes until there are enough."""
+        """Return rate, median gap, 99th percentile of the gaps and missed refreshes; dashes until enough are known."""
         times = list(self._times)
         if len(times) < 3 or times[-1] - times[0] < self._least_ns:
             return ("–",) * len(_NAMES)
@@ -110,7 +110,7 @@ _DECIMALS = 2
 
 
 class _OffsetForm(QWidget):
-    """Two numbers and a way; ``kept(mean [ms], spread [ms], how)``, and ``forgotten``."""
+    """Two numbers and a method; ``kept(mean [ms], spread [ms], how)``, and ``forgotten``."""
 
     kept = Signal(float, float, str)
     forgotten = Signal()
@@ -133,7 +133,7 @@ class _OffsetForm(QWidget):
         self.forget.clicked.connect(self.forgotten)
 
     def show_offset(self, offset: DisplayOffset | None, screen: str) -> None:
-        """Show the measured offset, and whether it was measured on another screen than ``screen``."""
+        """Show the measured offset, and whether it was measured on a screen other than ``screen``."""
         self.forget.setEnabled(offset is not None)
         self.said.setText(_offset_sentence(offset, screen))
         if offset is not None:
@@ -154,7 +154,7 @@ class _OffsetForm(QWidget):
 
 
 def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
-    """Return a sentence on the offset of a screen."""
+    """Return a sentence about the measured offset of a screen."""
     if offset is None:
         return (
             "Not measured. The screen shows each frame slightly later; the delay is recorded as “not measured” in "
@@ -167,7 +167,7 @@ def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
 
 
 class DisplayTest(QWidget):
-    """One screen under test; Esc leaves, and ``left`` comes when the window has gone.
+    """A test pattern on one screen; Esc leaves it, and ``left`` is emitted when its window has closed.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ class DisplayTest(QWidget):
         self.report_timer.start()
 
     def draw_frame(self) -> None:
-        """Request a frame, as a session does; toggle the patch when it is due."""
+        """Request a frame as in a session; toggle the patch when it is due."""
         now_ns = self._now_ns()
         if now_ns - self._toggled_ns >= 1e6 * self.interval_ms:
             self._toggled_ns = now_ns
@@ -342,7 +342,7 @@ _OF_PROGRAM = tuple(  # the fields of `MachineSettings` with a title: a choice o
 
 
 class _ScreensCard(Card):
-    """Every screen, and which is the participant's; ``chosen`` carries it."""
+    """All screens, with a mark at the participant's; ``chosen`` carries another choice."""
 
     chosen = Signal(object)
 
@@ -387,11 +387,11 @@ class _ScreensCard(Card):
 
 
 class MachinePlace(Place):
-    """What is set, under headings.
+    """The settings of this computer under headings.
 
     ``changed(values)`` carries new values by their names in `MachineSettings`; ``offset_measured(mean [ms], spread
-    [ms], how, screen)`` what a photodiode said of a screen; ``undo_asked`` takes the last change back;
-    ``check_asked`` opens the check of this computer.
+    [ms], how, screen)`` a photodiode measurement of a screen; ``undo_asked`` reverts the last change; ``check_asked``
+    opens the check of this computer.
     """
 
     changed = Signal(dict)
@@ -473,7 +473,7 @@ class MachinePlace(Place):
         vbox(scrolled(inside), margins=0, parent=self)
 
     def enter(self) -> None:
-        """Read the screens again: one may have been plugged in."""
+        """Reread the screens, since one may have been plugged in."""
         self._show_all()
 
     def leave(self) -> None:

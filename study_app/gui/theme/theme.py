@@ -23,7 +23,7 @@ TypeRole: TypeAlias = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Type:
-    """A step of the type scale: size [logical px], weight, and whether figures share one width."""
+    """A step of the type scale: size [logical px], weight, and tabular figures."""
 
     size: float
     weight: int
@@ -51,7 +51,7 @@ TYPE: dict[TypeRole, Type] = {
 
 @cache
 def load_fonts() -> tuple[str, ...]:
-    """Register the package's fonts with Qt, once; return their families (a QApplication must exist)."""
+    """Register the package's fonts with Qt once; return their families (a QApplication must exist)."""
     families: list[str] = []
     for name in _FILES:
         content = resources.files("study_app.gui").joinpath("assets", "fonts", name).read_bytes()
@@ -107,11 +107,11 @@ SHADOW = 3  # of a card, within its rectangle
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Theme:
-    """Colours by role, as ``#RRGGBB``; ``dark`` tells which way hover and shadow go.
+    """Colours by role, as ``#RRGGBB``; ``dark`` selects the direction of hover and shadow.
 
-    ``ctl`` edges controls (≥ 3:1), ``border`` and ``grid`` only decorate; ``text3`` never stands on ``sunk``; ``stop``
-    is the force stop's alone. ``hover`` is the fill of a control under the pointer, ``selected`` of the
-    place one is at.
+    ``ctl`` is for edges of controls (≥ 3:1), ``border`` and ``grid`` are decorative; ``text3`` is never used on
+    ``sunk``; ``stop`` is reserved for the force stop. ``hover`` is the fill of a control under the pointer,
+    ``selected`` that of the current page.
     """
 
     name: str
@@ -180,7 +180,7 @@ PARTICIPANT = Theme(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TankColours:
-    """The tank's own colours: cold water-grey, the same for every liquid, so that nothing betrays which it is."""
+    """The tank's own colours: a cold grey, the same for every liquid, so that they do not reveal it."""
 
     water_light: str = "#2F6079"
     glass: str = "#CFE6F2"

@@ -8,7 +8,7 @@ from study_app.gui.theme.theme import LIGHT, Theme, stylesheet
 
 
 class Themed:
-    """What paints itself in the colours of ``theme``, that of the window it is in; outside of one it is light."""
+    """A widget that paints itself in the ``theme`` of its window; outside of one it is light."""
 
     @property
     def theme(self) -> Theme:
@@ -16,7 +16,7 @@ class Themed:
 
 
 class Coloured(Themed):
-    """What keeps colours beyond a painting: ``apply_theme`` takes those of another theme."""
+    """A widget that keeps colours between paintings: ``apply_theme`` sets those of another theme."""
 
     _applied: Theme | None = None
 
@@ -41,7 +41,7 @@ def _theme_of(part: object) -> Theme | None:
 
 
 def apply_theme(window: QWidget, theme: Theme) -> None:
-    """Give ``window`` and all its parts the colours of ``theme``, those that come into it later, too."""
+    """Apply ``theme`` to ``window`` and all its parts, including those that are added later."""
     window.given_theme = theme  # type: ignore[attr-defined]
     window.setPalette(_palette(theme))
     window.setStyleSheet(stylesheet(theme))
@@ -72,7 +72,7 @@ def _palette(theme: Theme) -> QPalette:
 
 
 def give_ground(part: QWidget, role: str) -> None:
-    """Let the style sheet paint a part's background, by its ``role``."""
+    """Let the style sheet paint a part's background according to its ``role``."""
     part.setProperty("role", role)
     part.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
 
@@ -84,9 +84,9 @@ def name_scroll_bars(whole: QWidget) -> None:
 
 
 def remove_widget(part: QWidget) -> None:
-    """Remove a part from its window for good.
+    """Remove a part from its window permanently.
 
-    It is hidden first: the layout that it came into may still be about to show it, and would show it as a window.
+    It is hidden first, because its former layout may be about to show it, and would then show it as a window.
     """
     part.hide()
     part.setParent(None)

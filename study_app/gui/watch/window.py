@@ -56,7 +56,7 @@ class _WatchedTank(TankWidget):
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
 
     def show_moment(self, view: TankView, arrows: tuple[Arrow, ...]) -> None:
-        """Draw a view with arrows, whose vectors are in heights of the water."""
+        """Draw a view with arrows, whose vectors are in units of the water's height."""
         self._still_images()
         high = self._box.water - self._box.floor
         self.arrows = tuple(
@@ -77,7 +77,7 @@ class _WatchedTank(TankWidget):
 
 
 class _ForcePlot(Plot):
-    """The force sent as a line and the force requested as an area behind it [N] over the time [s], with a cursor."""
+    """The sent force as a line and the requested force as an area behind it [N] over time [s], with a cursor."""
 
     def __init__(self, shown: Watched) -> None:
         super().__init__()
@@ -118,7 +118,7 @@ def _thin_out(times_s: Floats, values: Floats) -> tuple[Floats, tuple[Floats, Fl
 
 
 class _TimeLine(Slider):
-    """The time of a trial with its marks: targets as triangles, answers as diamonds, events as lines."""
+    """The time line of a trial with its marks: targets as triangles, answers as diamonds, events as lines."""
 
     def __init__(self, shown: Watched) -> None:
         super().__init__()
@@ -146,7 +146,7 @@ class _TimeLine(Slider):
 
 
 class Stage(QWidget):
-    """Everything of one moment; a video shows it as it is here."""
+    """The complete picture of one moment, also used for exported videos."""
 
     def __init__(self, shown: Watched) -> None:
         super().__init__()
@@ -185,7 +185,7 @@ class Stage(QWidget):
         self.happened.show_text(f"{before[-1].at_s:.2f} s: {before[-1].text}" if before else "")
 
     def describe_moment(self) -> None:
-        """Describe the shown moment to screen readers."""
+        """Describe the displayed moment to screen readers."""
         self.line.setAccessibleDescription(f"{self.numbers.text()}. {self.happened.whole}")
 
     def _make_arrows(self, view: TankView, sample: Any) -> tuple[Arrow, ...]:
@@ -215,7 +215,7 @@ _CAPS: Final = {"Left": "←", "Right": "→"}
 
 
 class WatchWindow(Themed, QDialog):
-    """Plays a trial of a session's folder, read in a thread; what cannot be read is one sentence in its place.
+    """Plays a trial of a session, read in a thread; unreadable parts are replaced by a sentence.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ class WatchWindow(Themed, QDialog):
             self.room.setCurrentWidget(self.sentence)
 
     def go(self, at_s: float) -> None:
-        """Show a time of the trial [s] and stay there."""
+        """Show a time of the trial [s] and stop there."""
         self.pause()
         if self.stage is not None:
             self.stage.show_moment(at_s)
@@ -360,7 +360,7 @@ class WatchWindow(Themed, QDialog):
         return self._timer.isActive()
 
     def toggle(self) -> None:
-        """Play from here, at the end from the start, or pause."""
+        """Play from here (at the end from the start), or pause."""
         if self.playing or self.stage is None:
             self.pause()
             return
@@ -443,7 +443,7 @@ class WatchWindow(Themed, QDialog):
             dialog.show_progress("Painting …", progress)
 
     def _pictures(self, to: Path) -> Iterator[float | Path]:
-        """Write a video; yield the share that is done, then the file."""
+        """Write a video; yield the fraction done, then the file."""
         stage = self.stage
         assert stage is not None  # noqa: S101 - the button is off without one
         back, size = stage.at_s, stage.grab().size()

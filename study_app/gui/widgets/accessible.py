@@ -12,7 +12,7 @@ _PRUNED_AT = 256  # and at its multiples
 
 
 def give_role(widget: QWidget, role: QAccessible.Role) -> None:
-    """Give ``widget`` a role that its class lacks in Qt; its accessible name and description stay.
+    """Give ``widget`` a role that its class lacks in Qt; its accessible name and description are kept.
 
     Qt owns the interface and deletes it with the widget; Python's reference must outlive it, or it is deleted twice.
     Call it last: Qt forgets the role once a signal is connected to a method that the widget's class has in Python.
@@ -32,7 +32,7 @@ def describe_plot(plot: QWidget, name: str, sentence: str) -> None:
 
 
 class PlainLabel(QLabel):
-    """A label that shows its text as it is: "<b>" and "&" of a study are no markup."""
+    """A label that shows its text literally: "<b>" and "&" in a study are no markup."""
 
     def __init__(
         self,
@@ -51,17 +51,17 @@ class PlainLabel(QLabel):
 
 
 def button_text(text: str) -> str:
-    """Return a text for a button that shows it as it is; Qt takes a single "&" as the mark of a shortcut."""
+    """Return a text that a button shows literally; Qt uses a single "&" as the mark of a shortcut."""
     return text.replace("&", "&&")
 
 
 def plain_tip(text: str) -> str:
-    """Return a text for a tooltip that shows it as it is, also if Qt would take it for markup."""
+    """Return a text that a tooltip shows literally, even if Qt would take it for markup."""
     return f"<qt>{html.escape(text).replace(chr(10), '<br>')}</qt>" if "<" in text else text
 
 
 class HeadingLabel(PlainLabel):
-    """A label that is a heading to a screen reader."""
+    """A label that screen readers treat as a heading."""
 
     def __init__(self, text: str, parent: QWidget | None = None) -> None:
         super().__init__(text, parent)
@@ -74,6 +74,6 @@ class HeadingLabel(PlainLabel):
 
 
 def announce(widget: QWidget, sentence: str) -> None:
-    """Announce a sentence about a widget to screen readers that listen."""
+    """Announce a sentence about a widget to screen readers."""
     if QAccessible.isActive():
         QAccessible.updateAccessibility(QAccessibleAnnouncementEvent(widget, sentence))

@@ -32,7 +32,7 @@ def vbox(
 def grid(
     across: int | None = None, down: int | None = None, *, margins: _Margins = None, parent: QWidget | None = None
 ) -> QGridLayout:
-    """Return a grid with its gaps across and down [px], as the layout of ``parent`` if given."""
+    """Return a grid with horizontal and vertical gaps [px], as the layout of ``parent`` if given."""
     made = QGridLayout(parent) if parent is not None else QGridLayout()
     if margins is not None:
         made.setContentsMargins(*((margins,) * 4 if isinstance(margins, int) else margins))
@@ -69,7 +69,7 @@ def add_parts(box: QBoxLayout, *parts: Part) -> None:
 
 
 def add_layout(outer: QBoxLayout | QGridLayout, inner: QLayout, *place: Any) -> None:
-    """Add a layout to another one: at the end with its stretch, or at a place of a grid."""
+    """Add a layout to another one: at the end with its stretch, or at a position of a grid."""
     outer.addLayout(inner, *place)
     _release_items(inner)
 
@@ -83,7 +83,7 @@ def insert_layout(outer: QBoxLayout, at: int, inner: QLayout) -> None:
 def _release_items(layout: QLayout) -> None:
     """Release PySide's wrappers of a layout's items when the layout is added to another one.
 
-    PySide does not notice when Qt deletes an item; an event at its address would get the wrapper, and its class.
+    PySide does not notice when Qt deletes an item; an event at its address would get the wrapper and its class.
     """
     for at in range(layout.count()):
         item = layout.itemAt(at)

@@ -18,7 +18,7 @@ _SHADOW_ALPHAS = (5, 5, 4)
 
 
 class Card(Themed, QWidget):
-    """A rounded surface with a column for its content; ``title`` and a word at the right head it, where given."""
+    """A rounded surface with a column for its content and, if given, a ``title`` and a text at its right."""
 
     def __init__(self, title: str = "", aside: QWidget | None = None, *, padding: int = 20, gap: int = 12) -> None:
         super().__init__()
@@ -49,7 +49,7 @@ class Card(Themed, QWidget):
 
 
 def scrolled(content: QWidget | QLayout) -> QScrollArea:
-    """Return ``content`` in a frame that scrolls vertically if necessary, and never sideways."""
+    """Return ``content`` in a frame that scrolls vertically if necessary, and never horizontally."""
     if isinstance(content, QLayout):
         inside = QWidget()
         inside.setLayout(content)
@@ -77,12 +77,12 @@ def fill_rounded(painter: QPainter, body: QRectF, radius: float, colour: str) ->
 
 
 def paint_ground(part: QWidget, colour: str) -> None:
-    """Paint the ground of a part with rounded corners."""
+    """Paint the background of a part with rounded corners."""
     fill_rounded(smooth_painter(part), QRectF(part.rect()), RADIUS_CONTROL, colour)
 
 
 class Rule(QWidget):
-    """A hairline between groups; decoration only."""
+    """A hairline between groups, purely decorative."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -108,7 +108,7 @@ class Icon(Themed, QWidget):
 
 
 class Chip(Themed, QWidget):
-    """A state as colour, icon and word."""
+    """A state as colour, icon and text."""
 
     def __init__(self, tone: Tone = "neutral", icon: str = "ring", word: str = "", *, small: bool = False) -> None:
         super().__init__()
@@ -144,12 +144,12 @@ def _chip_font(*, small: bool) -> QFont:
 
 
 def chip_size(word: str, *, small: bool) -> QSize:
-    """Return the room for a chip's icon and word."""
+    """Return the size of a chip's icon and text."""
     return QSize(round(QFontMetricsF(_chip_font(small=small)).horizontalAdvance(word)) + 40, 24 if small else 28)
 
 
 def paint_chip(painter: QPainter, body: QRectF, t: Theme, tone: Tone, icon: str, word: str, *, small: bool) -> None:
-    """Paint a chip's pill, icon and word into ``body``."""
+    """Paint a chip's background, icon and text into ``body``."""
     fills = {"ok": t.ok_bg, "warn": t.warn_bg, "bad": t.bad_bg, "accent": t.selected, "neutral": t.sunk}
     inks = {"ok": t.ok, "warn": t.warn, "bad": t.bad, "accent": t.accent, "neutral": t.text2}
     fill_rounded(painter, body, body.height() / 2, fills[tone])
@@ -160,7 +160,7 @@ def paint_chip(painter: QPainter, body: QRectF, t: Theme, tone: Tone, icon: str,
 
 
 class Bar(Themed, QWidget):
-    """A share of a whole, with a tick where something is asked for at least."""
+    """A fraction of a whole, with a tick at the required minimum, if any."""
 
     def __init__(self, height: int = 8) -> None:
         super().__init__()
@@ -193,7 +193,7 @@ class Bar(Themed, QWidget):
 
 
 class Logo(Themed, QWidget):
-    """The program's mark."""
+    """The program's logo."""
 
     def __init__(self, size: int = 32) -> None:
         super().__init__()
@@ -204,7 +204,7 @@ class Logo(Themed, QWidget):
 
 
 class MaskedPanel(Themed, QWidget):
-    """A hatched field with a lock, what is hidden here, and one line why."""
+    """A hatched area with a lock, the name of the hidden content, and the reason."""
 
     def __init__(self, title: str, why: str) -> None:
         super().__init__()

@@ -39,7 +39,7 @@ _STOP_HEIGHT = 44
 
 
 class PressedByEnter(QPushButton):
-    """A button that Enter presses as Space does, in a dialog too, where it would else press the default one."""
+    """A button that Enter presses like Space, also in dialogs, where Enter would press the default button."""
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
@@ -49,7 +49,7 @@ class PressedByEnter(QPushButton):
 
 
 class Cap(Themed, QWidget):
-    """Keys as on a keyboard."""
+    """A key cap."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -81,9 +81,9 @@ def _paint_cap(painter: QPainter, at: QPointF, text: str, ink: str, edge: str) -
 
 
 class ActionButton(Themed, PressedByEnter):
-    """A button with an icon before its words and, where a key does the same, the key's cap behind them.
+    """A button with an icon before its text and, if a key does the same, the key cap after it.
 
-    ``key`` presses the button anywhere in its window; ``cap`` is drawn alone, for a key that others listen to.
+    ``key`` presses the button anywhere in its window; ``cap`` is only drawn, for a key that is handled elsewhere.
     """
 
     def __init__(self, icon: str, text: str, *, key: str = "", cap: str = "", role: str = "", height: int = 44) -> None:
@@ -159,9 +159,9 @@ class ActionButton(Themed, PressedByEnter):
 
 
 class CompactStop(Themed, QPushButton):
-    """Stop force, in the force stop's own colour; it acts when pressed, not when released, and is never disabled.
+    """Stop force, in its reserved colour; it acts when pressed, not when released, and is never disabled.
 
-    Where the stop ends more than the force, ``text`` says so; ``cap`` are the keys that are shown behind them.
+    If the stop ends more than the force, ``text`` says so; ``cap`` are the keys shown after it.
     """
 
     def __init__(self, text: str = "Stop force", cap: str = "") -> None:
@@ -199,7 +199,7 @@ class CompactStop(Themed, QPushButton):
 
 
 class IconButton(Themed, PressedByEnter):
-    """A square button with an icon alone; its words are in its name and its tip."""
+    """A square button with only an icon; its text is the accessible name and the tip."""
 
     def __init__(self, icon: str, name: str, tip: str = "", *, size: int = 44, role: str = "") -> None:
         super().__init__()
@@ -224,10 +224,10 @@ class IconButton(Themed, PressedByEnter):
 
 
 class Choice(Themed, QComboBox):
-    """A list to choose one from, with its chevron; the wheel scrolls the page, never the choice.
+    """A drop-down list with a chevron; the wheel scrolls the page, not the choice.
 
-    A word too long for the field ends in "…", whole in the list and in the tip. On Linux, screen readers take the
-    choice for its name, and what it is a choice of from a label alone: so it has one that nobody sees.
+    Text that is too long is elided and complete in the list and in the tip. On Linux, screen readers use the choice as
+    its name and learn its meaning only from a label: therefore it has an invisible one.
     """
 
     def __init__(self) -> None:
@@ -275,10 +275,10 @@ class Choice(Themed, QComboBox):
 
 
 class Number(QSpinBox):
-    """A whole number, typed or moved by the arrow keys and the wheel.
+    """A whole number that is typed or changed by the arrow keys and the wheel.
 
-    Qt ignores the keys of signs that no whole number has, so that "2,5" would become 25. Here they are typed; Enter
-    refuses such a text, and leaving the field puts back the number that it had when it was entered. Both say why.
+    Qt ignores keys that a whole number cannot contain, so that "2,5" would become 25. Here they are typed; Enter
+    rejects such a text, and leaving the field restores the number from before. Both show the reason.
     """
 
     def __init__(self, lowest: int, highest: int, value: int) -> None:
@@ -311,7 +311,7 @@ class Number(QSpinBox):
 
     @property
     def refusal(self) -> str:
-        """Why the text in the field is refused; "" if it is not."""
+        """The reason why the text in the field is rejected; "" if it is valid."""
         if self.hasAcceptableInput():
             return ""
         return f"“{self.cleanText()}” is not a whole number from {self.minimum()} to {self.maximum()}"
@@ -321,7 +321,7 @@ class Number(QSpinBox):
 
 
 class Check(Themed, QCheckBox):
-    """A yes or no; hit anywhere on mark or words."""
+    """A check box; both mark and text can be clicked."""
 
     def sizeHint(self) -> QSize:
         return _marked_size(self)
@@ -338,7 +338,7 @@ class Check(Themed, QCheckBox):
 
 
 class Toggle(Check):
-    """A yes or no that takes effect at once, as a switch; hit anywhere on switch or words."""
+    """A switch that takes effect at once; both switch and text can be clicked."""
 
     def sizeHint(self) -> QSize:
         return QSize(round(QFontMetricsF(self.font()).horizontalAdvance(self.text())) + 50, 32)
@@ -365,7 +365,7 @@ class Toggle(Check):
 
 
 class Radio(Themed, QRadioButton):
-    """One of several; hit anywhere on mark or words."""
+    """A radio button; both mark and text can be clicked."""
 
     def sizeHint(self) -> QSize:
         return _marked_size(self)
@@ -388,7 +388,7 @@ def _marked_size(button: QAbstractButton) -> QSize:
 
 
 def _begin_mark(button: QAbstractButton, theme: Theme) -> tuple[QPainter, QRectF]:
-    """Paint the button's text; return the painter with the mark's pen, and the mark's place."""
+    """Paint the button's text; return the painter with the mark's pen, and the mark's rectangle."""
     painter = QPainter(button)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(QColor(theme.text if button.isEnabled() else theme.text3))

@@ -26,7 +26,7 @@ def label(
 ) -> QLabel:
     """Return a label in the type ``role`` and the colour role ``ink``; by default titles are headings.
 
-    ``tabular`` figures share one width.
+    ``tabular`` figures have equal widths.
     """
     made = HeadingLabel(text) if (role in _HEADINGS if heading is None else heading) else PlainLabel(text)
     made.setFont(font(role, weight=weight, tabular=tabular))
@@ -40,12 +40,12 @@ def label(
 
 
 def figures(text: str = "", role: TypeRole = "label", ink: Ink = "text", *, weight: int | None = None) -> QLabel:
-    """Return a label whose figures share one width, for numbers that change or stand in a column."""
+    """Return a label with tabular figures, for numbers that change or are in a column."""
     return label(text, role, ink, heading=False, weight=weight, tabular=True)
 
 
 class Elided(QLabel):
-    """A label that ends in "…" where its room is too small; the whole text is in its tip."""
+    """A label that is elided if there is not enough room; the complete text is in its tip."""
 
     def __init__(self, role: TypeRole = "body", ink: Ink = "text") -> None:
         super().__init__()
@@ -82,9 +82,9 @@ class Elided(QLabel):
 
 
 class Clamped(QLabel):
-    """A label of at most so many lines, which ends in "…" where they are too few; the whole text is in its tip.
+    """A label with at most ``most`` lines, elided if they are too few; the complete text is in its tip.
 
-    A ``steady`` one is as high as all its lines, however few the text needs.
+    A ``steady`` label is as high as all its lines, even if the text needs fewer.
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class Clamped(QLabel):
 
 
 def _clamped(text: str, most: int, font: QFont, width: int) -> list[str]:
-    """Return a text in lines that fit into ``width``; the last one ends in "…" where there would be too many."""
+    """Return a text in lines that fit into ``width``; the last line is elided if there would be too many."""
     layout = QTextLayout(text, font)
     layout.beginLayout()
     lines = []
@@ -143,7 +143,7 @@ def set_ink(widget: QLabel, ink: Ink) -> None:
 
 
 def set_property(widget: QWidget, name: str, value: str) -> None:
-    """Set a property that the style sheet uses, and apply the sheet again."""
+    """Set a property used by the style sheet, and apply the style sheet again."""
     if (widget.property(name) or "") != value:
         widget.setProperty(name, value)
         widget.style().unpolish(widget)

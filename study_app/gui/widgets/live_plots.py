@@ -37,13 +37,13 @@ NAMES = ("x right", "y up", "z near")
 
 
 def tick_text(value: float) -> str:
-    """Return a tick's number with a real minus and thin groups: "−20", "10 000"."""
+    """Return a tick's number with a minus sign and thin spaces: "−20", "10 000"."""
     text = f"{abs(value):,.6g}".replace(",", _THIN_SPACE)
     return f"{MINUS}{text}" if value < 0 else text
 
 
 def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
-    """Return a cosmetic pen: its width is px of the screen at any scale of the plot."""
+    """Return a cosmetic pen, whose width is in screen px at any scale of the plot."""
     made = QPen(QColor(colour), width)
     made.setCosmetic(True)
     made.setCapStyle(Qt.PenCapStyle.FlatCap)
@@ -54,7 +54,7 @@ def pen(colour: str, width: float = STROKE, dash: tuple[float, float] | None = N
 
 
 class _Axis(pg.AxisItem):
-    """An axis without a label; laying out the empty label took a quarter of the time to make a plot."""
+    """An axis without a label; laying out the empty label took a quarter of the time to create a plot."""
 
     def _updateLabel(self) -> None:
         self.picture = None
@@ -64,7 +64,7 @@ class _Axis(pg.AxisItem):
 class Plot(Coloured, pg.GraphicsView):
     """An empty plot: no menu, no buttons, no mouse, no frame; horizontal grid lines at the ticks of y.
 
-    Made of pyqtgraph's view box and axes alone: its plot item brings menus that outlive the window.
+    It uses only pyqtgraph's view box and axes: its plot item creates menus that outlive the window.
     """
 
     def __init__(self) -> None:
@@ -99,7 +99,7 @@ class Plot(Coloured, pg.GraphicsView):
         self.axes["bottom"].setHeight(28)
 
     def stroke(self, colour: str, width: float = STROKE, dash: tuple[float, float] | None = None) -> QPen:
-        """Return a pen of so many logical px on a screen of any density."""
+        """Return a pen whose width is in logical px on a screen of any density."""
         return pen(colour, width * self.devicePixelRatioF(), dash)
 
     def event(self, event: QEvent) -> bool:
@@ -112,11 +112,11 @@ class Plot(Coloured, pg.GraphicsView):
         QCoreApplication.sendPostedEvents(self.scene(), QEvent.Type.MetaCall.value)
 
     def sizeHint(self) -> QSize:
-        """Return a small size: a plot takes what is left, and never makes a window scroll."""
+        """Return a small size: a plot takes the remaining room, and never makes a window scroll."""
         return QSize(320, 150)
 
     def show_ticks(self, side: str, ticks: list[tuple[float, str]]) -> None:
-        """Write ``ticks`` (place, text) at an axis; those of y also get a grid line."""
+        """Draw ``ticks`` (place, text) at an axis; those of y also get a grid line."""
         self.ticks[side] = ticks
         self.axes[side].setTicks([ticks])
         if side == "left":
@@ -136,7 +136,7 @@ class Plot(Coloured, pg.GraphicsView):
 
 
 class TracePlot(Plot):
-    """Three curves over the last seconds, named at their newest ends.
+    """Three curves over the last seconds, with their names at the newest ends.
 
     Parameters
     ----------
@@ -166,7 +166,7 @@ class TracePlot(Plot):
         self.apply_theme(LIGHT)
 
     def show_reach(self, reach: float) -> None:
-        """Show values from −reach to reach, extended to even ticks."""
+        """Set the scale from −reach to reach, extended to even ticks."""
         if reach != self._asked:
             self._asked = reach
             self._make_room()
@@ -191,7 +191,7 @@ class TracePlot(Plot):
         self._place_names()
 
     def show_traces(self, times_s: Floats, values: Floats) -> None:
-        """Draw ``values`` (n, curves) over ``times_s`` (n,), zero being now."""
+        """Draw ``values`` (n, curves) over ``times_s`` (n,), where zero is now."""
         if len(values) and float(np.nanmax(np.abs(values))) > 1.08 * self.reach:
             self.show_reach(float(np.nanmax(np.abs(values))))
         for axis, curve in enumerate(self.curves):
@@ -202,7 +202,7 @@ class TracePlot(Plot):
         self._place_names()
 
     def _place_names(self) -> None:
-        """Put every name at its curve's newest end, or as near as the others and the plot's edges permit."""
+        """Put every name at its curve's newest end, or as near as the other names and the edges permit."""
         if not self._newest:
             return
         for end, height in zip(self.ends, _spread_apart(self._newest, self._name_height, self.reach), strict=True):
@@ -217,7 +217,7 @@ class TracePlot(Plot):
 
 
 class LatenessPlot(Plot):
-    """Ticks of the servo by how late they began, both axes logarithmic; 99th percentile and limit marked."""
+    """Histogram of the lateness of ticks, both axes logarithmic; 99th percentile and limit marked."""
 
     def __init__(self, limit_us: float) -> None:
         super().__init__()
@@ -296,12 +296,12 @@ def lateness_histogram(lateness_us: Floats) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def draw_quickly(curve: pg.PlotCurveItem, *, solid: bool) -> None:
-    """Draw a solid curve in pieces, which takes half as long; dashes must run on between pieces."""
+    """Draw a solid curve in pieces, which takes half as long; dashes must be continuous."""
     curve.setSegmentedLineMode("on" if solid else "off")
 
 
 def tick_step(reach: float, most: int) -> float:
-    """Return the least even step between ticks (1, 2 or 5 times a power of ten) that ``reach`` holds ``most`` times."""
+    """Return the least even step between ticks (1, 2 or 5 times a power of ten) with at most ``most`` in ``reach``."""
     least = max(reach, 1e-9) / (most + 0.01)
     power = 10.0 ** np.floor(np.log10(least))
     return float(next(power * step for step in (1, 2, 5, 10) if power * step >= least))
@@ -313,7 +313,7 @@ def _time_ticks(span_s: float) -> list[tuple[float, str]]:
 
 
 def _spread_apart(places: Sequence[float], least: float, reach: float) -> list[float]:
-    """Return ``places`` moved as little as possible, in order, so that names there do not touch, within ±reach."""
+    """Return ``places`` moved as little as possible, in order, so that names do not touch, within ±reach."""
     order = np.argsort(places, kind="stable")
     moved = np.asarray(places, float)[order]
     for _ in range(8):

@@ -11,10 +11,10 @@ HOLD_MS = 600
 
 
 class EscapeKey(QObject):
-    """An event filter that sees Esc go down and up, whichever part of a window has the keyboard.
+    """An event filter that detects Esc in any part of a window.
 
-    ``held`` comes once it has been down for 600 ms, whatever is shown meanwhile, ``tapped`` where it came up before.
-    A window that is left ends a hold without either.
+    ``held`` is emitted once it has been down for 600 ms, regardless of the page, ``tapped`` if it was released before.
+    Leaving the window ends a hold without either.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ class EscapeKey(QObject):
         return False
 
     def _follow_escape(self, window: QObject | None, event: QKeyEvent) -> None:
-        """Follow Esc by presses and releases, and by their time stamps if the program was busy."""
+        """Track presses and releases of Esc, and their time stamps if the program was busy."""
         if event.key() != Qt.Key.Key_Escape:
             return
         if event.type() == QEvent.Type.KeyPress and not self._timer.isActive():
@@ -74,10 +74,10 @@ class EscapeKey(QObject):
 
 
 class Place(Themed, QWidget):
-    """A part that fills the main window next to the rail.
+    """A page of the main window, next to the rail.
 
-    ``message`` carries a title and a sentence that the main window is to say, until the place is left or emits
-    ``message_over``; ``go_asked`` the name of another place.
+    ``message`` carries a title and a sentence that the main window shows until the page is left or emits
+    ``message_over``; ``go_asked`` carries the name of another page.
     """
 
     message = Signal(str, str)
@@ -85,10 +85,10 @@ class Place(Themed, QWidget):
     go_asked = Signal(str)
 
     def enter(self) -> None:
-        """Handle that the place is shown: reload what may have changed."""
+        """Prepare for being shown: reload what may have changed."""
 
     def leave(self) -> None:
-        """Handle that the place is hidden: release at once every device that acts on the hand."""
+        """Prepare for being hidden: release at once every device that acts on the hand."""
 
 
 def last_focused(part: QWidget) -> QWidget | None:

@@ -17,13 +17,13 @@ _NUMERALS = set("0123456789.,+-eE' \u00a0\u2009\u202f" + MINUS)
 
 
 def read_number(text: str, decimal_sign: str = ".") -> float | None:
-    """Return the number in a text (`number_of`) as a float; None if there is none or two readings."""
+    """Return the number in a text (`number_of`) as a float; None if there is none or it is ambiguous."""
     number = number_of(text, decimal_sign)
     return None if number is None else float(number)
 
 
 def write_number(value: float, decimals: int, decimal_sign: str = ".") -> str:
-    """Return a number with at most so many decimals, without trailing zeros, with a real minus."""
+    """Return a number with at most ``decimals`` decimals, without trailing zeros, with a minus sign."""
     text = f"{value:.{decimals}f}"
     text = text.rstrip("0").rstrip(".") if "." in text else text
     if text.strip("-0.") == "":
@@ -32,10 +32,11 @@ def write_number(value: float, decimals: int, decimal_sign: str = ".") -> str:
 
 
 class NumberField(QLineEdit):
-    """A low field for a number; Return or leaving it takes it, Esc goes back, Up and Down step; Return tries again.
+    """A low field for a number; Return or leaving it submits, Esc reverts, Up and Down step.
 
-    ``entered(value)`` comes once for what was typed; ``unread(text)`` if it is not one number; ``abandoned()`` at Esc;
-    ``stepped(steps)`` at Up and Down. While something is typed, `show_text` does not touch it.
+    ``entered(value)`` is emitted once for a typed number; ``unread(text)`` if the text is not one number;
+    ``abandoned()`` at Esc; ``stepped(steps)`` at Up and Down. Return submits a rejected number again. While something
+    is typed, `show_text` does not change it.
     """
 
     entered = Signal(float)
@@ -54,7 +55,7 @@ class NumberField(QLineEdit):
 
     @property
     def state(self) -> str:
-        """The mark of the field's edge: "", "changed" or "refused"."""
+        """The state of the field's edge: "", "changed" or "refused"."""
         return self._state
 
     def show_text(self, text: str) -> None:
@@ -64,7 +65,7 @@ class NumberField(QLineEdit):
             self.setCursorPosition(0)
 
     def show_state(self, state: str) -> None:
-        """Set the mark of the field's edge; changed and refused numbers are bold."""
+        """Set the state of the field's edge; changed and refused numbers are bold."""
         if state == self._state:
             return
         self._state = state
@@ -114,13 +115,13 @@ class NumberField(QLineEdit):
         return bool(text) and set(text) <= _NUMERALS
 
     def _take_typed(self) -> None:
-        """Take the typed text; retry a refused number, since the obstacle may be gone."""
+        """Submit the typed text; retry a rejected number, since the reason may have disappeared."""
         if self._state == "refused":
             self.setModified(True)
         self.emit_typed()
 
     def emit_typed(self) -> None:
-        """Emit the typed text, once; it stays if it is not one number."""
+        """Emit the typed text once; it is kept if it is not a number."""
         if not self.isModified():
             return
         value = read_number(self.text())
@@ -141,7 +142,7 @@ MARGIN = _KNOB + 4  # room for knob and focus ring at both ends
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """The numbers a slider reaches, from ``least`` to ``most``; by decades where ``logarithmic``."""
+    """The range of a slider, from ``least`` to ``most``; by decades if ``logarithmic``."""
 
     least: float
     most: float
@@ -184,10 +185,10 @@ class Range:
 
 
 class Slider(Themed, QSlider):
-    """A slider on a `Range`; the wheel scrolls the page, never the slider.
+    """A slider on a `Range`; the wheel scrolls the page, not the slider.
 
-    ``slid(value, held)`` comes as it is moved by mouse or keyboard: ``held`` while the knob is dragged, and once more,
-    not held, when it is let go. Double click or Delete asks for the tick's value.
+    ``slid(value, held)`` is emitted when mouse or keyboard move it: ``held`` while the knob is dragged, and once more,
+    not held, when it is released. Double click or Delete requests the tick's value.
     """
 
     slid = Signal(float, bool)
@@ -305,7 +306,7 @@ class Slider(Themed, QSlider):
         return self._span.value_at((x - MARGIN) / max(1.0, self.width() - 2 * MARGIN))
 
     def _value_after(self, steps: int) -> float:
-        """Return the number some steps on, always another one unless the end is reached."""
+        """Return the number after some steps, which always differs unless the end is reached."""
         share = self._span.fraction_of_range(self._value)
         value = self._span.value_at(share + steps / self._span.steps)
         if self._span.whole and value == self._value:
@@ -321,7 +322,7 @@ class Slider(Themed, QSlider):
         self.slid.emit(value, held)
 
     def _follow_step(self, step: int) -> None:
-        """Follow a change that came neither from mouse nor keys, as from a screen reader."""
+        """Follow a change that was caused by neither mouse nor keys, such as by a screen reader."""
         self._move_to(self._span.value_at(step / self._span.steps), held=False)
 
     def _update_accessible_value(self) -> None:

@@ -75,7 +75,7 @@ class Rows(QAbstractTableModel):
 
 
 class _Cells(QStyledItemDelegate):
-    """Draws texts and chips; the table draws what spans a row."""
+    """Draws texts and chips; the table draws parts that span a row."""
 
     def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
         table = self.parent()
@@ -114,7 +114,7 @@ def _write_text(painter: QPainter, place: QRectF, face: QFont, ink: str, text: s
 
 
 class Table(Themed, QTableView):
-    """A table of whole rows; ``opened`` carries the index of a row that was double-clicked or entered.
+    """A table of whole rows; ``opened`` carries the index of a row that was double-clicked or confirmed by Enter.
 
     Parameters
     ----------

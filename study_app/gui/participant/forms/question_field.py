@@ -43,10 +43,10 @@ _HIGHEST = 2000  # of wrapped words [px]
 
 
 class _QuestionWords(QWidget):
-    """One widget instead of four with a layout of their own: a page has nine and more of them.
+    """Number, text and note of a question in one widget, since a page has many of them.
 
-    The number stands in a column of its own, so that the texts of all questions begin at one line. What is missing has
-    a sign before the note.
+    The number has its own column, so that the texts of all questions are aligned. A missing answer has a sign before
+    the note.
     """
 
     def __init__(self, number: int, text: str, parent: QWidget) -> None:
@@ -62,11 +62,11 @@ class _QuestionWords(QWidget):
         self.setSizePolicy(policy)
 
     def fill_row(self) -> None:
-        """Take the room that a row of a given height leaves, without a minimum."""
+        """Use the room that a row of fixed height leaves, without a minimum."""
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Ignored)
 
     def show_note(self, note: str, *, missing: bool) -> None:
-        """Show the small note, or none; a missing answer gets its sign and colour."""
+        """Show a small note, or none; a missing answer gets a sign and a colour."""
         if (note, missing) != (self.note, self.missing):
             self.note, self.missing = note, missing
             self._forget_sizes()
@@ -86,7 +86,7 @@ class _QuestionWords(QWidget):
             self._forget_sizes()
 
     def sizeHint(self) -> QSize:
-        """Return the minimum size: the width is a share of the row, the height follows from it."""
+        """Return the minimum size: the width is a fraction of the row, and the height follows from it."""
         return self.minimumSizeHint()
 
     def minimumSizeHint(self) -> QSize:
@@ -165,7 +165,7 @@ _LEAST_TARGET = 44.0  # of what is hit with mouse or finger [logical px]
 
 
 def target_px(scale: float) -> float:
-    """Return the minimum height and width of anything that is clicked, however small the text [logical px]."""
+    """Return the minimum height and width of clickable parts, regardless of the text size [logical px]."""
     return _LEAST_TARGET * max(1.0, scale)
 
 
@@ -176,10 +176,10 @@ _NOTE_GAP = 5.0
 
 
 class QuestionField(QWidget):
-    """A question and its answer: one stop of the Tab key, and for a screen reader a group with its answers.
+    """A question and its answer: one Tab stop, and for screen readers a group with its answers.
 
-    ``answered(value)`` comes when an answer is given or changed, ``retracted`` where an entry was emptied, ``left``
-    when a key answered it so that the next question can have the keyboard; ``seen`` comes with the first painting.
+    ``answered(value)`` is emitted when an answer is given or changed, ``retracted`` when an entry was emptied, ``left``
+    when a key answered it so that the next question can get the focus; ``seen`` at the first painting.
     """
 
     ANSWER: ClassVar[int] = 2
@@ -223,7 +223,7 @@ class QuestionField(QWidget):
         return self.view.keys
 
     def put_answer_part(self, answer: QWidget) -> None:
-        """Put the part that answers the question after its text."""
+        """Insert the part with the answer after the question's text."""
         self._answer = answer
         self.grid.addWidget(answer, 0, self.ANSWER, Qt.AlignmentFlag.AlignVCenter)
 
@@ -234,7 +234,7 @@ class QuestionField(QWidget):
         return str(self.value)
 
     def finish(self) -> bool:
-        """Take the typed text; return False if it is not an answer."""
+        """Accept the typed text; return False if it is not an answer."""
         return True
 
     def set_scale(self, scale: float) -> None:
@@ -250,7 +250,7 @@ class QuestionField(QWidget):
         return round(MARGIN * self.scale)
 
     def set_fonts(self, statement: QFont, note: QFont, scale: float) -> None:
-        """Set the fonts of statement and note; the number is as large as in all rows of a page."""
+        """Set the fonts of statement and note; the number has the same size in all rows of a page."""
         number = font("cell", scale=scale * 0.9, weight=700 if self.missing else 400)
         self.statement.set_fonts(statement, note, number, _NOTE_GAP * scale)
 
@@ -270,14 +270,14 @@ class QuestionField(QWidget):
         return height
 
     def point_at(self, place: int) -> None:
-        """Point at an answer, at none with -1; typed answers have nothing to point at."""
+        """Point at an answer, or (-1) at none; typed answers cannot be pointed at."""
 
     def set_missing(self, *, missing: bool) -> None:
         self.missing = missing and not self.is_answered
         self._update_state()
 
     def give_answer(self, value: Value) -> None:
-        """Take an answer, and emit it if it is new."""
+        """Set an answer, and emit it if it is new."""
         changed = not self.is_answered or value != self.value
         self.value, self.is_answered, self.missing = value, True, False
         self._update_state()
@@ -292,7 +292,7 @@ class QuestionField(QWidget):
             self.retracted.emit()
 
     def forget_answer(self) -> None:
-        """Discard the answer without a signal: another answer hid the question."""
+        """Discard the answer without a signal, because another answer hid the question."""
         self.value, self.is_answered, self.missing = None, False, False
         self.clear_answer()
         self._update_state()
@@ -378,7 +378,7 @@ Look: TypeAlias = Literal["words", "point", "off scale"]
 
 @lru_cache(maxsize=1024)
 def _widest_word(text: str, scale: float) -> float:
-    """Return the width of an answer's widest word [px]; the points of all rows of a page are alike."""
+    """Return the width of an answer's widest word [px]; cached, since rows repeat their points."""
     metrics = QFontMetricsF(font("chosen", scale=scale))
     return max((metrics.horizontalAdvance(word) for word in text.split()), default=0.0)
 
@@ -398,7 +398,7 @@ def _height_of(text: str, scale: float, width_px: float) -> float:
 
 
 class _OpenLook(NamedTuple):
-    """How an answer looks that is not chosen: in a size [px], perhaps pointed at, or with strong words."""
+    """The appearance of an answer that is not chosen: size [px], pointed at, strong text."""
 
     words: str
     look: Look
@@ -426,7 +426,7 @@ class _OpenLook(NamedTuple):
 
 @lru_cache(maxsize=256)
 def _answer_picture(look: _OpenLook, ground: str) -> QImage:
-    """Return the picture of an answer on a plain ground."""
+    """Return the picture of an answer on a plain background."""
     made = QImage(look.width, look.height, QImage.Format.Format_RGB32)
     made.fill(QColor(ground))
     painter = QPainter(made)
@@ -437,9 +437,9 @@ def _answer_picture(look: _OpenLook, ground: str) -> QImage:
 
 
 class OptionLook(Button):
-    """How an answer looks: the whole rectangle is clickable; shape, fill and a check mark show that it is chosen.
+    """The appearance of an answer: the whole rectangle is clickable; shape, fill and check mark show the choice.
 
-    ``place`` is its number among the answers of its question, which is notified when the pointer enters and leaves.
+    ``place`` is its index among the answers of its question, which is notified when the pointer enters and leaves.
     """
 
     place = -1
@@ -464,7 +464,7 @@ class OptionLook(Button):
         self.update()
 
     def show_pointed(self, pointed: bool) -> None:
-        """Show the mouse pointer, or the keyboard's own pointer, on this answer."""
+        """Show the mouse pointer, or the keyboard's pointer, on this answer."""
         if pointed != self.pointed:
             self.pointed = pointed
             self.update()
@@ -479,7 +479,7 @@ class OptionLook(Button):
         return self.sizeHint()
 
     def hasHeightForWidth(self) -> bool:
-        """Return True if the text wraps; points are short."""
+        """Return True if the text wraps; scale points are short."""
         return self._look != "point"
 
     def heightForWidth(self, width: int) -> int:
@@ -504,7 +504,7 @@ class OptionLook(Button):
             question.point_at(place)
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw the answer; points look the same in all questions and are drawn once for all."""
+        """Draw the answer; points look the same in all questions and are drawn only once."""
         painter = page_painter(self)
         in_focus = self._has_focus()
         strong = self._look == "words" or self.pointed or in_focus
@@ -550,16 +550,16 @@ class RadioOption(OptionLook, QRadioButton):
 
 
 class CheckOption(OptionLook, QCheckBox):
-    """One of several answers that can be given together."""
+    """One of several answers that can be combined."""
 
 
 _MOST_DIGITS = 9
 
 
 class OptionsField(QuestionField):
-    """Digits choose, the arrows move a pointer of the keyboard's own, Space chooses there; mouse and touch choose.
+    """Digits choose; arrows move a separate pointer, at which Space chooses; mouse and touch choose, too.
 
-    ``pointed_at(place)`` comes with the option that mouse or keyboard point at, -1 for none.
+    ``pointed_at(place)`` carries the option at which mouse or keyboard point, -1 for none.
     """
 
     several = False
@@ -627,7 +627,7 @@ class OptionsField(QuestionField):
             self.left.emit()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Choose with digits and Space, point with left and right; other keys are the page's."""
+        """Choose with digits and Space, point with left and right; other keys go to the page."""
         number = digit_of(event)
         plain = not event.modifiers() & Qt.KeyboardModifier.ControlModifier
         if number is not None and 1 <= number <= self.digits and plain:
@@ -672,12 +672,12 @@ class OptionsField(QuestionField):
 
 
 class ScaleField(OptionsField):
-    """A row of points; "cannot judge" stands apart from them, where lines end."""
+    """A row of points; "cannot judge" is separate, at the end of the line."""
 
     labels: tuple[str, ...] = ()
 
     def build_options(self, labels: tuple[str, ...], judge_name: str | None, judge_text: str | None) -> None:
-        """Make the options: the points of the scale, and the off-scale answer if there is one."""
+        """Create the options: the points of the scale, and the off-scale answer if there is one."""
         self.labels = labels
         names = [f"{point} {label}" for point, label in enumerate(labels, start=1)]
         text = self.view.text
@@ -694,7 +694,7 @@ class ScaleField(OptionsField):
 
     @property
     def answer_keys(self) -> str:
-        """The digits of its points; beyond 9 the arrows reach them."""
+        """The digits of its points; points beyond 9 are reached by the arrows."""
         return f"1–{self.digits}"
 
     @property
@@ -716,10 +716,10 @@ _VERTICAL = (Qt.Key.Key_Up, Qt.Key.Key_Down)
 
 
 class EntryKeys(Widget):
-    """A widget to type into that leaves Esc to the window and other keys to the page, and shows its question's ring."""
+    """A text widget that leaves Esc to the window and other keys to the page, and shows its question's focus ring."""
 
     def leaves_to_page(self, event: QKeyEvent) -> bool:
-        """Return whether a key belongs to the page: it has no meaning in the field."""
+        """Return whether a key has no meaning in the field, so that the page handles it."""
         return event.key() in (*ENTER, *_VERTICAL)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -744,10 +744,10 @@ class EntryKeys(Widget):
 
 
 class TypedField(QuestionField):
-    """What is typed is taken when typing pauses, and at the latest when the question is left."""
+    """A typed answer, which is accepted when typing pauses, and at the latest when the question is left."""
 
     def give_keyboard_to(self, entry: QWidget, wait_ms: int, take: Callable[[], object]) -> None:
-        """Give ``entry`` the keyboard focus; call ``take`` this time after the last key press."""
+        """Give ``entry`` the focus; call ``take`` this time after the last key press."""
         self.setFocusProxy(entry)
         self._timer = QTimer(self, singleShot=True, interval=wait_ms)
         self._timer.timeout.connect(take)

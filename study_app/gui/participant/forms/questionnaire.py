@@ -32,10 +32,10 @@ _POINTS = 7
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Asked:
-    """What is asked, measured at scale 1 [px].
+    """The measured texts of a questionnaire at scale 1 [px].
 
-    ``statement`` is the width of the longest statement on one line, ``judge`` that of the longest word over the column
-    "cannot judge", 0 where there is none, and ``word`` that of the labels over the scale.
+    ``statement`` is the width of the longest statement on one line, ``judge`` that of the longest word above the column
+    "cannot judge", 0 without it, and ``word`` that of the labels above the scale.
     """
 
     statement: float
@@ -45,10 +45,10 @@ class Asked:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Grid:
-    """The sizes of a row, from its number to "cannot judge" [logical px].
+    """The widths of a row's columns, from its number to "cannot judge" [logical px].
 
-    ``scale`` is of spaces, ``text`` of words; ``judge_gap`` lies between the scale and "cannot judge", whose width is 0
-    where there is none; ``pitch`` is a row's height, 0 until it is known.
+    ``scale`` applies to spaces, ``text`` to texts; ``judge_gap`` separates the scale and "cannot judge", whose width is
+    0 without it; ``pitch`` is a row's height, 0 until it is known.
     """
 
     scale: float
@@ -74,7 +74,7 @@ class Grid:
         return min(self.cell_height, self.cell_width) >= _LEAST_CELL * self.scale - 0.01
 
     def with_rows(self, room: float, per_page: int) -> Grid:
-        """Return the sizes if ``room`` [px] is divided among so many rows."""
+        """Return the sizes if ``room`` [px] is divided among ``per_page`` rows."""
         return replace(self, pitch=math.floor(min(room / per_page, 68 * self.text)))
 
 
@@ -87,10 +87,9 @@ def _part_sizes(items: int, width: float) -> Iterator[int]:
 
 
 def grid(width: float, height: float, asked: Asked, margin: float, *, text_scale: float = 1.0) -> Grid:
-    """Return the widths of a row in a window; ``margin`` is between its edges and the text [logical px].
+    """Return the column widths in a window; ``margin`` is between its edges and the text [logical px].
 
-    Words are drawn ``text_scale`` times as large as designed at least. Rows may turn out too low for their words or
-    their cells: see `Grid.can_be_hit`.
+    Texts are enlarged by at least ``text_scale``. Rows may be too low for their texts or cells: see `Grid.can_be_hit`.
     """
     scale = page_scale(width, height)
     text = words_scale(width, height, text_scale)
@@ -130,7 +129,7 @@ def _statement_height(text: str, scale: float, weight: int, width_px: int) -> fl
 
 
 class StatementField(ScaleField):
-    """A statement with its cells; their names stand over the columns, once for all statements."""
+    """A statement with its cells, whose labels are shown once above the columns of all statements."""
 
     def __init__(
         self, view: ItemView, labels: tuple[str, ...], judge: str | None, wording: Words, parent: QWidget
@@ -153,7 +152,7 @@ class StatementField(ScaleField):
 
     @property
     def note(self) -> str:
-        """The small line under the focused statement: which keys answer."""
+        """The small line below the focused statement: the keys that answer it."""
         if self.missing and self.hasFocus():
             return f"{self._words.please_answer} · {self._words.press_keys}"
         return super().note
@@ -193,9 +192,9 @@ class StatementField(ScaleField):
         return self.fitted_fonts(sizes, note) is not None
 
     def fitted_fonts(self, sizes: Grid, note: str) -> _Fitted | None:
-        """Return the largest fonts with which statement and note fit the row, and their heights [px]; None if none.
+        """Return the largest fonts with which statement and note fit the row, and their heights [px], or None.
 
-        Words that must be so large (``sizes.text`` beyond ``sizes.scale``) are not made smaller; a note may be.
+        Text that has a required size (``sizes.text`` beyond ``sizes.scale``) is not reduced; a note may be.
         """
         must = sizes.text > sizes.scale
         shrunk = ((1.0, 1.0), (1.0, sizes.scale / sizes.text)) if must else ((s, max(s, 0.88)) for s in _SHRINKING)
@@ -214,7 +213,7 @@ class StatementField(ScaleField):
         self._update_state()
 
     def _smallest_fonts(self, sizes: Grid, note: str) -> _Fitted:
-        """Return the fonts of a row that is alone on its page and still too low."""
+        """Return the fonts of a row that is the only one on its page and still too low."""
         for percent in range(95, 30, -5):
             fitted = self._measured_fonts(sizes, note, percent / 100, percent / 100)
             if fitted[2] + fitted[3] <= sizes.pitch - 3 * sizes.scale:
@@ -266,9 +265,9 @@ def _widest_word(metrics: QFontMetricsF, text: str) -> float:
 
 
 class _Heading(QWidget):
-    """The labels over the columns: both ends and the middle, and the one that is pointed at.
+    """The labels above the columns: both ends and the middle, and the one that is pointed at.
 
-    ``row`` returns a row of the part that is shown: its cells say where the columns are.
+    ``row`` returns a displayed row, whose cells define the columns.
     """
 
     def __init__(
@@ -313,7 +312,7 @@ class _Heading(QWidget):
         painter.end()
 
     def columns(self) -> set[int]:
-        """Return the columns with a visible label; one that takes the pointed label's room is hidden."""
+        """Return the columns with a visible label; labels in the way of the pointed one are hidden."""
         if self._pointed < 0:
             return self._fixed
         neighbours = {
@@ -335,14 +334,14 @@ class _Heading(QWidget):
         return bounds.width() <= width and bounds.height() <= self.height() + 1
 
     def _bounds(self, column: int) -> tuple[float, float]:
-        """Return the left and right limits of a label [px]: the scale's labels do not cross the rule at its end."""
+        """Return the left and right limits of a label [px]; labels of the scale do not cross the rule at its end."""
         row = self._row()
         if row.rule is None or column == _POINTS:
             return 0.0, self.width()
         return (row.rule, self.width()) if row.columns[_POINTS] < row.columns[0] else (0.0, row.rule)
 
     def column_area(self, column: int) -> QRectF:
-        """Return the area of a label: its column, and as much as it needs on either side, within the row."""
+        """Return the area of a label: its column, extended on either side as needed, within the row."""
         assert self._sizes is not None  # noqa: S101  # painted only when laid out
         left, width = self._row().columns[column]
         pitch = min(self._sizes.cell_pitch, _LABEL_WIDTH * self._sizes.text) if column < _POINTS else width
@@ -353,7 +352,7 @@ class _Heading(QWidget):
 
 
 class QuestionnaireWidget(QuestionsPage):
-    """Statements that are rated on one scale: rows with the scale's labels over their columns."""
+    """Statements that are rated on one scale: rows, with the scale's labels above their columns."""
 
     fields: tuple[StatementField, ...]
 
@@ -383,7 +382,7 @@ class QuestionnaireWidget(QuestionsPage):
         return [list(asked[first : first + per_page]) for first in range(0, len(asked), per_page)]
 
     def lead_height(self) -> int:
-        """Return the height above the statements [px]: few statements begin a third down the page."""
+        """Return the height above the statements [px]: few statements start at a third of the page's height."""
         room, needed = (
             self.room_height(tabs=False),
             self._heading.height() + sum(it.minimumHeight() for it in self.fields),

@@ -46,7 +46,7 @@ _MOST_ACROSS = 4
 
 
 class _ChoiceField(OptionsField):
-    """Options in a grid; of several, a key or a click adds one or removes it."""
+    """Options in a grid; with several, a key or click adds or removes one."""
 
     widget_id: ClassVar[str] = "choice"
 
@@ -123,7 +123,7 @@ _FIELD_WIDTH = 120.0
 
 
 class Entry(EntryKeys, QLineEdit):
-    """The field; it has no menu, as Qt's is in English."""
+    """The entry field, without Qt's context menu, which would be in English."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)
@@ -131,7 +131,7 @@ class Entry(EntryKeys, QLineEdit):
 
 
 class _NumberField(TypedField):
-    """Point or comma; an entry that is not one permitted number is reported and not taken."""
+    """A number with point or comma; any other entry is reported and not accepted."""
 
     widget_id: ClassVar[str] = "number"
 
@@ -200,7 +200,7 @@ class _NumberField(TypedField):
         return self.entry.text()
 
     def finish(self) -> bool:
-        """Take the entry, or show its problem."""
+        """Accept the entry, or show its problem."""
         self._timer.stop()
         text = self.entry.text().strip()
         if not text:
@@ -229,7 +229,7 @@ class _NumberField(TypedField):
         self._timer.start()
 
     def _take_number(self) -> None:
-        """Take the text typed so far if it is a number; nothing is reported while typing."""
+        """Accept the text typed so far if it is a number; nothing is reported while typing."""
         number = read_number(self.entry.text(), self._words.decimal_sign)
         if number is not None and self._number.permits(number):
             self.give_answer(plain_number(number))
@@ -264,7 +264,7 @@ _ALL_NAMED = 5  # points whose names stand side by side; of more the ends, the m
 
 
 class _RatingField(ScaleField):
-    """Points with their names above them."""
+    """Points with their labels above them."""
 
     widget_id: ClassVar[str] = "rating"
 
@@ -315,7 +315,7 @@ class _RatingField(ScaleField):
         return [Qt.AlignmentFlag.AlignLeft, centre, Qt.AlignmentFlag.AlignRight]
 
     def _name_points(self, _place: int = -1) -> None:
-        """Show the names: all of a short scale; of a long one the ends, and the pointed one in the middle."""
+        """Show the labels: all of a short scale; for a long one the ends, and the pointed one in the middle."""
         texts = list(self.labels)
         if len(texts) > _ALL_NAMED:
             middle = self.labels[len(texts) // 2] if len(texts) % 2 else ""
@@ -342,7 +342,7 @@ _STEP_KEYS = {
 
 
 class _Line(QSlider):
-    """The line and its handle; ``set_to(step)`` comes with a click, a key, and where the handle is let go."""
+    """The line and its handle; ``set_to(step)`` is emitted at a click, a key, and when the handle is released."""
 
     set_to = Signal(int)
 
@@ -390,7 +390,7 @@ class _Line(QSlider):
             self._drag(event.position().x())
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
-        """Release the handle: its place is the answer."""
+        """Release the handle: its position is the answer."""
         if self.isSliderDown():
             self._drag(event.position().x())
             self.setSliderDown(False)
@@ -455,7 +455,7 @@ class _Line(QSlider):
 
 
 class SliderField(QuestionField):
-    """Arrows move one step, Page ten, Home and End to the ends; a click or a finger puts the handle anywhere."""
+    """A slider: arrows move one step, Page ten, Home and End to the ends; clicks and touch move it anywhere."""
 
     widget_id: ClassVar[str] = "slider"
 
@@ -510,7 +510,7 @@ _FRAME = 20.0  # of a field around its lines
 
 
 class _TextEntry(EntryKeys, QPlainTextEdit):
-    """The field, without a menu; Tab leaves it, and in a single line Enter is the page's."""
+    """The text field, without a menu; Tab leaves it, and in a single line Enter is handled by the page."""
 
     def __init__(self, lines: int, parent: QWidget) -> None:
         super().__init__(parent)
@@ -523,14 +523,14 @@ class _TextEntry(EntryKeys, QPlainTextEdit):
             self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
 
     def leaves_to_page(self, event: QKeyEvent) -> bool:
-        """Return whether a key belongs to the page: with several lines only Ctrl+Enter."""
+        """Return whether the page handles a key; with several lines only Ctrl+Enter."""
         if self._lines == 1:
             return super().leaves_to_page(event)
         return event.key() in ENTER and bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier)
 
 
 class TextField(TypedField):
-    """A text of one line or several."""
+    """A free text with one or several lines."""
 
     widget_id: ClassVar[str] = "text"
 
@@ -566,7 +566,7 @@ class TextField(TypedField):
         self.entry.setFixedHeight(round(max(target_px(scale), height)))
 
     def finish(self) -> bool:
-        """Take the text; an empty one is no answer."""
+        """Accept the text; an empty one is no answer."""
         self._timer.stop()
         text = self.entry.toPlainText().strip()
         if text:
@@ -601,7 +601,7 @@ class TextField(TypedField):
 
 
 def _utf16(text: str) -> bytes:
-    """Return a text in UTF-16, in which Qt counts positions: two bytes each."""
+    """Return a text in UTF-16, Qt's units for positions, with two bytes each."""
     return text.encode("utf-16-le", "surrogatepass")
 
 

@@ -42,7 +42,7 @@ _WRAPPED = int(Qt.TextFlag.TextWordWrap)
 
 
 class _Foot(QWidget):
-    """One line; the keys give way where a message needs the room. All but the button is painted."""
+    """The line at the foot; the key hints are hidden if a message needs the room. Only the button is a widget."""
 
     def __init__(self, wording: Words, parent: QWidget) -> None:
         super().__init__(parent)
@@ -73,7 +73,7 @@ class _Foot(QWidget):
         self.update()
 
     def paintEvent(self, _event: QPaintEvent) -> None:
-        """Draw a line, and below it from the end: the count of answers, the keys, and what is missing."""
+        """Draw a line, and below it from the end: the count of answers, the keys, and missing answers."""
         painter = page_painter(self)
         painter.setLayoutDirection(Qt.LayoutDirection.LayoutDirectionAuto)  # the text has its own language's direction
         painter.fillRect(0, 0, self.width(), _LINE, QColor(PARTICIPANT.border))
@@ -146,7 +146,7 @@ class _Foot(QWidget):
         painter.drawText(QRectF(place), flags, text)
 
     def _placed(self, left: int, width: int) -> QRect:
-        """Return a rectangle as high as the foot, at a distance from the start of lines [px]."""
+        """Return a rectangle as high as the foot, at a distance from the start of the line [px]."""
         line = self._row.contentsRect()
         return QStyle.visualRect(self.layoutDirection(), line, QRect(left, line.top(), width, line.height()))
 
@@ -168,11 +168,11 @@ _TAB_STYLE = (
 
 
 class QuestionsPage(PageWidget):
-    """Draws a page of questions and says what happens on it.
+    """Draws a page of questions and emits its events.
 
-    Nothing is preset but what the page brings back after a pause. ``ItemShown`` comes once for every question, when it
-    is first painted; ``Chosen`` when an answer is made or changed, ``Retracted`` where an entry was emptied;
-    ``Submitted`` once, when nothing is missing. Questions that an answer shows or hides come and go at once.
+    Nothing is preset except earlier answers after a pause. ``ItemShown`` is emitted once per question, when it is first
+    painted; ``Chosen`` when an answer is made or changed, ``Retracted`` when an entry was emptied; ``Submitted`` once,
+    when nothing is missing. Questions that an answer shows or hides appear and disappear at once.
     """
 
     def __init__(self, page: QuestionnairePage, context: PageContext) -> None:
@@ -240,7 +240,7 @@ class QuestionsPage(PageWidget):
 
     @property
     def message(self) -> str:
-        """The message of the foot: which questions need an answer, once Continue was pressed too early."""
+        """The message at the foot: the questions that need an answer, after Continue was pressed too early."""
         numbers = [field.view.number for field in self.asked if field.missing]
         return self.missing_words(numbers) if numbers else ""
 
@@ -254,7 +254,7 @@ class QuestionsPage(PageWidget):
 
     @property
     def tight(self) -> bool:
-        """Whether margins shrink in a window that is low for its text size."""
+        """Whether margins are reduced because the window is low for its text size."""
         return self.height() < 740 * self.words_scale
 
     @property
@@ -312,7 +312,7 @@ class QuestionsPage(PageWidget):
             super().keyPressEvent(event)
 
     def lay_out(self, scale: float) -> None:
-        """Set the size of everything and divide the questions into parts."""
+        """Set the size of all parts and divide the questions into parts."""
         self.space_scale = scale
         text, margin = self.words_scale, round(self.margin)
         side = round(self.margin - MARGIN * scale)
@@ -370,7 +370,7 @@ class QuestionsPage(PageWidget):
         self._shown_parts = shown
 
     def _tabs_shown(self, tab_px: int) -> list[int]:
-        """Return the parts with a tab: all that fit beside the title, else the first, the last and the nearest."""
+        """Return the parts with a tab: all if they fit next to the title, else the first, the last and the nearest."""
         many = len(self.parts)
         room = self.width() - 2 * round(self.margin) - self._title.sizeHint().width()
         fitting = max(3, room // (tab_px + self._tab_row.spacing()))
@@ -403,7 +403,7 @@ class QuestionsPage(PageWidget):
         self._update_foot()
 
     def _move_keyboard(self, by: int) -> None:
-        """Focus the next or previous question; after the last comes the button."""
+        """Focus the next or previous question, or after the last one the button."""
         here = self.focusWidget()
         question = question_of(here) if here is not None else None
         asked = self.asked
@@ -414,7 +414,7 @@ class QuestionsPage(PageWidget):
             self.go_to(asked[target])
 
     def _go_on_from(self, field: QuestionField) -> None:
-        """Go on after an answer by key, within the part; after its last question comes the button."""
+        """Continue after an answer by key, within the part; after its last question the button gets the focus."""
         part = self.part
         following = part.index(field) + 1 if field in part else len(part)
         if following < len(part):
@@ -470,7 +470,7 @@ class FormWidget(QuestionsPage):
         return self._words.questions_missing(numbers)
 
     def arrange_parts(self, asked: Sequence[QuestionField]) -> _Parts:
-        """Return the questions in parts that fit; smaller text avoids a second part if that is enough."""
+        """Return the questions in parts that fit; a smaller text is used if it avoids a second part."""
         must = self.words_scale > 1.0 and self._text_scale > 1.0
         parts = self._packed_parts(asked, self.words_scale)
         if len(parts) == 2 and not must:
@@ -498,7 +498,7 @@ class FormWidget(QuestionsPage):
 
 
 def _fit_words(field: QuestionField, scale: float, width: int, room: int) -> int:
-    """Set a question's text size, smaller if it is too high for a part of its own; return its height [px]."""
+    """Set a question's text size, reduced if it is too high for its own part; return its height [px]."""
     for percent in range(100, 45, -5):
         field.set_scale(scale * percent / 100)
         if (height := max(field.height_in(width, room), round(target_px(scale * percent / 100)))) <= room:
@@ -514,7 +514,7 @@ def _range_text(part: Sequence[QuestionField]) -> str:
 
 
 def _divide_into_parts(asked: Sequence[QuestionField], heights: Sequence[int], room: int) -> _Parts:
-    """Return the questions in parts no higher than the room [px], as many in each as fit."""
+    """Return the questions in parts no higher than the room [px], with as many in each as fit."""
     parts: _Parts = []
     taken = 0
     for field, height in zip(asked, heights, strict=True):

@@ -34,7 +34,7 @@ _ASKING = 0.8  # share of the present trial's bar that is full
 
 
 class _AnswerPage(PageWidget):
-    """The progress, a question and room for its answer below it; ``answer`` answers and continues, once."""
+    """The progress, a question and room for its answer; ``answer`` answers and continues, only once."""
 
     def __init__(self, page: DesignPage, context: PageContext) -> None:
         super().__init__(context)
@@ -80,8 +80,8 @@ _ARROWS = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 class ChoiceWidget(_AnswerPage):
     """The answers in temporal order; digits choose by number, the arrows by position on the screen.
 
-    Nothing is preselected. Of two answers ← is the left one and → the right; of more the arrows go to a button, which
-    Enter presses.
+    Nothing is preselected. With two answers ← chooses the left one and → the right; with more, the arrows focus a
+    button, which Enter presses.
     """
 
     def __init__(self, page: ChoicePage, context: PageContext) -> None:
@@ -190,7 +190,7 @@ def draw_interval(
 ) -> None:
     """Draw text and squares, centred in a page of ``width`` around the height ``middle`` [px].
 
-    In a rest no square is filled; in a language that is read from right to left the first is on the right.
+    In a rest no square is filled; in a right-to-left language the first is at the right.
     """
     text = wording.reached.format(reached=interval.number, of=interval.of)
     side, gap = _SQUARE * scale, _GAP * scale
@@ -285,10 +285,11 @@ _KEYS: Final = {Qt.Key.Key_Left: -1, Qt.Key.Key_Right: 1}
 
 
 class SettingControls(QWidget):
-    """Says which way the participant moves the level, and that it is set; shown only while it can be set.
+    """Controls with which the participant adjusts and confirms the level; shown only while it can be adjusted.
 
-    The left key and button are less in every language. What is held makes a step every `_STEP_MS`. ``event_made``
-    carries the session's events. Without ``buttons``, where no pointer is shown, keys and wheel alone are heard.
+    The left key and button mean less in every language. A held key or button makes a step every `_STEP_MS`.
+    ``event_made`` carries the session's events. Without ``buttons``, if no pointer is shown, only keys and wheel are
+    used.
     """
 
     event_made = Signal(object)
@@ -343,7 +344,7 @@ class SettingControls(QWidget):
         self.raise_()
 
     def press_key(self, event: QKeyEvent) -> bool:
-        """Handle a key press; return whether the key is one of these controls."""
+        """Handle a key press; return whether the key belongs to these controls."""
         way = _KEYS.get(Qt.Key(event.key()), 0)
         if not self._adjusts or (not way and event.key() not in (Qt.Key.Key_Return, Qt.Key.Key_Enter)):
             return False
@@ -361,14 +362,14 @@ class SettingControls(QWidget):
             self.stop_stepping()
 
     def turn_wheel(self, event: QWheelEvent) -> None:
-        """Step with each notch of the wheel; forwards increases."""
+        """Make a step for each notch of the wheel; forwards increases."""
         self._turned += event.angleDelta().y()
         steps = int(self._turned / _NOTCH)
         self._turned -= steps * _NOTCH
         self._emit_steps(steps)
 
     def stop_stepping(self) -> None:
-        """Stop stepping: a deactivated window never receives the key's release."""
+        """Stop stepping, because a deactivated window never receives the key's release."""
         self._held = self._turned = 0
         self._timer.stop()
 

@@ -48,9 +48,9 @@ def page_scale(width: float, height: float) -> float:
 
 
 def words_scale(width: float, height: float, text_scale: float) -> float:
-    """Return the scale of text in a window [logical px], at least that for legibility.
+    """Return the scale of text in a window [logical px], at least the legible one.
 
-    A window that is smaller than designed holds words of 200 % no more: there they grow as far as it can hold them.
+    A window smaller than the design size cannot hold text at 200 %; there the text is enlarged as far as possible.
     """
     most = _MOST_TEXT * min(width / _DESIGNED_FOR[0], height / _DESIGNED_FOR[1])
     return max(page_scale(width, height), min(text_scale, most))
@@ -82,7 +82,7 @@ def page_painter(widget: QWidget) -> QPainter:
 
 @dataclass(frozen=True, slots=True)
 class PageContext:
-    """What a page is shown with.
+    """The context in which a page is shown.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class PageContext:
 
 
 class PageWidget(QWidget):
-    """A page that fills the participant's window, mirrored in a language that is read from right to left.
+    """A page that fills the participant's window, mirrored in a right-to-left language.
 
     ``event_made`` carries the session's events.
     """
@@ -123,7 +123,7 @@ class PageWidget(QWidget):
         return words_scale(self.width(), self.height(), self._text_scale)
 
     def lay_out(self, scale: float) -> None:
-        """Lay out everything at the present size."""
+        """Lay out all parts at the current size."""
 
     def focus_first(self) -> None:
         self.setFocus()
@@ -143,7 +143,7 @@ _BAR = (40.0, 6.0, 8.0)  # width, height, gap [logical px at scale 1]
 
 
 def _progress_texts(progress: Progress, wording: Words) -> tuple[str, str]:
-    """Return "Part 2 of 2" and "Delay setting 3 of 7"; an only part or setting is not counted."""
+    """Return "Part 2 of 2" and "Delay setting 3 of 7"; a single part or setting is not counted."""
     counted = progress.part is not None and progress.parts > 1
     part = wording.part.format(part=progress.part, parts=progress.parts) if counted else ""
     named = progress.label and progress.of > 1
@@ -157,8 +157,8 @@ def draw_progress(
 ) -> float:
     """Draw text and bars from the start of a line in ``room``; return the width [px].
 
-    ``share`` is how much of the present bar is full: the task is its first half, the questionnaire its second. Bars
-    that find no room are left out; the words say the same, and shrink if they would leave ``room``.
+    ``share`` is the filled fraction of the current bar: the task is its first half, the questionnaire its second. Bars
+    without room are omitted, since the text has the same content, and the text shrinks to fit ``room``.
     """
     flip = wording.right_to_left
     part, setting = _progress_texts(progress, wording)
@@ -218,7 +218,7 @@ def _rectangle_from_start(room: QRectF, x: float, width: float, height: float, *
 
 
 class ProgressLine(QWidget):
-    """The progress at the head of a page; empty, but as high, where a page has none."""
+    """The progress at the top of a page; if there is none, an empty line of the same height."""
 
     def __init__(self, progress: Progress | None, wording: Words, share: float, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -307,12 +307,12 @@ class KeyCap(QWidget):
 
 
 class _LitButton(Button):
-    """A button that lights up under the pointer, and has a ring where the keyboard led to it."""
+    """A button that lights up under the pointer, and has a focus ring after keyboard navigation."""
 
     ringed = False
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Show the focus ring after keyboard navigation; on a page that begins here, the key cap suffices."""
+        """Show the focus ring after keyboard navigation; on a page that starts here, the key cap suffices."""
         self.ringed = event.reason() in _KEYBOARD
         super().focusInEvent(event)
 
@@ -326,7 +326,7 @@ class _LitButton(Button):
 
 
 class GoButton(_LitButton, QPushButton):
-    """The filled button of a participant's page, with the key that presses it; never disabled."""
+    """The filled button of a participant's page, with its key; never disabled."""
 
     def __init__(self, text: str, key: str, parent: QWidget | None = None) -> None:
         super().__init__(button_text(text), parent)
@@ -375,7 +375,7 @@ class GoButton(_LitButton, QPushButton):
         painter.end()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Leave arrow keys to the page, where they scroll or move; here they would move the focus."""
+        """Leave arrow keys to the page, where they scroll or move, instead of moving the focus."""
         if event.key() in _ARROWS:
             event.ignore()
         else:
@@ -386,7 +386,7 @@ _LEAST_HEIGHT = 44
 
 
 class LanguageButton(_LitButton, QRadioButton):
-    """One language: an outline, and a check mark where it is the page's. Enter and Space choose it."""
+    """One language: an outline, and a check mark if it is the page's. Enter and Space choose it."""
 
     def __init__(self, language: str, parent: QWidget) -> None:
         super().__init__(words(language).name, parent)
@@ -442,9 +442,9 @@ class LanguageButton(_LitButton, QRadioButton):
 
 
 class LanguageSwitch(QGroupBox):
-    """The languages in one line: Tab comes to the page's own, arrows choose its neighbour.
+    """The languages in one line: Tab focuses the page's own, arrows choose a neighbour.
 
-    ``chosen`` comes with the code of another than the page's.
+    ``chosen`` carries the code of a language other than the page's.
     """
 
     chosen = Signal(str)
@@ -481,9 +481,9 @@ _DELETE = "⌫"
 
 
 class DigitPad(QWidget):
-    """Keys in rows of ``across``, in the same order in every language; ``more`` come after the digits.
+    """Keys in rows of ``across``, in the same order in every language, followed by ``more``.
 
-    The keyboard's digit row types digits into ``field`` in every layout; a minus stays one if ``more`` has it.
+    The keyboard's digit row types digits into ``field`` in every layout; a minus is typed if ``more`` has it.
     """
 
     def __init__(self, field: QLineEdit, more: tuple[str, ...], across: int, delete_name: str, parent: QWidget) -> None:

@@ -36,14 +36,14 @@ _PAGE_KEYS = {Qt.Key.Key_PageUp: -1, Qt.Key.Key_PageDown: 1}
 
 
 def _paragraphs_html(paragraphs: tuple[str, ...], gap: float, *, right_to_left: bool = False) -> str:
-    """Return paragraphs with spacing between their lines as HTML for a QLabel."""
+    """Return paragraphs with line spacing as HTML for a QLabel."""
     style = f"line-height: {_LINE_PERCENT}%; margin: 0 0 {round(gap)}px 0"
     way = "rtl" if right_to_left else "ltr"
     return "".join(f'<p dir="{way}" style="{style}">{html.escape(text)}</p>' for text in paragraphs)
 
 
 class Badge(QWidget):
-    """An icon in a disc: what kind of page this is, before a word is read."""
+    """An icon in a disc that shows the kind of page at a glance."""
 
     def __init__(self, icon: str, colour: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -67,7 +67,7 @@ class Badge(QWidget):
 
 
 class Column(QWidget):
-    """Badge, title and paragraphs under each other; scrolls only if a small window cannot show them all."""
+    """Badge, title and paragraphs below each other; it scrolls only if a small window cannot show them all."""
 
     def __init__(
         self, icon: str, title: str, paragraphs: tuple[str, ...], colour: str = PARTICIPANT.accent, *, parent: QWidget
@@ -101,7 +101,7 @@ class Column(QWidget):
 
 
 class ReadingPage(PageWidget):
-    """A progress line, a column of text in the middle, and perhaps one button."""
+    """A progress line, a column of text in the middle, and at most one button."""
 
     def __init__(
         self,
@@ -188,7 +188,7 @@ class ReadingPage(PageWidget):
         return 0
 
     def _lay_out_head(self, _scale: float, _margin: int, top: int) -> int:
-        """Lay out the head from ``top`` on; return the top of the column's room [px]."""
+        """Lay out the head from ``top``; return the top of the column's room [px]."""
         return top
 
 
@@ -210,7 +210,7 @@ class _DeclineButton(QPushButton):
         self.setFixedSize(round(metrics.horizontalAdvance(self.text()) + 44 * scale), round(48 * scale))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Decline with Enter, too, if the button has focus: Enter must not agree."""
+        """Decline with Enter, too, if the button has the focus, since Enter must not agree."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.click()
         else:
@@ -220,8 +220,8 @@ class _DeclineButton(QPushButton):
 class TextWidget(ReadingPage):
     """Consent, instructions, a break or the debrief.
 
-    Space or Enter goes on; a consent asks for more: its button, or Enter; another button declines. A break with a least
-    time counts it down in the place of its button. Before the consent another language can be chosen.
+    Space or Enter continues; a consent requires its button, or Enter; another button declines. A break with a least
+    time shows a countdown in place of its button. Before the consent another language can be chosen.
     """
 
     def __init__(self, page: TextPage, context: PageContext) -> None:
@@ -264,7 +264,7 @@ class TextWidget(ReadingPage):
         return self.count_label.text()
 
     def tick(self) -> None:
-        """Count down; at the end, show the button in place of the count."""
+        """Count down; at the end, show the button instead of the count."""
         assert self.button is not None  # noqa: S101  # these pages have one
         left = self.seconds_left
         self.count_label.setText(self._words.continue_in.format(seconds=left) if left else "")
@@ -282,7 +282,7 @@ class TextWidget(ReadingPage):
                 announce(self.button, self.button.text())
 
     def focus_first(self) -> None:
-        """Do not focus the consent's button: Space must not agree by itself."""
+        """Do not focus the consent's button, because Space must not agree."""
         if self._consent or self.button is None or self.button.isHidden():
             self.setFocus()
         else:
@@ -297,7 +297,7 @@ class TextWidget(ReadingPage):
         self._place_decline()
 
     def _below_button(self, width: int) -> int:
-        """Leave room for the decline button if both do not fit in one line."""
+        """Return the room for the decline button if both do not fit in one line."""
         if self.decline is None or self.button is None:
             return 0
         self.decline.set_scale(self.words_scale)
@@ -364,10 +364,9 @@ _VEIL = 0.80  # opacity of the pause above the page
 
 
 class PauseWidget(ReadingPage):
-    """The pause, over the page that it interrupts; after a force stop it says that the force is off.
+    """The pause page, shown over the interrupted page; after a force stop it says that the force is off.
 
-    Where only the operator resumes, there is nothing to press. Of a mouse, which gives no force, it
-    never speaks of one.
+    If only the operator can resume, it has no button. With a mouse, which has no force, it does not mention force.
     """
 
     def __init__(self, page: PausePage, context: PageContext, under: QPixmap | None = None) -> None:
@@ -384,14 +383,14 @@ class PauseWidget(ReadingPage):
         super().__init__(column, context, button)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        """Continue with Enter; Space alone could still be meant for the previous page."""
+        """Continue with Enter; Space could still be meant for the previous page."""
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
             self.go_on()
         else:
             super().keyPressEvent(event)
 
     def go_on(self) -> None:
-        """Ask to resume the session if the participant may do so."""
+        """Request to resume the session if the participant may do so."""
         if self.button is not None:
             self.event_made.emit(ResumeRequested(self._clock(), "participant"))
 
@@ -410,9 +409,9 @@ class PauseWidget(ReadingPage):
 
 
 class NoticeWidget(ReadingPage):
-    """Something broke, or the session is over: a calm sentence; the last page can be closed.
+    """The page after a failure or the end of the session: a calm sentence; the last page can be closed.
 
-    Where the mouse is the device, the last page does not ask to let go of it.
+    With a mouse as the device, the last page does not ask to let go of it.
     """
 
     def __init__(self, page: TroublePage | EndPage, context: PageContext) -> None:

@@ -18,7 +18,7 @@ _NAME_PX = 18
 
 
 class Arrow(NamedTuple):
-    """A vector that begins at a point [m, hand], in metres of the tank, with its name and colour."""
+    """A vector that starts at a point [m, hand], in metres of the tank, with its name and colour."""
 
     name: str
     start_m: Point
@@ -66,7 +66,7 @@ def paint_arrows(painter: QPainter, camera: Camera, arrows: Sequence[Arrow]) -> 
 
 
 def draw_head(painter: QPainter, tip: QPointF, turn: float, ink: QColor, size: float) -> None:
-    """Paint an arrow head whose middle is at ``tip``, pointing ``turn`` [rad] from the right, downwards."""
+    """Paint an arrow head centred at ``tip``, pointing ``turn`` [rad] clockwise from the right."""
     corners = [(0.55, 0.0), (-0.45, 0.46), (-0.45, -0.46)]
     cos, sin = math.cos(turn), math.sin(turn)
     shape = QPolygonF([tip + QPointF(cos * u - sin * v, sin * u + cos * v) * size for u, v in corners])

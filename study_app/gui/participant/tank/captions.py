@@ -39,10 +39,10 @@ def _caption_scale(width: float, height: float) -> float:
 
 
 class Captions:
-    """Lays the words out for a size and draws those that a region touches.
+    """Lays out the texts for a size and draws those that intersect a region.
 
-    Words are no smaller than ``text_scale`` times as designed. In a language that is read from right to left everything
-    is mirrored but the tank and the photodiode's patch.
+    Texts are enlarged by at least ``text_scale``. In a right-to-left language everything is mirrored except the tank
+    and the photodiode's patch.
     """
 
     def __init__(self, page: TaskPage, wording: Words, text_scale: float = 1.0) -> None:
@@ -114,7 +114,7 @@ class Captions:
         return max(1, *(round(metrics.boundingRect(room, _CENTRED, text).height() / self._line) for text in texts))
 
     def _room_of_foot(self) -> tuple[float, float]:
-        """Return start and width of the foot's room, read from left to right [px]."""
+        """Return start and width of the foot's room, in reading direction [px]."""
         margin = 64 * _caption_scale(self._width, self._height)
         start = max(margin, _PATCH_ROOM + 12) if self._words.right_to_left else margin
         return start, self._width - start - (margin if self._words.right_to_left else _PATCH_ROOM + 12)
@@ -146,7 +146,7 @@ class Captions:
         }
 
     def draw(self, painter: QPainter, region: QRegion, task: TaskShown | None, hint: str = "") -> None:
-        """Draw the texts in ``region``; ``hint`` says how the ball reaches its target, "" if none is needed."""
+        """Draw the texts in ``region``; ``hint`` tells how the ball reaches its target, "" if not needed."""
         page, wording = self._page, self._words
         painter.setLayoutDirection(self._way)
         if page.progress is not None and region.intersects(self._head.toAlignedRect()):
@@ -177,7 +177,7 @@ class Captions:
 
     @property
     def controls_middle(self) -> float:
-        """The height of the adjustment controls' middle [px]: the foot's, or above it."""
+        """The vertical centre of the adjustment controls [px]: the foot's, or above it."""
         above = self._controls_above
         return self._foot.top() - above / 2 if above else self._foot_middle()
 

@@ -29,7 +29,7 @@ _MARGIN_M = 0.0025  # between ball and glass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box:
-    """The inside of the tank: half width, floor, water level, glass edge, half depth [m]."""
+    """The inner dimensions of the tank: half width, floor, water level, glass edge, half depth [m]."""
 
     x: float
     floor: float
@@ -56,7 +56,10 @@ class Box:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Camera:
-    """A pinhole at (0, ``eye_y``, ``eye_z``) [m] that looks down by ``pitch`` [rad]; ``focal`` and ``centre`` in px."""
+    """A pinhole camera at (0, ``eye_y``, ``eye_z``) [m], pitched down by ``pitch`` [rad].
+
+    ``focal`` and ``centre`` are in px.
+    """
 
     eye_y: float
     eye_z: float
@@ -107,7 +110,7 @@ _PLUMB_HALF_PX = 3.0
 
 
 class TaskShown(Protocol):
-    """What is drawn of a task (see ``session.tasks.TaskView``)."""
+    """The drawn properties of a task (see ``session.tasks.TaskView``)."""
 
     @property
     def lit(self) -> int | None: ...
@@ -125,7 +128,7 @@ class TaskShown(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A thing that looks as ``state`` says and lies inside ``place`` [px]."""
+    """A drawn part whose appearance follows from ``state``, within ``place`` [px]."""
 
     state: object
     place: QRectF
@@ -133,7 +136,7 @@ class Placed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BallPlace:
-    """Where the proxy is drawn: middle, radius by depth step, haze, and the floor below it [px]."""
+    """The drawn place of the proxy: centre, radius by depth step, haze, and the floor below it [px]."""
 
     middle: QPointF
     radius: float
@@ -149,7 +152,7 @@ class BallPlace:
 
 @dataclass(frozen=True, slots=True)
 class TargetPlace:
-    """Where a target is drawn: middle, radius, its marks on the floor (circle, diamond) and below it [px]."""
+    """The drawn place of a target: centre, radius, its marks on the floor (circle, diamond) and below it [px]."""
 
     middle: QPointF
     radius: float
@@ -198,7 +201,7 @@ def target_place(camera: Camera, box: Box, centre: Point, radius_m: float) -> Ta
 
 
 class BallPlacer:
-    """Finds where the ball is drawn; its sizes come in steps of depth, one sprite each."""
+    """Computes the ball's drawn place; its size changes in depth steps, one sprite each."""
 
     def __init__(self, camera: Camera, box: Box, radius_m: float) -> None:
         self._camera, self._box, self._radius_m = camera, box, radius_m
@@ -245,7 +248,7 @@ class BallPlacer:
 
 
 def _plumb_dots(floor: QPointF, end: QPointF, pitch: float) -> tuple[QPointF, ...]:
-    """Return dots from the floor up to ``end``, ``pitch`` px apart: they stay in place while the ball rises."""
+    """Return dots from the floor up to ``end``, ``pitch`` px apart, whose positions do not depend on the ball."""
     along = end - floor
     length = math.hypot(along.x(), along.y())
     return (
@@ -283,7 +286,7 @@ def changed_region(before: dict[str, Placed], after: dict[str, Placed]) -> QRegi
 
 
 def paint_marks(painter: QPainter, target: TargetPlace, stroke: float, *, is_lit: bool) -> None:
-    """Paint the marks with lines as wide as a share of ``stroke`` [px]."""
+    """Paint the marks with line widths relative to ``stroke`` [px]."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     ink = QColor(TANK.lit if is_lit else TANK.dim)
     ink.setAlphaF(0.62 if is_lit else 0.55)

@@ -32,7 +32,7 @@ SEED = 7
 
 @cache
 def brightness() -> NDArray[np.float32]:
-    """Return the light on the floor above its mean as a (320, 512) array in 0 … 1, back of the tank first."""
+    """Return the light on the floor above its mean as a (320, 512) array in 0 … 1, from the back of the tank."""
     random = np.random.Generator(np.random.PCG64(SEED))
     x = _ray_starts(COLUMNS)[None, :]
     z = _ray_starts(ROWS)[:, None]
@@ -107,7 +107,7 @@ def _pen(colour: str, alpha: int, width: float) -> QPen:
 
 
 def shade(gradient: QGradient, *stops: tuple[float, str, int]) -> QBrush:
-    """Return a brush of a gradient with stops of place, colour and opacity."""
+    """Return a gradient brush with stops of position, colour and opacity."""
     for place, colour, alpha in stops:
         gradient.setColorAt(place, ink(colour, alpha))
     return QBrush(gradient)
@@ -148,7 +148,7 @@ def paint_walls(painter: QPainter, box: Box, camera: Camera) -> None:
 
 
 def paint_floor(painter: QPainter, box: Box, camera: Camera) -> None:
-    """Paint the floor: glass with caustics and a grid for the sense of scale."""
+    """Paint the floor: glass with caustics and a grid that conveys the scale."""
     x, y, z = box.x, box.floor, box.z
     quad = _polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
     far, near = quad.at(0).y(), quad.at(2).y()
@@ -211,7 +211,7 @@ def paint_light(painter: QPainter, box: Box, camera: Camera) -> None:
 
 
 def _paint_shaft(painter: QPainter, strength: int) -> None:
-    """Paint one shaft into [-1, 1] × [0, 1]: soft on both sides, fading downwards."""
+    """Paint one shaft of light into [-1, 1] × [0, 1]: soft at both sides, fading downwards."""
     steps = 48
     for step in range(steps):
         down = (step + 0.5) / steps
@@ -250,7 +250,7 @@ def paint_far_edges(painter: QPainter, box: Box, camera: Camera) -> None:
 
 
 def paint_near_sides(painter: QPainter, box: Box, camera: Camera) -> None:
-    """Paint the near edges at the sides and below, which moving parts cannot hide."""
+    """Paint the near edges at the sides and below, which no moving part can hide."""
     x, z = box.x, box.z
     painter.setPen(_pen(TANK.glass, 150, 1.25))
     corners = [(-x, box.top, z), (-x, box.floor, z), (x, box.floor, z), (x, box.top, z)]
@@ -274,7 +274,7 @@ def front_area(box: Box, camera: Camera) -> QRectF:
 
 
 def paint_surface(painter: QPainter, box: Box, camera: Camera) -> None:
-    """Paint the water's surface, seen from above: a pale skin with a few still ripples."""
+    """Paint the water surface from above: a pale layer with a few static ripples."""
     x, y, z = box.x, box.water, box.z
     skin = _polygon(camera, [(-x, y, -z), (x, y, -z), (x, y, z), (-x, y, z)])
     far, near = skin.at(0).y(), skin.at(2).y()

@@ -25,7 +25,7 @@ _PAINTING = threading.Lock()
 
 @dataclass(frozen=True, slots=True)
 class Backdrop:
-    """The still images and where they go: ``back`` fills the widget, ``front`` lies at ``front_at`` [px]."""
+    """The static images and their positions: ``back`` fills the widget, ``front`` is at ``front_at`` [px]."""
 
     back: QImage
     front: QImage
@@ -35,7 +35,7 @@ class Backdrop:
 def paint_backdrop(size: tuple[int, int], ratio: float, box: Box, camera: Camera) -> Backdrop:
     """Return both images of a tank for a widget of ``size`` [logical px] on a screen with pixel ratio ``ratio``.
 
-    The last two are kept. It may be called in another thread to have them at hand: who asks meanwhile waits for it.
+    The last two are cached. It may be called in another thread in advance; a second caller waits for that result.
     """
     with _PAINTING:
         return _paint_backdrop(size, ratio, box, camera)
@@ -103,7 +103,7 @@ def _paint_room(painter: QPainter, area: QRectF, box: Box, camera: Camera) -> No
 
 
 def _dithered(image: QImage) -> QImage:
-    """Return the 16-bit image with 8 bits a channel, rounded with noise of one step, so that gradients stay smooth."""
+    """Return a 16-bit image with 8 bits per channel, dithered by one step, so that gradients stay smooth."""
     width, height, ratio = image.width(), image.height(), image.devicePixelRatio()
     deep = np.frombuffer(image.constBits(), np.uint16).reshape(height, width, 4)
     random = np.random.Generator(np.random.PCG64(SEED))
@@ -124,10 +124,10 @@ _BASE_NS = 8_000_000
 
 
 class OnsetPatch:
-    """Toggles at each onset of a movement of the shown proxy.
+    """A patch that toggles at each movement onset of the displayed proxy.
 
-    A movement begins when the shown proxy, having been slower than 8 mm/s (hand) for 100 ms, becomes faster than
-    20 mm/s. Speeds are taken over at least 8 ms, whatever the refresh rate.
+    A movement begins when the displayed proxy, after being slower than 8 mm/s (hand) for 100 ms, becomes faster than 20
+    mm/s. Speeds are taken over at least 8 ms, regardless of the refresh rate.
     """
 
     def __init__(self) -> None:
@@ -138,7 +138,7 @@ class OnsetPatch:
         self._rested = True
 
     def follow_motion(self, position_m: tuple[float, float, float], time_ns: int) -> bool:
-        """Take the shown proxy (3,) [m] and its sample's time [ns]; return whether the patch is lit."""
+        """Process the displayed proxy (3,) [m] and its sample's time [ns]; return whether the patch is lit."""
         if self._position is None:
             self._position, self._time_ns = position_m, time_ns
         step_ns = time_ns - self._time_ns
@@ -176,9 +176,10 @@ def paint_patch(painter: QPainter, place: QRectF, *, lit: bool) -> None:
 
 
 class Pane(QOpenGLWidget):
-    """Fills its parent and has everything painted by ``paint`` whenever it is updated.
+    """A surface that fills its parent and is painted by ``paint`` whenever it is updated.
 
-    ``swapped`` comes after each swap, once it is on its way to the screen; swaps wait for the screen's refresh.
+    ``swapped`` is emitted after each buffer swap, when the frame is on its way to the screen; swaps are synchronised to
+    the refresh.
     """
 
     swapped = Signal()
@@ -193,20 +194,20 @@ class Pane(QOpenGLWidget):
         self.frameSwapped.connect(self.swapped)
 
     def paintGL(self) -> None:
-        """Paint the whole surface: its previous content is lost."""
+        """Paint the whole surface, since its previous content is lost."""
         painter = page_painter(self)
         self._paint(painter, QRegion(QRect(0, 0, self.width(), self.height())))
         painter.end()
 
 
 def video_place(camera: Camera, box: Box) -> QRectF:
-    """Return the place of a video, that of the tank [px]."""
+    """Return the place of a video, which is that of the tank [px]."""
     xs, ys = zip(*map(camera.point, box.corners()), strict=True)
     return QRectF(QPointF(min(xs), min(ys)), QPointF(max(xs), max(ys))).toAlignedRect().toRectF()
 
 
 class VideoLayer:
-    """Paints the frames of a video; ``place`` is where the tank would be [px]."""
+    """Paints the frames of a video at the tank's ``place`` [px]."""
 
     def __init__(self) -> None:
         self.place = QRectF()
@@ -233,7 +234,7 @@ class VideoLayer:
             painter.drawImage(self.frame_place(self._frame), self._image)
 
     def frame_place(self, frame: VideoFrame) -> QRectF:
-        """Return the rectangle of a frame: as large as the place allows, with its aspect ratio."""
+        """Return the rectangle of a frame: as large as the place permits, with its aspect ratio."""
         share = min(self.place.width() / frame.width, self.place.height() / frame.height)
         drawn = QRectF(self.place.topLeft(), QSizeF(share * frame.width, share * frame.height))
         drawn.moveCenter(self.place.center())

@@ -16,7 +16,7 @@ SOFT = 1.5  # reach of a shadow, in radii of the ball
 
 @dataclass(frozen=True, slots=True)
 class Sprite:
-    """An image and the half sizes of its place around a middle [logical px]."""
+    """An image and the half extents of its place around a centre [logical px]."""
 
     image: QImage
     half_width: float
@@ -29,7 +29,7 @@ class Sprite:
 
 
 def _empty_sprite(half_width: float, half_height: float, ratio: float) -> tuple[Sprite, QPainter]:
-    """Return an empty sprite with room for its edge, and a painter with the origin in its middle."""
+    """Return an empty sprite with a margin for its edge, and a painter with the origin at its centre."""
     wide, high = math.ceil(half_width * ratio) + 1, math.ceil(half_height * ratio) + 1
     image = QImage(2 * wide, 2 * high, QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
@@ -49,7 +49,7 @@ def _ink(colour: str, alpha: float = 1.0) -> QColor:
 
 @lru_cache(maxsize=256)
 def ball_sprite(radius: float, ratio: float, haze: float) -> Sprite:
-    """Return the proxy of ``radius`` [logical px]; ``haze`` in 0 … 1 is how much water lies before it."""
+    """Return the proxy of ``radius`` [logical px]; ``haze`` in 0 … 1 grows with the water in front of it."""
     sprite, painter = _empty_sprite(radius, radius, ratio)
     painter.scale(radius, radius)
     disc = QRectF(-1, -1, 2, 2)
@@ -87,7 +87,7 @@ def ball_sprite(radius: float, ratio: float, haze: float) -> Sprite:
 
 
 def _paint_rim(painter: QPainter) -> None:
-    """Paint the light that the floor throws on the ball's lower edge."""
+    """Paint the reflection of the floor on the ball's lower edge."""
     along = QLinearGradient(-0.85, 0, 0.75, 0)
     for place, alpha in ((0, 0), (0.3, 0.62), (0.6, 0.5), (1, 0)):
         along.setColorAt(place, _ink("#FFD9A6", alpha))
@@ -99,7 +99,7 @@ def _paint_rim(painter: QPainter) -> None:
 
 @lru_cache(maxsize=256)
 def shadow_sprite(radius: float, ratio: float, flat: float) -> Sprite:
-    """Return the shadow of a ball of ``radius`` [logical px]; ``flat`` is its height over its width."""
+    """Return the shadow of a ball of ``radius`` [logical px]; ``flat`` is its ratio of height to width."""
     reach = SOFT * radius
     sprite, painter = _empty_sprite(reach, reach * flat, ratio)
     painter.scale(reach, reach * flat)
@@ -152,7 +152,7 @@ def diamond_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
 
 
 def dashed_pen(ink: QColor, stroke: float, side: float, count: int) -> QPen:
-    """Return a pen that makes ``count`` dashes on a side [px], with half a dash at both ends."""
+    """Return a pen with ``count`` dashes per side [px], with half a dash at both ends."""
     pen = QPen(ink, stroke, Qt.PenStyle.CustomDashLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.MiterJoin)
     period = side / (count * stroke)
     pen.setDashPattern([period * 0.64, period * 0.36])
