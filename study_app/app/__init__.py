@@ -33,7 +33,7 @@ with naming_missing_library(), _without_collections():
 
 
 def __getattr__(name: str) -> Any:
-    """Load the main window where it is asked for: a session by command begins without it."""
+    """Load the main window on first access, since sessions started by a command do not need it."""
     if name != "run_home_window":
         raise AttributeError(name)
     with naming_missing_library(), _without_collections():

@@ -109,7 +109,7 @@ delay_error_ms = 25
 
 
 def study_of_delays(seconds: float) -> bytes:
-    """Return a protocol with a trial of so many seconds for each delay, one after the other."""
+    """Return a protocol with a trial of this duration for each delay in turn."""
     names = [f"delay{1e3 * delay_s:.0f}" for delay_s in DELAYS_S]
     conditions = "".join(
         f'\n[conditions.{name}]\nliquid = "water"\ndelay_ms = {1e3 * delay_s:g}\n'
@@ -257,7 +257,7 @@ T = TypeVar("T")
 
 
 class WindowsThread(QObject):
-    """The calling thread and its event loop; with a load both windows of a session are open meanwhile.
+    """The GUI thread and its event loop; with a load both windows of a session are open meanwhile.
 
     Raises
     ------
@@ -279,7 +279,7 @@ class WindowsThread(QObject):
         return self._painting.frames if self._painting is not None else 0
 
     def during(self, work: Callable[[], T]) -> T:
-        """Run ``work`` in another thread while the windows live in this one; return its result or raise its error."""
+        """Run ``work`` in another thread while this one runs the event loop; return its result or raise its error."""
         loop, heart = QEventLoop(), QTimer()
         heart.timeout.connect(lambda: None)
         heart.start(_HEARTBEAT_MS)
@@ -329,7 +329,7 @@ class WindowsThread(QObject):
 class _Painting(QObject):
     """Both windows of a session, painting as in a trial: the ball 60 times a second, the hand's traces 30 times.
 
-    What they show is a servo of their own in virtual time, so that they do the same whatever is timed with them.
+    They show a separate servo in virtual time, so that their work does not depend on what is being timed.
     """
 
     def __init__(self) -> None:

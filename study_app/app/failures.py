@@ -60,10 +60,10 @@ class UncaughtExceptions:
 
 
 def guard_painting() -> None:
-    """Hand every exception of a painting method to ``sys.excepthook``, in each class of widgets and items so far.
+    """Pass every exception of a painting method to ``sys.excepthook``, in all existing widget and item classes.
 
-    Qt goes on painting other parts while the exception is pending; PySide6 6.12 then loses references to their methods
-    until the process ends by a segmentation fault.
+    Otherwise Qt continues painting other parts while the exception is pending; PySide6 6.12 then loses references to
+    their methods until the process ends by a segmentation fault.
     """
     kinds: list[type] = [QWidget, QGraphicsItem, QStyledItemDelegate]
     while kinds:
@@ -89,7 +89,7 @@ def _reporting_exceptions(method: Callable[..., None]) -> Callable[..., None]:
 
 
 class ThreadExceptions(QObject):
-    """Replaces ``threading.excepthook`` while installed; ``ended`` says in this object's thread what ended a thread."""
+    """Replaces ``threading.excepthook`` while installed; ``ended`` carries, in its own thread, what ended a thread."""
 
     ended = Signal(str)
     _ended = Signal(str)
@@ -113,7 +113,7 @@ class ThreadExceptions(QObject):
 
 
 class Failing(Protocol):
-    """An object that handles a failure and ends in zero force."""
+    """An object that handles a failure and ends with zero force."""
 
     def fail(self, error: BaseException) -> None: ...
 
@@ -123,7 +123,7 @@ P = ParamSpec("P")
 
 
 def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
-    """Decorate a slot: an exception in it ends in zero force."""
+    """Decorate a slot so that an exception in it ends with zero force."""
 
     @wraps(slot)
     def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
@@ -136,7 +136,7 @@ def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, 
 
 
 def guarded_session_slot(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
-    """Decorate a slot as `guarded` does, but drop an event that arrives too late (`SessionError`): it is no failure."""
+    """Decorate a slot like `guarded`, but ignore events that arrive too late (`SessionError`)."""
 
     @wraps(slot)
     def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
@@ -149,10 +149,10 @@ def guarded_session_slot(slot: Callable[Concatenate[F, P], None]) -> Callable[Co
 
 
 class CrashTrace:
-    """Let `faulthandler` write to ``path`` until `close`; a file that stayed empty is removed then.
+    """Let `faulthandler` write to ``path`` until `close`, which removes an empty file.
 
-    The trace holds names of source files and functions and line numbers, no values. A session runs without it where
-    the file cannot be opened. A resumed session adds to the file.
+    The trace has names of source files and functions and line numbers, but no values. Sessions run without it if the
+    file cannot be opened. A resumed session appends to the file.
     """
 
     def __init__(self, path: Path) -> None:
@@ -183,7 +183,7 @@ _HANG_UP = 1  # the number of SIGHUP, for a log-off on any system
 
 
 class Patience:
-    """How long several waits may take together [s]."""
+    """A common time limit for several waits [s]."""
 
     def __init__(self, seconds: float) -> None:
         self._until_s = time.perf_counter() + seconds
@@ -205,8 +205,8 @@ def log_off_signal() -> SignalInstance:
 def ending_on_signals(end: Callable[[int], None]) -> Iterator[None]:
     """Call ``end`` once, with the signal's number, on Ctrl+C, a request to terminate or a log-off.
 
-    Signals are heard from the event loop. A log-off waits for ``end``, and for nothing else. Ctrl-Z does nothing: what
-    pushes would push on.
+    Signals are handled in the event loop. A log-off waits only for ``end``. Ctrl-Z is ignored, since a force would
+    continue.
     """
     if threading.current_thread() is not threading.main_thread():
         yield

@@ -71,7 +71,7 @@ log = logging.getLogger(__name__)
 
 
 class _Prices:
-    """What the felt setting costs and how true it is, as far as it was answered."""
+    """The measured cost and error of the felt setting."""
 
     def __init__(self, make_appraiser: Callable[[], AppraisalClient]) -> None:
         self._make = make_appraiser
@@ -82,7 +82,7 @@ class _Prices:
         self.waits = False
 
     def discard_answers(self) -> None:
-        """Discard the answers: the setting has changed."""
+        """Discard the answers, because the setting has changed."""
         self._asked, self.costs, self.errors, self.waits = -1, None, None, False
 
     def request(self, scene: Scene) -> None:
@@ -120,10 +120,10 @@ STARTS_AFTER_MS = 150  # opening a device holds Python's lock for long, so the l
 
 
 class LabOpening(QObject):
-    """Opens the device that is wanted, and lets go of one that is not any more.
+    """Opens the requested device, and closes one that is no longer requested.
 
-    ``opened`` carries a `Live` whose servo runs at rest; ``failed`` what was met instead; ``said`` a line that the
-    device asks for while it is opened.
+    ``opened`` carries a `Live` whose servo runs at rest; ``failed`` the exception; ``said`` an instruction of the
+    device while it is opened.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class LabOpening(QObject):
         self._cancelled.set()
 
     def wait(self, patience_s: float = PATIENCE_S) -> None:
-        """Wait until the device is open or has failed: it must be closed in the windows' thread."""
+        """Wait until the device is open or has failed, because it must be closed in the GUI thread."""
         self._background.wait(patience_s)
         QCoreApplication.sendPostedEvents()
 
@@ -211,9 +211,9 @@ class LabOpening(QObject):
 
 
 class _LabSaving(QObject):
-    """The liquids at hand; writes presets, one at a time, and looks which liquids there are then.
+    """The available liquids; writes presets one at a time, and then updates the list.
 
-    ``said`` tells what was written or opened last. ``failed`` carries what was met instead.
+    ``said`` names what was written or opened last. ``failed`` carries the exception.
     """
 
     failed = Signal(object)
@@ -235,7 +235,7 @@ class _LabSaving(QObject):
         self._before.start()
 
     def open_liquids(self, path: Path) -> Choice:
-        """Add the liquids of a file to those at hand; return the first.
+        """Add the liquids of a file to the available ones; return the first.
 
         Raises
         ------
@@ -281,7 +281,7 @@ COMPILING: Final = "Compiling the force model (once after each installation or u
 
 
 class LabController(QObject):
-    """The lab's stay at its place.
+    """Controls the lab while its page is shown.
 
     Parameters
     ----------
@@ -411,7 +411,7 @@ class LabController(QObject):
             self.uncaught.remove()
 
     def end(self, patience: Patience) -> None:
-        """Leave, then wait for a preset that is being written and for a device that is being opened."""
+        """Leave, then wait for presets being written and devices being opened."""
         self.leave()
         self._saving.wait(patience.left_s)
         self._opening.wait(patience.left_s)
@@ -419,7 +419,7 @@ class LabController(QObject):
     def fail(self, error: BaseException) -> None:
         """Send zero force, then show the failure; the force can be resumed once the device is opened again.
 
-        A painter is at work for as long as something holds it, as a traceback does: Qt would paint nothing any more.
+        The traceback is cleared, since a painter that it references would stay active and block all painting.
         """
         self._opening.cancel()
         try:
@@ -528,7 +528,7 @@ class LabController(QObject):
         self._try_edit(lambda: self.bench.choose(side, displayed_name(choice.liquid), choice.scene), "")
 
     def _try_edit(self, edit: Callable[[], Workbench], name: str) -> None:
-        """Make an edit; if it is refused, keep the reason for its parameter."""
+        """Make an edit; if it is rejected, keep the reason for its parameter."""
         try:
             bench = edit()
         except StudyError as error:
@@ -580,7 +580,7 @@ class LabController(QObject):
         self.trouble = str(error)
 
     def _clear_trouble(self) -> None:
-        """Clear the last problem, unless it says why no device is open."""
+        """Clear the last problem, unless it is the reason why no device is open."""
         if self.live is not None:
             self.trouble = ""
 

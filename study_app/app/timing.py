@@ -35,7 +35,7 @@ class DeferredTask:
 
 
 class FrameBudget:
-    """Does works when they are due and there is room for them.
+    """Runs recurring tasks when they are due and time permits.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class FrameBudget:
         self._now_ns = now_ns
 
     def run_due_tasks(self, until_ns: int) -> None:
-        """Run due tasks that will end by ``until_ns``; of tasks that are long overdue, one in any case."""
+        """Run due tasks that will end by ``until_ns``; if tasks are long overdue, run one in any case."""
         hurried = False
         for work in self.tasks:
             now_ns = self._now_ns()
@@ -76,7 +76,7 @@ _session_runs = threading.Event()
 
 
 def collect_if_due() -> int | None:
-    """Collect the oldest generation that is due by the interpreter's thresholds; return it, or None."""
+    """Collect the oldest generation that is due according to the interpreter's thresholds; return it, or None."""
     due = [count > limit > 0 for count, limit in zip(gc.get_count(), gc.get_threshold(), strict=True)]
     if not any(due):
         return None
@@ -86,7 +86,7 @@ def collect_if_due() -> int | None:
 
 
 def _collect() -> None:
-    """Collect what is due; after a long full collection skip all present objects, up to a bound between sessions."""
+    """Collect what is due; after a long full collection freeze all objects, up to a limit between sessions."""
     began_s = time.thread_time()
     if collect_if_due() == OLDEST and time.thread_time() - began_s > _LONG_S:
         gc.freeze()
@@ -95,9 +95,10 @@ def _collect() -> None:
 
 
 def freeze_garbage() -> None:
-    """Skip all present objects until `unfreeze_garbage`, after collecting the youngest garbage.
+    """Exclude all current objects from collection until `unfreeze_garbage`, after a collection of the youngest.
 
-    A collection of all objects of a session takes as long as several frames; one of later objects hardly any time.
+    A collection of all objects of a session takes as long as several frames; one of later objects takes hardly any
+    time.
     """
     _session_runs.set()
     gc.collect(YOUNG)
@@ -114,13 +115,13 @@ _ends_at_once = threading.Event()
 
 
 def disable_collection() -> None:
-    """Disable collection: the program ends, and a full collection takes seconds under load."""
+    """Disable collection at the end of the program, where a full collection takes seconds under load."""
     _ends_at_once.set()
 
 
 @contextmanager
 def collecting_in_this_thread() -> Iterator[None]:
-    """Run collections in this thread, which runs Qt's event loop, and in no other."""
+    """Run collections only in this thread, which runs Qt's event loop."""
     before = gc.isenabled()
     _ends_at_once.clear()
     gc.disable()
@@ -143,7 +144,7 @@ ABOVE_NORMAL, NORMAL = 1, 0  # thread priorities on Windows
 
 
 class ThreadPriority:
-    """Puts the thread that calls it before others, and back."""
+    """Raises the priority of the calling thread, and restores it."""
 
     def __init__(self) -> None:
         self._before: int | None = None

@@ -57,7 +57,7 @@ for command in (devices, outlets, plugins):  # the module's other commands belon
 
 
 def _shortened(message: str) -> str:
-    """Return a message in which words longer than `SHOWN` letters, such as paths, are cut."""
+    """Return a message in which words longer than `SHOWN` letters, such as paths, are truncated."""
     return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", message)
 
 
@@ -73,7 +73,7 @@ def _exit_at_once(ended: list[int]) -> None:
 def main() -> None:
     """Run a command; report a user's mistake in one line with exit code 2, and log any other failure.
 
-    A program that was ended by a signal does not free Qt's objects and Python's modules: that takes seconds under load.
+    A program ended by a signal does not free Qt's objects and Python's modules, which takes seconds under load.
     """
     ended: list[int] = []
     atexit.register(_exit_at_once, ended)  # registered first, so it is called last

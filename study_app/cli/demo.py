@@ -49,7 +49,7 @@ def demo(context: click.Context, *, no_window: bool) -> None:
 
 
 def _run_sessions(study: Path) -> None:
-    """Run or resume the session of each participant up to its end."""
+    """Run or resume the session of each participant to its end."""
     from study_app.protocol.source.files import shipped_file
     from study_app.session.simulated.rehearsal import finish_session
     from study_app.store.folders import StudyFolder
@@ -76,7 +76,7 @@ def _compile_everything(protocol: Path) -> None:
 
 
 def _run_servo(protocol: Path, device: str, *, ticks: int) -> None:
-    """Open a simulated device as a session does, run the servo for some ticks, and close both."""
+    """Open a simulated device as in a session, run the servo for some ticks, and close both."""
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import rehearsal_rig
 
@@ -98,7 +98,7 @@ def _unblind(study: Path) -> None:
 
 
 def _write_report(study: Path, to: Path) -> list[str]:
-    """Write the report unless it is there; return the sections that failed."""
+    """Write the report unless it exists; return the sections that failed."""
     from study_app.errors import MissingExtra, naming_the_extra
     from study_app.store.output_files import outputs
 
@@ -120,7 +120,7 @@ def _write_report(study: Path, to: Path) -> list[str]:
 
 
 def _show_results(study: Path) -> int:
-    """Open the program on the results and return its exit code; or say how to open it, and return 0."""
+    """Open the program on the results and return its exit code; or print how to open it, and return 0."""
     from study_app.errors import DisplayError
     from study_app.gui.display.display_check import check_display, missing_for_windows
 

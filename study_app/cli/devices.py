@@ -260,7 +260,8 @@ def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
 class Terminal:
     """Lines that the operator types while the grip is held.
 
-    Read without Python's own buffer, whose lock a thread that still waits at the program's end would keep.
+    They are read without Python's own buffer, whose lock would be held by a thread that is still waiting at the end of
+    the program.
     """
 
     def __init__(self, descriptor: int) -> None:

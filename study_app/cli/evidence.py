@@ -45,10 +45,10 @@ _EXIT_UNDECIDED = 4
 
 
 def _present_evidence(result: Evidence, to: Path | None, *, with_text: bool = True) -> None:
-    """Print evidence and write it into a folder, if one was given.
+    """Print evidence and write it into a folder, if given.
 
-    The exit code is 3 if a limit is missed, and 4 if one is undecided. ``with_text``: print the text in any case, not
-    only where there is no folder.
+    The exit code is 3 if a limit is missed, and 4 if one is undecided. ``with_text`` prints the text even with a
+    folder.
     """
     if with_text or to is None:
         click.echo(result.text, nl=False)
@@ -112,7 +112,7 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
 
 
 def _print_survey(file: str | None, to: Path | None) -> None:
-    """Print or write the error of the force of every liquid of a file."""
+    """Print or write the force error of every liquid of a file."""
     from study_app.evidence.accuracy.survey import evidence, survey
     from study_app.protocol.load import load_scenes
 
@@ -351,7 +351,7 @@ def stability(
 
 
 def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
-    """Return the evidence of one separate measurement."""
+    """Return the evidence from one separate measurement."""
     from study_app.evidence.stability import delivered_force, velocity, withheld_force
 
     if part == "velocity":
@@ -477,7 +477,7 @@ def _choose_display() -> None:
 
 
 def _windows_thread(load: LoadName) -> WindowsThread | None:
-    """Return the windows' thread; None without Qt or if the load paints no windows."""
+    """Return the GUI thread; None without Qt or if the load paints no windows."""
     try:
         from study_app.app.delay_session import WindowsThread
     except DisplayError:
@@ -552,7 +552,7 @@ def _timed_lines() -> Callable[[str], None]:
 
 
 def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
-    """Return a function that says a text at most once in `_SAID_EVERY_S`."""
+    """Return a function that prints a text at most once in `_SAID_EVERY_S`."""
     said = -math.inf
 
     def say_sometimes(text: str) -> None:

@@ -61,7 +61,7 @@ EXIT_CANCELLED: Final = 130
 
 
 class GroupedCommands(click.Group):
-    """Commands that ``--help`` lists under the headings of `GROUPS`; options of earlier versions are taken too."""
+    """Commands that ``--help`` lists under the headings of `GROUPS`; options of earlier versions are accepted."""
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         """Return a command by its name."""
@@ -108,7 +108,7 @@ def example_of(ctx: click.Context) -> str:
 
 
 class Target(click.Path):
-    """A path to write to; an empty one, which would be the folder one is in, is refused."""
+    """A path to write to; an empty one, which would be the current folder, is rejected."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
@@ -189,7 +189,7 @@ def _session_at(named: str, results: Path | None) -> Path:
 
 
 def keep_offered_workspace() -> None:
-    """Store the offered workspace and print it, if none was chosen: data are about to be written there."""
+    """Store and print the suggested workspace if none was chosen, because data will be written there."""
     from study_app.store.workstation import keep_workspace
     from study_app.workspace import chosen_workspace, offered_workspace
 
@@ -212,7 +212,7 @@ def echo_files(written: Iterable[Path]) -> None:
 
 
 def make_output_folder(to: Path | None) -> None:
-    """Make the folder to write into, if one was given, before a long computation."""
+    """Create the output folder, if given, before a long computation."""
     from study_app.store.atomic import make_folder
 
     if to is not None:
@@ -220,7 +220,7 @@ def make_output_folder(to: Path | None) -> None:
 
 
 class ShowProgress(Protocol):
-    """Shows what is being done, and which share of all is done (0 to 1), if that is known."""
+    """Shows the current activity and, if known, the fraction done (0 to 1)."""
 
     def __call__(self, what: str, share: float | None = None) -> None: ...  # noqa: D102
 
@@ -309,7 +309,7 @@ class DeviceName(click.Option):
         self._only_moving = only_moving
 
     def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
-        """Return the names, and what the option says else."""
+        """Return the names and the help text of the option."""
         from study_app.devices.registry import all_devices
 
         names = []
@@ -328,10 +328,10 @@ class DeviceName(click.Option):
 
 
 class TakesDeviceOptions(click.Command):
-    """A command that also takes the options of all devices; the function gets those given as ``device_options``."""
+    """A command that also accepts the options of all devices and passes them on as ``device_options``."""
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Call the function with its own parameters and the device options, by their own names."""
+        """Call the function with its own parameters and the device options by name."""
         of_devices = ctx.params.keys() - {parameter.name for parameter in self.params}
         taken = {name.replace("_", "-"): ctx.params.pop(name) for name in sorted(of_devices)}
         ctx.params["device_options"] = {name: value for name, value in taken.items() if value is not None}

@@ -27,7 +27,7 @@ _SWITCHES_BY_CHANCE: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A liquid as chosen, and as edited; ``name`` is its displayed name."""
+    """A liquid as it was chosen and as edited; ``name`` is its displayed name."""
 
     name: str
     origin: Scene
@@ -39,7 +39,7 @@ class Setting:
 
     @property
     def title(self) -> str:
-        """Its displayed name, with a note if it was edited."""
+        """The displayed name, with a note if the liquid was edited."""
         return f"{self.name}, edited" if self.is_edited else self.name
 
     def value(self, name: str) -> Value:
@@ -58,7 +58,7 @@ class Setting:
 class Workbench:
     """Settings A and B; ``presented`` is the one presented to the hand.
 
-    While ``blind`` the assignment is hidden: ``first`` is the one called "setting 1", and nothing can be edited.
+    While ``blind`` the assignment is hidden: ``first`` is the side called "setting 1", and nothing can be edited.
     ``held`` is the parameter whose slider is being dragged.
     """
 
@@ -163,7 +163,6 @@ class Workbench:
     def _edited(
         self, side: Side, setting: Setting, *, held: tuple[Side, str] | None = None, goes_on: bool = False
     ) -> Workbench:
-        """Return a copy with another setting on a side, as an edit that can be undone."""
         past = self.past if goes_on else (*self.past, (self.a, self.b))[-_MOST_STEPS:]
         a, b = (setting, self.b) if side == "A" else (self.a, setting)
         return replace(self, a=a, b=b, past=past, future=(), held=held)
@@ -174,5 +173,5 @@ class Workbench:
 
 
 def other_side(side: Side) -> Side:
-    """Return the other side."""
+    """Return B for A and A for B."""
     return "B" if side == "A" else "A"

@@ -81,9 +81,9 @@ _LONGEST_GAP_NS: Final = 200_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reading:
-    """Position of the hand [m, hand frame], force on it [N], wake at the body [m/s, scene], and state of the servo.
+    """Hand position [m, hand frame], force on the hand [N], wake at the body [m/s, scene], and state of the servo.
 
-    ``fault`` is why the servo stopped itself, in a sentence; empty while it runs.
+    ``fault`` is a sentence on why the servo stopped itself, "" while it runs.
     """
 
     position_m: _Vector
@@ -119,11 +119,11 @@ class Live:
         self.shadow.prepare()
 
     def feel(self, bench: Workbench, *, anew: bool = False) -> None:
-        """Present the selected setting of ``bench`` from the next tick on, and compute the other on the same motion.
+        """Present the selected setting of ``bench`` from the next tick, and compute the other one alongside.
 
         Changes of parameters keep the wake (`Servo.adjust`). Other changes begin with a fade of 50 ms; the newest
-        change during a fade waits for its end. A setting already presented continues unchanged, unless it is to begin
-        ``anew``, in a blind comparison.
+        change during a fade waits for its end. A setting that is already presented continues unchanged, unless ``anew``
+        restarts it in a blind comparison.
 
         Raises
         ------
@@ -288,14 +288,14 @@ class Live:
         return programmed_path(name, scene, self.device.workspace_m)
 
     def _lead(self) -> None:
-        """Move the hand along the path, from its present place."""
+        """Move the hand to the path from its current position."""
         assert self.path is not None and self.hand is not None  # noqa: S101, PT018 - called for a path and a hand
         motion = lead_to_path(self._programme(self.path), self.hand.aim_m)
         self.hand.follow(motion.t_s, motion.position_m)
 
 
 class _Ghost:
-    """A path without a hand: samples as a servo would produce them, for a separate shadow."""
+    """A path without a hand: samples like those of a servo, for a separate shadow."""
 
     def __init__(self, motion: Motion, rate_hz: float, limit_n: float, now_ns: int) -> None:
         self.shadow = Shadow(Scene(rate_hz=rate_hz), _ELEMENTS, limit_n, alone=True)

@@ -33,7 +33,7 @@ OFF, ON, AUTO = "off", "on", "auto"
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """Parameters that belong together."""
+    """A group of related parameters."""
 
     title: str
     parameters: tuple[Parameter, ...]
@@ -126,7 +126,7 @@ def _read_value(scene: Scene, name: str) -> Any:
 
 
 def the_liquid(scene: Scene) -> Liquid:
-    """Return the liquid of a scene with exactly one.
+    """Return the only liquid of a scene.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def _accuracy(liquid: Liquid) -> tuple[str, ...]:
 
 
 def _parameter(scene: Scene, name: str) -> Parameter:
-    """Return a parameter with its range, default and unit as shown."""
+    """Return a parameter with its range, default and unit for display."""
     if name == "effects":
         return Parameter(name, "Chosen", default=ON, choices=((ON, "Chosen by hand"), (AUTO, "Automatic")))
     if name.startswith("effects."):
@@ -206,7 +206,7 @@ def _default(scene: Scene, place: str, field: str, row: Parameter) -> Any:
 
 
 def _range(scene: Scene, place: str, field: str, row: Parameter) -> tuple[float, float]:
-    """Return the lab's range within the model's."""
+    """Return the lab's range, limited by the model's."""
     least, most = row.least, row.most
     for bound in _model(scene, place).model_fields[field].metadata:
         if row.least == LEAST and getattr(bound, "ge", None) is not None:
@@ -269,7 +269,7 @@ def _check_value(it: Parameter, value: Value) -> Value:
 
 
 def _with_effect(scene: Scene, effect: str, *, on: bool) -> Scene:
-    """Return the scene with an effect on or off, and the effects that it requires."""
+    """Return the scene with an effect switched on or off, and the effects that it requires."""
     liquid = the_liquid(scene)
     wanted = set(resolve(scene).liquids[0].effects)
     if on:
@@ -300,7 +300,7 @@ def _chosen_by_gate(scene: Scene) -> dict[str, object]:
 
 
 def _initial_table(scene: Scene, place: str, kind: str) -> dict[str, Any]:
-    """Return the initial table of a region or an effect: around the middle of the hand's reach, as large as that."""
+    """Return the initial table of a region or an effect, centred on the hand's reach and as large as it."""
     centre_m, reach_m = scene.origin_m, scene.scale * _HALF_HAND_M
     if place in NAMED:
         start = NAMED[place].start

@@ -17,7 +17,7 @@ from study_app.workspace import workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choice:
-    """A liquid to choose: its file or shipped name, its id there, and its displayed name."""
+    """A liquid that can be chosen: its file or shipped name, its id there, and its displayed name."""
 
     source: str
     liquid: str
@@ -44,10 +44,10 @@ class Choice:
 
 
 def available_liquids(folders: tuple[Path, ...] | None = None, saved: tuple[str, ...] = ()) -> tuple[Choice, ...]:
-    """Return every liquid of the shipped protocols, of the files in ``folders``, and of those ``saved``.
+    """Return every liquid of the shipped protocols, of the files in ``folders``, and of the ``saved`` ones.
 
-    ``folders`` is by default the workspace's ``protocols``.
-    A broken file has none; a file in ``folders`` with the name of a shipped one replaces it.
+    ``folders`` is by default the workspace's ``protocols``. Broken files are skipped; a file in ``folders`` with the
+    name of a shipped one replaces it.
     """
     folders = (workspace().protocols,) if folders is None else folders
     own = [str(path) for folder in folders for path in sorted(folder.glob("[!.]*.toml")) if path.stem not in shipped()]

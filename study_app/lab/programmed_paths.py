@@ -28,7 +28,7 @@ _HALF_TURN: Final = 0.7071  # angle of a leg to either side of the path
 
 
 def programmed_path(name: str, scene: Scene, half_m: _Vector) -> Motion:
-    """Return a path in the hand frame, about the middle of a workspace of these half extents [m].
+    """Return a path in the hand frame, about the centre of a workspace of these half extents [m].
 
     Its speed is that of the figures in the scene, 1 m/s; its size is theirs, reduced to fit.
 
@@ -58,7 +58,7 @@ def programmed_path(name: str, scene: Scene, half_m: _Vector) -> Motion:
 
 
 def lead_to_path(motion: Motion, from_m: Any) -> Motion:
-    """Return a motion that begins at the hand, (3,) [m], with a smooth path to its first place."""
+    """Return a motion that starts at the hand, (3,) [m], with a smooth path to the motion's first position."""
     way_m = motion.position_m[0] - np.asarray(from_m, np.float64)
     lasts_s = max(float(np.linalg.norm(way_m)) / _APPROACH_MPS, _SHORTEST_APPROACH_S)
     t_s = np.arange(round(lasts_s * _RATE_HZ)) / _RATE_HZ

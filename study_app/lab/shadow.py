@@ -29,7 +29,7 @@ _MOST_POINTS: Final = 400
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Tail:
-    """The moving elements of a wake as places, from the oldest to the newest, thinned to at most 400.
+    """The moving elements of a wake as positions, from the oldest to the newest, thinned to at most 400.
 
     ``positions_m`` (n, 3) [m, hand frame]; ``breaks`` (n,) bool, true where a segment begins; ``ages`` (n,) from 0, the
     newest possible element, to 1, the oldest. ``alive`` of at most ``elements`` are stored now, including those at
@@ -97,9 +97,9 @@ _ROW: Final = np.dtype(
 class Trace:
     """The last 2.5 s of one motion for A and for B; ``t_s`` (n,) ends at 0, the newest sample.
 
-    ``force_a_n``, ``force_b_n`` (n, 3) are the forces on the hand, sent by the servo or, for the side not presented, as
-    they would have been sent; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) speeds in the scene;
-    ``presented_a`` (n,) tells where A was presented.
+    ``force_a_n``, ``force_b_n`` (n, 3) are the forces on the hand, sent by the servo or, for the other side, as they
+    would have been sent; ``body_mps``, ``wake_a_mps`` and ``wake_b_mps`` (n,) are speeds in the scene; ``presented_a``
+    (n,) tells where A was presented.
     """
 
     t_s: Floats
@@ -121,10 +121,10 @@ class _Presented:
 
 
 class Shadow:
-    """The two settings, computed outside the servo, with the device's own force limit [N] and dynamics.
+    """Recomputes both settings outside the servo, with the device's own force limit [N] and dynamics.
 
-    ``rest`` is the scene without liquids that the servo begins with, ``elements`` the capacity of a wake. ``alone``:
-    the samples are not from a servo, so that both sides show recomputed results.
+    ``rest`` is the servo's initial scene without liquids, ``elements`` the capacity of a wake. ``alone``: the samples
+    are not from a servo, so that both sides show recomputed results.
     """
 
     def __init__(
@@ -218,19 +218,19 @@ class _Half:
         self.safety = new_safety(self.safety[0].device_limit_n)
 
     def begin(self, scene: Scene) -> None:
-        """Present a scene from now on, like the servo: reset its state and fade its force in."""
+        """Start a scene like the servo: reset the state and fade the force in."""
         self.scene = scene
         pack_into(self._model, scene, dynamics=self._dynamics)
         begin_scene(self.safety[0])
         self._trail.view(np.uint8)[:] = 0
 
     def go_on(self, scene: Scene) -> None:
-        """Take a scene's parameters, like the servo's `adjust`: keep state and force."""
+        """Adopt a scene's parameters like the servo's `adjust`: keep state and force."""
         self.scene = scene
         adjust_into(self._model, scene, dynamics=self._dynamics)
 
     def answer(self, samples: Any, *, sent: bool) -> Any:
-        """Return the samples with recomputed results; ``sent`` if the device was sent this side's force."""
+        """Return the samples with recomputed results; ``sent`` if the device received this side's force."""
         out = samples.copy()
         recompute_sample(self._model, self.safety[0], out, self._trail[0], self._places, sent)
         return out
@@ -247,7 +247,7 @@ class _Half:
 
 
 class _Recent:
-    """The newest samples of both sides, for the length of a trace."""
+    """The newest samples of both sides, over the length of a trace."""
 
     def __init__(self) -> None:
         self._rows: Any = records(_ROW, 0)

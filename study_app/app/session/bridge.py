@@ -90,7 +90,7 @@ log = logging.getLogger(__name__)
 
 
 class WatchedJournal:
-    """Passes everything on to the store, and folds what it has kept into ``progress``."""
+    """Forwards everything to the store, and updates ``progress`` with each written line."""
 
     def __init__(self, store: JournalPort, progress: Progress, clock: Callable[[], float]) -> None:
         self.progress = progress
@@ -128,12 +128,12 @@ class WatchedJournal:
 class Parts:
     """The parts of a session, except its windows.
 
-    ``session`` is what the operator sees of it throughout; ``key`` is block → code → condition or track and ``secret``
-    the sealed key's nonce, never shown; ``start`` is where a resumed session goes on. ``aim_m`` gives where hand or
-    pointer mean to be [m, hand frame]; ``point_to`` and ``press`` pass the mouse on, None where the device is not the
-    mouse; ``hand_for`` makes the simulated hand for a page, None with a real hand.
-    ``outlets`` send its events to other programs; ``videos`` are those of the study, None where it shows none.
-    ``reconnect`` opens a device or video that failed again, with the servo at zero force; it may take minutes.
+    ``session`` is the constant part of the operator's view; ``key`` is block → code → condition or track and ``secret``
+    the sealed key's nonce, never shown; ``start`` is the point of resumption. ``aim_m`` returns the target of hand or
+    pointer [m, hand frame]; ``point_to`` and ``press`` forward the mouse, None if the device is not the mouse;
+    ``hand_for`` makes the simulated hand for a page, None with a real hand. ``outlets`` send its events to other
+    programs; ``videos`` are those of the study, None if it shows none. ``reconnect`` reopens a failed device or video,
+    with the servo at zero force; it may take minutes.
     """
 
     session: Session
@@ -157,10 +157,9 @@ class Parts:
 class SessionBridge(QObject):
     """Runs one session in two windows.
 
-    ``done`` comes once, when the session is over and its windows may go; ``diagnose_asked`` when the operator wants to
-    know what is wrong with the device: the force is off and the session paused by then.
-
-    ``forces`` is None, and no force is looked at, in a double-blind study.
+    ``done`` is emitted once, when the session is over and its windows can be closed; ``diagnose_asked`` when the
+    operator requests a diagnosis of the device, with the force off and the session paused. ``forces`` is None in a
+    double-blind study, so that no force is processed.
 
     Parameters
     ----------
@@ -267,7 +266,7 @@ class SessionBridge(QObject):
         self._leave_session()
 
     def watch_screens(self) -> None:
-        """From now on, pause when a screen is removed and both windows end up on the same one, until one is added."""
+        """Pause when a screen is removed and both windows end up on the same one, until one is added."""
         for window in (self.participant, self.operator):
             window.windowHandle().screenChanged.connect(
                 lambda _screen: QTimer.singleShot(SCREEN_SETTLES_MS, self, self._check_screens)
@@ -297,7 +296,7 @@ class SessionBridge(QObject):
             self.operator.bring_forward()
 
     def _refuses_resumption(self) -> bool:
-        """Return whether the session cannot be resumed because one window covers the other, and say so."""
+        """Return whether the session cannot be resumed because one window covers the other, and report it."""
         if refused := self._covers_operator:
             self.operator.bring_forward()
             self.operator.show_message(*_SCREEN_REMOVED)
@@ -327,7 +326,7 @@ class SessionBridge(QObject):
             log.error("and could not be recorded: %s", second)  # noqa: TRY400 - one line, the first has the trace
 
     def _handle_uncaught(self, error: BaseException) -> bool:
-        """Handle an exception that no slot caught; return whether it only kept the operator's window from painting."""
+        """Handle an unhandled exception; return whether it only affected painting of the operator's window."""
         frame = None if error.__traceback__ is None else error.__traceback__.tb_frame
         if frame is None or not isinstance(error, Exception) or frame.f_code.co_name not in PAINTING:
             paints_here = False
@@ -598,7 +597,7 @@ def _unexpected_error(error: BaseException) -> BaseException | None:
 
 
 def make_operator_window(chosen: NewSession, protocol: Protocol, rig: Rig, theme: Theme) -> OperatorWindow:
-    """Return the operator's window, not yet shown."""
+    """Return the operator's window, which is not shown yet."""
     described = descriptor_of(chosen.device)
     return OperatorWindow(
         protocol.study.name,
@@ -621,11 +620,11 @@ def make_participant_window(
     photodiode: bool,
     in_step: bool = True,
 ) -> ParticipantWindow:
-    """Return the participant's window, not yet shown.
+    """Return the participant's window, which is not shown yet.
 
-    ``clock`` gives the session's time [s] once the session is on the disk; ``shares_screen`` is whether the operator's
-    window is on the same screen, ``text_scale`` how much larger than designed the words must be at least,
-    ``photodiode`` whether the tank has a corner for one, ``in_step`` whether it may be drawn in step with the screen.
+    ``clock`` gives the session's time [s] once the session is on the disk; ``shares_screen`` tells whether the
+    operator's window is on the same screen, ``text_scale`` is the minimum scale of text, ``photodiode`` adds a corner
+    of the tank for one, ``in_step`` permits drawing in step with the screen.
     """
     return ParticipantWindow(
         words(chosen.language),
@@ -665,8 +664,7 @@ def connect_windows(
 ) -> SessionBridge:
     """Connect both windows to the session; the caller shows them and starts the bridge.
 
-    ``plan`` is what is run, in what order, and where it begins; ``refresh_hz`` how many frames a second there are.
-    ``videos`` are open.
+    ``plan`` has protocol, schedule and start; ``refresh_hz`` is the frame rate. ``videos`` are open.
     """
     clock, device, servo = store.clock.seconds, rig.device, rig.servo
     journal = WatchedJournal(store, progress_of(open_events(store.lines, store.key)), clock)
@@ -720,7 +718,7 @@ def show_windows(
 
 
 def _make_reconnect(rig: Rig, videos: Videos | None) -> Callable[[], dict[str, Any]]:
-    """Return a function that reopens what failed: device and servo, or videos."""
+    """Return a function that reopens the failed part: device and servo, or videos."""
 
     def reconnect() -> dict[str, Any]:
         if videos is None or rig.servo.fault is not None:
@@ -760,7 +758,7 @@ def _calibration_rows(device: Device) -> tuple[tuple[str, str], ...]:
 
 
 def _make_position_reader(hand: HandOrders | None, servo: Servo) -> Callable[[], Vector]:
-    """Return a function that gives the hand's position, or a simulated hand's aim: its lag would reveal the liquid."""
+    """Return a function for the hand's position, or a simulated hand's aim, since its lag would reveal the liquid."""
     if hand is not None:
         return lambda: hand.aim_m
 

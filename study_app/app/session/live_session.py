@@ -85,8 +85,8 @@ NOT_EXAMINED = ("There is nothing to diagnose", "Diagnosis is not available for 
 class LiveSession(QObject):
     """One session from the operator's choices to the closed journal.
 
-    ``over`` comes once; then ``code`` is the exit code and ``error`` what could not be mended here, if anything. With
-    ``asks`` the operator sees what the pre-flight found and decides whether to begin.
+    ``over`` is emitted once; then ``code`` is the exit code and ``error`` the unhandled error, if any. With ``asks``
+    the operator sees the pre-flight results and decides whether to begin.
     """
 
     over = Signal()
@@ -141,17 +141,17 @@ class LiveSession(QObject):
 
     @property
     def is_opening(self) -> bool:
-        """Whether device and servo are being prepared, even if the session was cancelled meanwhile."""
+        """Whether device and servo are being prepared, even if the session was cancelled in the meantime."""
         return self._opening.busy
 
     def wait(self, patience_s: float = OPENING_PATIENCE_S) -> None:
-        """Wait until the preparation has ended: its results must be released in this thread."""
+        """Wait until the preparation has ended, since its results must be released in this thread."""
         if self._opening.busy:
             self._opening.wait(patience_s)
             QApplication.processEvents()
 
     def end_by_signal(self, number: int) -> None:
-        """Leave the session unfinished: a signal ends the program."""
+        """Leave the session unfinished, because a signal ends the program."""
         self.code, self.patience_s = 128 + number, BY_SIGNAL_S
         if self._closed:
             return
@@ -214,7 +214,7 @@ class LiveSession(QObject):
             )  # 0 ms may be the same iteration of the loop
 
     def _run_step(self, step: Callable[[], None]) -> None:
-        """Run a step towards the first page; an error closes the session in order."""
+        """Run a step towards the first page; an error closes the session in the proper order."""
         try:
             step()
         except Exception as raised:  # noqa: BLE001 - told; what is open must be closed in order
@@ -293,7 +293,7 @@ class LiveSession(QObject):
         self._close_preflight()
 
     def _elapsed_s(self) -> float:
-        """Return the time since the session's origin [s]; 0 while it is not on the disk."""
+        """Return the time since the session's origin [s]; 0 until it is on the disk."""
         return 0.0 if self._store is None else self._store.clock.seconds()
 
     def chosen_screens(self) -> tuple[QScreen, QScreen]:
@@ -353,7 +353,7 @@ class LiveSession(QObject):
             self._close_everything()
 
     def _close_everything(self) -> None:
-        """Close everything, in the order of safety, and emit ``over`` once."""
+        """Close all parts in a safe order, and emit ``over`` once."""
         if self._closed:
             return
         self._closed = True
@@ -403,7 +403,7 @@ class LiveSession(QObject):
 
 
 def _close_all(rig: Rig | None, *parts: SessionStore | CrashTrace | Outlets | Videos | None) -> None:
-    """Zero force, then close the parts in this order, even if one fails."""
+    """Send zero force, then close the parts in this order, even if one fails."""
     with ExitStack() as closing:
         for part in reversed(parts):
             if part is not None:
@@ -493,9 +493,9 @@ def resume(
     screen: int | None = None,
     progress: Callable[[str], object] | None = None,
 ) -> int:
-    """Go on with a session whose program was ended; return the exit code when its windows are closed.
+    """Continue an interrupted session; return the exit code when its windows are closed.
 
-    A rehearsed session goes on as one, without windows.
+    A rehearsed session continues as a rehearsal, without windows.
 
     Parameters
     ----------

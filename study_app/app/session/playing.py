@@ -46,7 +46,7 @@ _STOPPED: Final = "stopped while playing in the study designer"
 
 
 class PlayedSession(LiveSession):
-    """A session that is played from the designer; ``over`` comes once, as of every session."""
+    """A session that is played from the designer; ``over`` is emitted once, as for every session."""
 
     _shown = False
 
@@ -74,7 +74,7 @@ class PlayedSession(LiveSession):
         return None if self.bridge is None else self.bridge.parts.journal.progress.ended
 
     def stop(self) -> None:
-        """Send zero force, end the session and close its window; before it has begun, cancel it."""
+        """Send zero force, end the session and close its window; cancel it if it has not begun."""
         bridge = self.bridge
         if self._closed:
             return
@@ -128,7 +128,7 @@ _OUTCOMES: Final = {
 
 @dataclass(slots=True)
 class _Pilot:
-    """What is played: its temporary folder, and its session while there is one."""
+    """A played part: its temporary folder, and its session once it runs."""
 
     what: Playable
     device: str
@@ -138,9 +138,9 @@ class _Pilot:
 
 
 class Playing(QObject):
-    """Plays the open study, one pilot at a time; ``kept`` carries the study folder of one that was kept.
+    """Plays the open study, one pilot at a time; ``kept`` carries the study folder of a pilot that was kept.
 
-    ``where`` says where the preview is; None is the first step that shows the selected element.
+    ``where`` returns the preview's position; None is the first step that shows the selected element.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ class Playing(QObject):
         self._show_devices()
 
     def play(self) -> None:
-        """Play from here, unless a part from here to the end is faulty; ask before a device is used."""
+        """Play from here, unless a part of the rest is faulty; ask before a device is used."""
         self.place.flush()
         opened = self.editing.opened
         if opened is None or self.is_under_way:

@@ -44,7 +44,7 @@ PATIENCE_S = 10.0
 
 
 class Asked(NamedTuple):
-    """A scene to ask about: of which liquid it is, and the fastest stroke in it."""
+    """A scene to appraise: its liquid, and the fastest stroke in it."""
 
     liquid: str
     scene: Scene
@@ -52,11 +52,11 @@ class Asked(NamedTuple):
 
 
 class Appraisal:
-    """Cost of the most expensive scene of a study, and error of the least accurate; asked one scene after another.
+    """Cost of the most expensive scene of a study, and error of the least accurate; scenes are appraised in turn.
 
-    ``velocity_errors`` are those of `Measurements`, None if all is known of the device.
-    ``withheld`` is the share of each liquid's force that is withheld in the fastest stroke on a device of these
-    ``dynamics``, once all are known. ``delivery`` is what a simulated participant would lose, asked ``last``.
+    ``velocity_errors`` are those of `Measurements`, None if the device's dynamics are known. ``withheld`` is the share
+    of each liquid's force that is withheld in the fastest stroke on a device of these ``dynamics``, once all are known.
+    ``delivery`` is the predicted loss of a simulated participant, requested ``last``.
     """
 
     def __init__(self, scenes: Iterable[Asked], dynamics: Dynamics, last: DeliveryQuestion | None = None) -> None:
@@ -115,10 +115,10 @@ class Appraisal:
 
 
 class Preflight(QObject):
-    """Shows the window before a session, has things measured again, and tells what was decided, once.
+    """Shows the window before a session, repeats measurements on request, and emits the decision once.
 
-    The rig stays its opener's; the servo ticks at rest meanwhile, and ``failed`` comes when it stops itself or the
-    participant's screen is gone. ``screen`` returns that screen anew: see ``choose_screens``.
+    The rig is owned by the caller; the servo ticks at rest meanwhile, and ``failed`` is emitted when it stops itself or
+    the participant's screen is removed. ``screen`` returns that screen: see ``choose_screens``.
     """
 
     started = Signal(object)
@@ -215,7 +215,7 @@ class Preflight(QObject):
             self._show_checks()
 
     def _measure_again(self) -> None:
-        """Measure again in a thread of its own: the measurement takes two seconds."""
+        """Measure again in a separate thread, since the measurement takes two seconds."""
         if not self.measuring.busy:
             ready, sleep = self._ready, self._ending.wait
             self.measuring.run(lambda: measure_rig(ready.rig, self._chosen, ready.videos, sleep=sleep))
@@ -255,14 +255,14 @@ def _largest_error_n(errors_n: list[float | None]) -> float | None:
 
 
 def _dynamics(facts: Measurements, protocol: Protocol) -> Dynamics:
-    """Return the device's dynamics, with the servo's present delay if the device measures it."""
+    """Return the device's dynamics, with the servo's current delay if the device measures it."""
     if facts.dynamics.delay_s is None:
         return facts.dynamics
     return facts.dynamics._replace(delay_s=facts.delay_ticks / protocol.device.rate_hz)
 
 
 def study_scenes(protocol: Protocol) -> tuple[Asked, ...]:
-    """Return the study's scenes of one liquid, each once, with the fastest stroke of their tasks."""
+    """Return the study's one-liquid scenes without duplicates, with the fastest stroke of their tasks."""
     scenes: dict[Scene, Asked] = {}
     for block in protocol.blocks.values():
         stroke = protocol.tasks[block.task].fastest_stroke(protocol.device.workspace_m)
@@ -281,7 +281,7 @@ STUDY = "demo"
 
 
 class ComputerCheck(QObject):
-    """Measures when its window asks, in the background, and shows what was found."""
+    """Measures in the background on request of its window, and shows the results."""
 
     _compiled = Signal(float)
 
@@ -326,7 +326,7 @@ class ComputerCheck(QObject):
         return computer_checks(facts, study, backends(), cache=CACHE, compiled=counter.compiled)
 
     def _close(self) -> None:
-        """Delete the object once the measurement has ended: its thread still uses it."""
+        """Delete the object once the measurement has ended, since its thread still uses it."""
         self._closed = True
         if not self._background.busy:
             self.window.deleteLater()

@@ -29,10 +29,10 @@ _SINGULAR: Final = 1e-9
 class Estimates:
     """The fitted parameters of a liquid, by their requested names.
 
-    ``values`` and ``intervals`` (95 %, within the permitted range). ``correlation`` (p, p) is that of the estimates,
-    nan where a parameter does nothing, ``following`` that of residuals from row to row. ``distinguishable`` tells
-    whether every parameter has an effect, and no two have the same. ``scene`` has the values in it, and its effects
-    named.
+    ``values`` with their 95 % ``intervals``, within the permitted range. ``correlation`` (p, p) is that of the
+    estimates, nan for a parameter without effect, ``following`` that of residuals between successive rows.
+    ``distinguishable`` tells whether every parameter has an effect, and no two have the same. ``scene`` contains the
+    values, with its effects named explicitly.
     """
 
     scene: Scene
@@ -46,7 +46,7 @@ class Estimates:
     warnings: tuple[str, ...]
 
     def row(self, it: Parameter) -> tuple[str, str]:
-        """Return a parameter's value and interval as texts, with five digits; whole numbers in full."""
+        """Return a parameter's value and interval as texts with five digits; integers are written in full."""
         value, (lower, upper) = self.values[it.name], self.intervals[it.name]
         anything = lower <= max(it.least, 1e-12) * (1 + 1e-9) and upper >= it.most
         return (f"{value}" if it.whole else f"{value:.5g}"), "anything" if anything else f"{lower:.5g} … {upper:.5g}"
@@ -56,7 +56,7 @@ class Estimates:
 
 
 def estimate(problem: Problem, liquid_id: str, names: Sequence[str], size: float) -> tuple[Floats, dict[str, Any]]:
-    """Return the z of the least squares, and the fields of `Estimates` there.
+    """Return the least-squares solution z, and the fields of `Estimates` there.
 
     ``size`` is the length of the vector of measurements, in the units of the misfit.
     """
@@ -119,7 +119,7 @@ def _interval_spread(
 
 
 def _interval_of(it: Parameter, u: float, half: float) -> tuple[float, float]:
-    """Return the interval of a parameter's value, within what is permitted."""
+    """Return the interval of a parameter's value within its permitted range."""
     least, most = u_range(it)
     ends = [coordinate(it).to_value(end) for end in (max(u - half, least), min(u + half, most))]
     lower, upper = sorted(min(max(end, it.least), it.most) for end in ends)
@@ -165,7 +165,7 @@ def _parameter_warnings(
 
 
 def _edge_reason(problem: Problem, k: int, z: Floats) -> str:
-    """Return the reason for the end of a range that is not determined by the model alone, or ""."""
+    """Return the reason why a range ends, if not by the model itself, or ""."""
     it = problem.parameters[k]
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
         return f" (no less than {NO_LESS_THAN[it.field]})"

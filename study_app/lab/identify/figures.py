@@ -30,7 +30,7 @@ _LEAST_IN_BIN: Final = 20
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw_force(fit: Fit) -> Figure:
-    """Draw the force, measured and fitted, over time; below it the residual over time, and along the motion."""
+    """Draw measured and fitted force over time, and the residual over time and along the motion."""
     caption = textwrap.wrap(_caption(fit), _CAPTION_LETTERS)
     height_pt = _TOP_PT + _FORCE_PT + _GAP_PT + _RESIDUAL_PT + _FOOT_PT + _LINE_PT * len(caption)
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, height_pt / 72), facecolor="white")
@@ -60,7 +60,7 @@ def draw_force(fit: Fit) -> Figure:
 
 
 def _values(fit: Fit) -> list[str]:
-    """Return two lines for each parameter: name and value, then the interval."""
+    """Return two lines per parameter: name with value, and the interval."""
     lines = []
     for it in fit.parameters:
         value, interval = fit.row(it)
@@ -109,7 +109,7 @@ def _residual(axes: Axes, fit: Fit) -> None:
 
 
 def _along(axes: Axes, fit: Fit) -> None:
-    """Draw the residual's part along the motion over the speed."""
+    """Draw the residual's component along the motion against the speed."""
     velocity_mps = _velocity_mps(fit)
     speed_mps = np.linalg.norm(velocity_mps, axis=1)
     moves = speed_mps > 1e-3
@@ -126,7 +126,7 @@ def _along(axes: Axes, fit: Fit) -> None:
 
 
 def _medians(speed_mps: Floats, along_n: Floats) -> Floats:
-    """Return middle speed and median residual, (k, 2), of equal intervals of speed with enough rows."""
+    """Return mean speed and median residual (k, 2) in equal speed intervals with enough rows."""
     if len(speed_mps) == 0:
         return np.empty((0, 2))
     edges = np.linspace(speed_mps.min(), speed_mps.max(), _BINS + 1)
@@ -136,7 +136,7 @@ def _medians(speed_mps: Floats, along_n: Floats) -> Floats:
 
 
 def _velocity_mps(fit: Fit) -> Floats:
-    """Return the velocities (n, 3): as measured, or the slopes of the places."""
+    """Return the velocities (n, 3), measured or derived from the positions."""
     if fit.motion.velocity_mps is not None:
         return fit.motion.velocity_mps
     slopes: Floats = np.gradient(fit.motion.position_m, fit.motion.t_s, axis=0)
@@ -151,7 +151,7 @@ def _time_axis(axes: Axes, fit: Fit) -> None:
 
 
 def _name_curves(axes: Axes, columns: int) -> None:
-    """Name the axes in a row above the plot, never over the data."""
+    """Draw the legend of the axes in a row above the plot."""
     axes.legend(
         loc="lower right",
         bbox_to_anchor=(1.0, 1.02),
@@ -171,7 +171,7 @@ _CURVE_LETTERS: Final = 96
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw_curve(fit: CurveFit) -> Figure:
-    """Draw measured and fitted stress over the shear rate, both logarithmic, and the residual in per cent below."""
+    """Draw measured and fitted stress against shear rate, both logarithmic, and the residual in percent below."""
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 4.2), facecolor="white", layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
     figure.suptitle(f"{fit.liquid_id}: measured and fitted flow curve", fontsize=9, fontweight="bold")

@@ -32,8 +32,8 @@ _CHANCE: Final = 5.0
 class Fit(Estimates):
     """The result of a fit to a force.
 
-    At the measured times ``measured_n``, ``fitted_n`` and ``residual_n`` (n, 3), measured − fitted; ``axes`` are those
-    in use.
+    ``measured_n``, ``fitted_n`` and ``residual_n`` (measured − fitted) are (n, 3) at the measured times; ``axes`` are
+    those in use.
     """
 
     motion: Motion
@@ -48,12 +48,12 @@ class Fit(Estimates):
 
     @property
     def rms_n(self) -> float:
-        """The residual vector's root mean square length [N]."""
+        """The RMS length of the residual vector [N]."""
         return _rms(self.residual_n)
 
     @property
     def share(self) -> float:
-        """``rms_n`` over the same of the measured force."""
+        """``rms_n`` relative to that of the measured force."""
         return self.rms_n / _rms(self.measured_n)
 
     def summary(self) -> str:
@@ -63,11 +63,11 @@ class Fit(Estimates):
 
 
 def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, force_n: Floats) -> Fit:
-    """Return the values of the parameters ``names`` with which `simulate` comes closest to a measured force.
+    """Return the values of the parameters ``names`` for which `simulate` is closest to a measured force.
 
-    ``force_n`` is the liquid's on the body, (n, 3) or along x (n,), at the times of the motion, which may have another
-    rate than the scene. Velocities of the motion are used if given, else those of the scene's estimator. The search
-    begins at the scene's values; with ``effects = "auto"``, with the effects chosen for these.
+    ``force_n`` is the liquid's force on the body, (n, 3) or along x (n,), at the times of the motion, whose rate may
+    differ from the scene's. Velocities of the motion are used if given, else those of the scene's estimator. The search
+    begins at the scene's values; with ``effects = "auto"``, with the effects selected for them.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
 
 
 def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:
-    """Yield warnings of correlated residuals, which speak against the model: noise is uncorrelated."""
+    """Yield warnings about correlated residuals, which indicate a model error, since noise is uncorrelated."""
     if rho > max(_FOLLOWING, _CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
@@ -115,7 +115,7 @@ class CurveFit(Estimates):
 
     @property
     def share(self) -> float:
-        """The root mean square of the residuals, each as a share of the measured stress."""
+        """The RMS of the residuals, each relative to the measured stress."""
         return float(np.sqrt(np.mean((self.fitted_pa / self.curve.stress_pa - 1) ** 2)))
 
     def summary(self) -> str:
@@ -125,7 +125,7 @@ class CurveFit(Estimates):
 
 
 def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCurve) -> CurveFit:
-    """Return the values of the parameters ``names`` with which a liquid's flow curve comes closest to a measured one.
+    """Return the values of the parameters ``names`` for which a flow curve is closest to a measured one.
 
     Raises
     ------
@@ -183,7 +183,7 @@ class _CurveProblem(Problem):
     def _products(self, residual: Floats) -> float:
         """Return the sum of the products of residuals at successive shear rates.
 
-        Rows of one shear rate have no order: the sum is the mean over all orders of them.
+        Rows with equal shear rates have no order: the sum is averaged over all their orders.
         """
         _, at, counts = np.unique(self._curve.rate_per_s, return_inverse=True, return_counts=True)
         sums, squares = np.bincount(at, residual.ravel()), np.bincount(at, residual.ravel() ** 2)

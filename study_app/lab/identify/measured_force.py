@@ -27,7 +27,7 @@ _HEADER: Final = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
-    """A motion of n rows in the scene frame, and the liquid's force (n, 3) on the body [N] measured along it."""
+    """A motion of n rows in the scene frame, and the liquid's force on the body (n, 3) [N] measured along it."""
 
     motion: Motion
     force_n: Floats
@@ -39,7 +39,7 @@ class Measured:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FlowCurve:
-    """Shear rates (n,) [1/s] and shear stresses (n,) [Pa] of steady shear, as a rheometer measures them."""
+    """Shear rates (n,) [1/s] and stresses (n,) [Pa] in steady shear, as measured by a rheometer."""
 
     rate_per_s: Floats
     stress_pa: Floats
@@ -51,15 +51,15 @@ class FlowCurve:
                 raise StudyError(f"row {row} has {name} {values.min():g}: it must be above 0; remove the row")
 
     def ordered(self) -> "FlowCurve":
-        """Return the same rows by shear rate, then by stress."""
+        """Return the same rows sorted by shear rate, then by stress."""
         order = np.lexsort((self.stress_pa, self.rate_per_s))
         return FlowCurve(self.rate_per_s[order], self.stress_pa[order])
 
     def branches(self) -> "Branches | None":
-        """Return two branches, each by shear rate: those of repeated rates, else rising and falling rows.
+        """Return two branches, each sorted by shear rate: of repeated rates, or rising and falling rows.
 
-        At rates that were measured repeatedly these are the least and the greatest stresses. None if most rates occur
-        once and the rows do not go up and down, or down and up.
+        For rates that were measured repeatedly these are the smallest and the largest stresses. None if most rates
+        occur once and the rows do not go up and down, or down and up.
         """
         rates, counts = np.unique(self.rate_per_s, return_counts=True)
         repeated = rates[counts > 1]
@@ -89,9 +89,10 @@ class Branches:
 
 
 def read(path: Path) -> Measured | FlowCurve:
-    """Read a table (`text_tables`) with one of the headers in `_HEADER`, its columns in any order; others are not read.
+    """Read a table (`text_tables`) with one of the headers in `_HEADER`, in any column order; ignore other columns.
 
-    Lines that begin with # are left out. Along a line, the motion is along x and places are summed from velocities.
+    Lines that begin with # are ignored. A motion given by its velocity along a line is along x, with integrated
+    positions.
 
     Raises
     ------
@@ -146,10 +147,10 @@ def along_a_line(t_s: Floats, velocity_mps: Floats, force_n: Floats) -> Measured
 
 
 def with_centred_velocity(motion: Motion) -> Motion:
-    """Return the motion with velocities (n, 3): slopes of parabolas through the places 12.5 ms to both sides.
+    """Return the motion with velocities (n, 3): slopes of parabolas through positions within ±12.5 ms.
 
-    A measured force depends on the motion itself, not on a device's filter: these velocities have no lag. A motion that
-    has velocities stays as it is. [choice] 25 ms: a tenth of the period of the fastest strokes, 4 Hz.
+    A measured force depends on the motion itself, not on a device's filter; these velocities have no lag. A motion that
+    has velocities is returned unchanged. [choice] 25 ms is a tenth of the period of the fastest strokes, 4 Hz.
 
     Raises
     ------
@@ -169,9 +170,9 @@ def with_centred_velocity(motion: Motion) -> Motion:
 
 
 def at_rate(motion: Motion, rate_hz: float) -> Motion:
-    """Return the motion with a row for every tick; unchanged if it has them within half a tick.
+    """Return the motion with a row for every tick; unchanged if its rows are within half a tick.
 
-    Between the rows of a slower or uneven measurement places follow cubic splines, velocities straight lines.
+    Between the rows of a slower or uneven measurement positions are interpolated by cubic splines, velocities linearly.
 
     Raises
     ------

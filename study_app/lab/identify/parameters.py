@@ -25,8 +25,8 @@ class Parameter:
     """One number of a scene.
 
     ``name`` is its requested name, ``table`` and ``field`` its place: "liquid", "body" or an effect's table. ``least``
-    and ``most`` are what its model permits, ``least`` itself not where ``above``, and what those of `NO_LESS_THAN` that
-    are not fitted leave. ``whole`` numbers count.
+    and ``most`` are the limits of its model (``least`` excluded if ``above``) and of the parameters in `NO_LESS_THAN`
+    that are not fitted. ``whole`` numbers are integers.
     """
 
     name: str
@@ -40,10 +40,10 @@ class Parameter:
 
 
 def find_parameters(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple[Parameter, ...]:
-    """Return the parameters called ``names``, of a scene whose liquids name their effects.
+    """Return the parameters called ``names`` of a scene whose liquids name their effects.
 
-    A name is a field of the liquid, of the tables of its effects or of the body, such as ``drag_coefficient``; where
-    two share one, the first found in this order, unless the table is named: ``body.density_kg_m3``.
+    A name is a field of the liquid, of the tables of its effects or of the body, such as ``drag_coefficient``; if two
+    share a name, the first in this order is used, unless the table is named: ``body.density_kg_m3``.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def _narrow_range(it: Parameter, table: BaseModel, fitted: Sequence[Parameter]) 
 
 
 def replace_values(scene: Scene, liquid_id: str, parameters: Sequence[Parameter], values: Sequence[float]) -> Scene:
-    """Return the scene with new values; those of whole numbers are rounded."""
+    """Return the scene with new values; integers are rounded."""
     tree = scene.model_dump()
     for parameter, value in zip(parameters, values, strict=True):
         rows = [tree["body"]] if parameter.table == "body" else [it for it in tree["liquids"] if it["id"] == liquid_id]
@@ -96,7 +96,7 @@ def _liquid(scene: Scene, liquid_id: str) -> Liquid:
 
 
 def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
-    """Yield the tables that affect the force, in the order in which a plain name is looked up."""
+    """Yield the tables that affect the force, in the search order for plain names."""
     yield "liquid", liquid
     for effect in EFFECTS:
         if effect.model is not None and effect.name in liquid.effects:
@@ -143,7 +143,7 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
 
 
 def _numbers(table: BaseModel) -> Iterator[tuple[str, tuple[float, float, bool, bool]]]:
-    """Yield every field that is one number, with its least and greatest value, whether above the least, and whole."""
+    """Yield every numeric field with its limits, whether the least is excluded, and whether it is an integer."""
     for field, schema in type(table).model_json_schema()["properties"].items():
         for kind in schema.get("anyOf", [schema]):
             if kind.get("type") in {"number", "integer"}:

@@ -37,7 +37,7 @@ def report_text(estimates: Estimates) -> str:
 def write_fit(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     """Write preset (TOML), report (text), residuals (CSV) and figure into the folder ``to``; return the files.
 
-    ``source`` is the file that was measured: the preset names it with its hash.
+    ``source`` is the measured file, which the preset names with its hash.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def write_fit(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
 def preset_file_text(estimates: Estimates, source: Path) -> str:
     """Return the fitted scene as a scene file, each fitted number with its interval in a comment.
 
-    The fit takes velocities from the measured motion, never from an estimator; the file names that of new files.
+    The fit uses velocities from the measured motion, not from an estimator; the file names the default estimator.
     """
     digest = hashlib.sha256(source.read_bytes()).hexdigest()
     said = (

@@ -72,12 +72,12 @@ def u_range(parameter: Parameter) -> tuple[float, float]:
 
 
 class Problem:
-    """A scene, the parameters that are searched, and the measurements.
+    """A scene, the parameters to be fitted, and the measurements.
 
-    z (p,) are the variables of the search: u, or for the greater of two in `NO_LESS_THAN` the logarithm of their ratio.
-    ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``, ``varied`` and
-    ``more`` are words for warnings; ``alike`` is the correlation of two estimates from which their parameters count as
-    not distinguishable.
+    z (p,) are the search variables: u, or for the greater of two parameters in `NO_LESS_THAN` the logarithm of their
+    ratio. ``least`` and ``most`` (p,) are its range, ``start`` the scene's own values in it. ``compared``, ``varied``
+    and ``more`` are phrases for warnings; ``alike`` is the correlation of two estimates above which their parameters
+    count as indistinguishable.
     """
 
     alike: ClassVar[float]
@@ -107,7 +107,7 @@ class Problem:
         raise NotImplementedError
 
     def following(self, residual: Floats) -> float:
-        """Return the correlation of residuals (n, k) from one row to the next, of all axes together."""
+        """Return the correlation of residuals (n, k) between successive rows, over all axes."""
         whole = float(np.sum(residual**2))
         return min(self._products(residual) / whole, 1 - 1 / len(residual)) if whole else 0.0
 
@@ -129,7 +129,7 @@ class Problem:
         return u
 
     def slopes(self, z: Floats) -> Floats:
-        """Return the derivative of the misfit by z, (m, p), from differences to both sides as far as permitted."""
+        """Return the derivative of the misfit by z, (m, p), from central differences where permitted."""
         columns = []
         for k, it in enumerate(self._coordinates):
             step = it.step * (max(abs(z[k]), 0.01) if it.relative else 1.0)
@@ -147,7 +147,7 @@ class Problem:
         return slopes
 
     def rounded(self, z: Floats) -> Floats:
-        """Return z with a whole length; the scaling stays."""
+        """Return z with an integer length; the scaling is kept."""
         if self.length is None:
             return z
         values = self.values(z)
@@ -155,7 +155,7 @@ class Problem:
         return self._to_z(values)
 
     def moved(self, z: Floats, k: int, u: float) -> Floats:
-        """Return z with another length; the scaling is kept, or raised to the length."""
+        """Return z with another length; the scaling is kept, or raised to the length if it is smaller."""
         u = min(max(u, self.least[k]), self.most[k])
         moved = np.array(z, float)
         if self.scaling is not None:
@@ -167,7 +167,7 @@ class Problem:
         return replace_values(self._scene, self._liquid_id, self.parameters, self.values(z))
 
     def _longest(self, values: Sequence[float], k: int) -> float:
-        """Return the greatest whole length that the scaling permits."""
+        """Return the greatest integer length that the scaling permits."""
         scaling = math.inf if self.scaling is None else values[self.scaling]
         return math.floor(min(self.parameters[k].most, scaling) * (1 + 1e-12))
 
@@ -210,7 +210,7 @@ class ForceProblem(Problem):
         return len(self.axes)
 
     def force_n(self, z: Floats) -> Floats:
-        """Return the force (n, 3) at the measured times; between whole lengths interpolated."""
+        """Return the force (n, 3) at the measured times, interpolated between integer lengths."""
         values = self.values(z)
         if self.length is None:
             return self._simulated(values)
@@ -230,7 +230,7 @@ class ForceProblem(Problem):
         return np.column_stack([np.interp(self.measured.motion.t_s, self._motion.t_s, it) for it in columns])
 
     def _neighbours(self, values: list[float], k: int) -> tuple[list[float], list[float], float]:
-        """Return the values with the integer lengths on both sides, and the length's position between them, 0 … 1."""
+        """Return the values with the integer lengths on both sides, and the length's position between them."""
         longest = self._longest(values, k)
         below = min(max(1.0, math.floor(values[k] / self._spacing + 1e-9) * self._spacing), longest)
         above = min(below + self._spacing, longest)
@@ -239,7 +239,7 @@ class ForceProblem(Problem):
         return [*values[:k], below, *values[k + 1 :]], [*values[:k], above, *values[k + 1 :]], share
 
     def _range(self, it: Parameter) -> tuple[float, float]:
-        """Return the least and the greatest z: a length is no longer than what was measured."""
+        """Return the least and the greatest z; a length is limited by the measured duration."""
         if it.whole:
             lasted_s = self._motion.t_s[-1] - self._motion.t_s[0]
             most = math.floor(min(it.most, math.ceil(1000 * lasted_s)))
@@ -248,7 +248,7 @@ class ForceProblem(Problem):
 
 
 def solve(problem: Problem) -> tuple[Floats, bool]:
-    """Return the z of the least squares with an integer length, and whether the search converged."""
+    """Return the least-squares solution z with an integer length, and whether the search converged."""
     everything = np.ones(len(problem.start), bool)
     best = _search(problem, problem.start if problem.length is None else _begin(problem, problem.length), everything)
     z = problem.rounded(best.x)
@@ -259,7 +259,7 @@ def solve(problem: Problem) -> tuple[Floats, bool]:
 
 
 def _begin(problem: Problem, k: int) -> Floats:
-    """Return a z near the least squares, searched at lengths over the whole range, then around the best."""
+    """Return a z near the solution, searched at lengths over the whole range, then around the best one."""
     shortest = min(math.log(_SHORTEST_START), problem.most[k])
     lengths = np.linspace(shortest, problem.most[k], _STARTS)
     best = _best(problem, [problem.start, *(problem.moved(problem.start, k, length) for length in lengths)])
@@ -273,7 +273,7 @@ def _begin(problem: Problem, k: int) -> Floats:
 
 
 def _best(problem: Problem, starts: Sequence[Floats]) -> Any:
-    """Return the best of a few steps from each start."""
+    """Return the best result after a few steps from each start."""
     everything = np.ones(len(problem.start), bool)
     return min((_search(problem, it, everything, _TRIAL) for it in starts), key=lambda it: float(it.cost))
 
