@@ -62,14 +62,14 @@ R = TypeVar("R")
 
 
 class _Permitted(NamedTuple):
-    """What an argument may be: a phrase, and the function that returns it or raises an error."""
+    """The permitted values of an argument: a phrase, and the function that returns it or raises an error."""
 
     phrase: str
     convert: Callable[[Any], Any]
 
 
 def _checked(**permitted: _Permitted) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Let a function raise a StudyError, before it does anything, for an argument that is not ``permitted``."""
+    """Let a function raise a StudyError before it does anything if an argument is not ``permitted``."""
 
     def decorated(function: Callable[P, R]) -> Callable[P, R]:
         @wraps(function)
@@ -143,7 +143,7 @@ _OPTIONS: Final = _or_none(_Permitted("options by name", partial(_instance, Mapp
 
 
 def __getattr__(name: str) -> Any:
-    """Return a class that is in another module, which is imported now."""
+    """Return a class of another module, which is imported on first access."""
     if name not in _ELSEWHERE:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_ELSEWHERE[name]), name)
@@ -221,10 +221,10 @@ def simulate_force(
 def simulate_study(
     study: str | Path, people: int, *, seed: int, progress: Callable[[str], object] | None = None
 ) -> dict[str, pd.DataFrame]:
-    """Answer a study as simulated participants do; return its tables, unblinded, as `read` does.
+    """Answer a study with simulated participants; return its tables, unblinded, like `read`.
 
-    Four sessions are rehearsed with the servo first, which tells what each condition feels like; ``progress`` is called
-    with a line now and then.
+    Four sessions are first rehearsed with the servo to obtain the features of each condition; ``progress`` is called
+    with a line from time to time.
     """
     from study_app.session.simulated.answers_only import rehearse_answers
 
@@ -308,9 +308,9 @@ def fit(
 
 @_checked(results=_PATH)
 def read(results: str | Path) -> dict[str, pd.DataFrame]:
-    """Return the tables of a study folder by name, as ``export`` writes them: responses, trials and others.
+    """Return the tables of a study folder by name, as written by ``export``: responses, trials and others.
 
-    Sealed columns are left out until the study is unblinded. docs/data-dictionary.md declares every column.
+    Sealed columns are omitted until the study is unblinded. docs/data-dictionary.md declares every column.
     """
     from study_app.analysis.data.study_tables import load_study
     from study_app.analysis.export.tables import deliver
@@ -320,7 +320,7 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
 
 @_checked(results=_PATH, by=_TEXT, reason=_TEXT)
 def unblind(results: str | Path, *, by: str, reason: str) -> None:
-    """Open the sealed key of a study folder: `read` and `report` name conditions then; name and reason are recorded.
+    """Open the sealed key of a study folder, so that `read` and `report` name conditions; record name and reason.
 
     Raises
     ------
@@ -373,7 +373,7 @@ class Session:
         return self._pages
 
     def run(self) -> None:
-        """Go on to the last page."""
+        """Continue to the last page."""
         for _ in self._pages:
             pass
 
@@ -408,9 +408,9 @@ def open_session(
     group: str | None = None,
     row_of: str | None = None,
 ) -> Iterator[Session]:
-    """Open a session without windows, on simulated time; one that was left before its end is resumed.
+    """Open a session without windows, in simulated time; an unfinished one is resumed.
 
-    It is stored as a session with windows is, marked as simulated. Whatever ends the block, the force ends at zero, and
+    It is stored like a session with windows, marked as simulated. However the block ends, the force ends at zero, and
     every answer given is on the disk. A resumed session keeps its seed, device and recordings.
 
     Parameters
@@ -473,9 +473,9 @@ def open_session(
 
 
 class ForceLoop:
-    """A device whose force a liquid computes at 1 kHz in a thread of its own, for another program's loop.
+    """A device whose force is computed from a liquid at 1 kHz in a separate thread, for another program's loop.
 
-    After its block every call is a `StudyError`.
+    After its block every call raises `StudyError`.
     """
 
     def __init__(self, rig: Rig, scenes: Mapping[str, Scene]) -> None:
@@ -491,14 +491,14 @@ class ForceLoop:
 
     @property
     def dropped(self) -> int:
-        """Samples that `read` was called too late for."""
+        """The number of samples lost because `read` was called too late."""
         return self._reader.dropped
 
     @_checked(liquid=_TEXT)
     def set_liquid(self, liquid: str, **parameters: object) -> None:
-        """Change the liquid, or only numbers of it; the force changes within the slew limit, or fades in.
+        """Change the liquid, or only its parameters; the force changes within the slew limit, or fades in.
 
-        ``parameters`` differ from the file's; those of an earlier call are not kept.
+        ``parameters`` override the file's; those of an earlier call are not kept.
 
         Raises
         ------
@@ -516,10 +516,10 @@ class ForceLoop:
             servo.load(scene)
 
     def follow(self, t_s: ArrayLike, position_m: ArrayLike) -> None:
-        """Move the hand of a simulated device along the straight lines between places; until then it rests.
+        """Move the hand of a simulated device along straight lines between positions; until then it rests.
 
-        Of the times (n,) [s], which increase, only differences count; places (n, 3) [m, hand] outside the range of
-        motion, ±0.05 m along x and ±0.03 m along y and z, count as its border.
+        Only differences of the increasing times (n,) [s] matter; positions (n, 3) [m, hand] outside the range of
+        motion, ±0.05 m along x and ±0.03 m along y and z, are moved to its border.
 
         Raises
         ------
@@ -568,8 +568,8 @@ def open_force(
 ) -> Iterator[ForceLoop]:
     """Open a device with the servo and its safety layer, at zero force until `ForceLoop.set_liquid`.
 
-    Whatever ends the block, the last force is zero. Open it in the main thread, where signals end the block; in another
-    thread it is refused unless the program handles SIGTERM.
+    However the block ends, the last force is zero. Open it in the main thread, where signals end the block; in another
+    thread it is rejected unless the program handles SIGTERM.
 
     Parameters
     ----------

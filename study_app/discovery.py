@@ -40,16 +40,16 @@ def modules_of(package: ModuleType) -> Iterator[ModuleType]:
 
 
 def by_name(own: Mapping[str, T], name: str) -> T:
-    """Return what a descriptor names: one of the program's own by its id, or that at ``module:attribute``."""
+    """Return the object that a descriptor names: one of the program's own by id, or that at ``module:attribute``."""
     return cast("T", pkgutil.resolve_name(name)) if ":" in name else own[name]
 
 
 @dataclass(frozen=True, slots=True)
 class PlugIn:
-    """What one entry point adds.
+    """The contribution of one entry point.
 
-    ``kind`` is one of `REGISTRIES`, ``package`` the distribution, ``origin`` where it is installed; ``fault`` says in a
-    line why it cannot be used, empty if it can.
+    ``kind`` is one of `REGISTRIES`, ``package`` the distribution, ``origin`` its location; ``fault`` is a line on why
+    it cannot be used, "" if it can.
     """
 
     kind: str
@@ -62,19 +62,19 @@ class PlugIn:
 
     @property
     def described(self) -> dict[str, str]:
-        """What a receipt records of it."""
+        """The record for a receipt."""
         return {"kind": self.kind, "name": self.name, "package": self.package, "version": self.version}
 
 
 @cache
 def _points() -> tuple[EntryPoint, ...]:
-    """Return the entry points of all groups, read once: that takes 10 to 30 ms."""
+    """Return the entry points of all groups; cached, since reading takes 10 to 30 ms."""
     groups = entry_points()
     return tuple(point for kind in REGISTRIES for point in groups.select(group=f"liquid_study.{kind}s"))
 
 
 def _of_kind(kind: str) -> Iterator[tuple[EntryPoint, PlugIn]]:
-    """Yield the entry points of a kind, with what their packages say of them."""
+    """Yield the entry points of a kind with the metadata of their packages."""
     for point in _points():
         if point.group == f"liquid_study.{kind}s" and (dist := point.dist) is not None:
             yield (
@@ -84,21 +84,21 @@ def _of_kind(kind: str) -> Iterator[tuple[EntryPoint, PlugIn]]:
 
 
 class Returns(NamedTuple):
-    """What a function or property of a plug-in may return: a phrase, and the test of a value."""
+    """The permitted results of a plug-in's function or property: a phrase, and the test of a value."""
 
     permitted: str
     holds: Callable[[Any], bool]
 
 
 def number_between(low: float, high: float) -> Returns:
-    """Return the permission of numbers from ``low`` to ``high``, which NaN is not."""
+    """Return a permission for numbers from ``low`` to ``high``, which excludes NaN."""
     return Returns(
         f"a number from {low:g} to {high:g}", lambda value: isinstance(value, Real) and low <= float(value) <= high
     )
 
 
 def instance_of(kind: type) -> Returns:
-    """Return the permission of values of a class."""
+    """Return a permission for instances of a class."""
     return Returns(f"of the class {kind.__name__}", lambda value: isinstance(value, kind))
 
 
@@ -112,13 +112,13 @@ def are_numbers(values: Any) -> bool:
 class Registry(Mapping[str, T], Generic[T]):
     """The descriptors of one kind, by name: the program's ``own``, then those of plug-ins.
 
-    Entry points are read when a name is none of its own, or when all are asked for. An entry point holds a value of the
-    class ``base``, with its ``name``; or a class that extends it, whose name is the value of its attribute or field
-    ``key``. Names that study files hold, those of a ``kind``, begin with the package, ``package:name``: so a file says
-    itself what to install.
+    Entry points are read when a name is not among its own, or when all are requested. An entry point holds an instance
+    of the class ``base``, with its ``name``, or a subclass whose name is the value of its attribute or field ``key``.
+    Names in study files, those of a ``kind``, begin with the package, ``package:name``, so that a file states what to
+    install.
 
-    ``returns`` are the functions and properties of a plug-in that the program calls, with what they may return: another
-    value, or an error, is a `PlugInError` that names the plug-in.
+    ``returns`` are the functions and properties of a plug-in that the program calls, with their permitted results:
+    another value, or an error, is a `PlugInError` that names the plug-in.
     """
 
     def __init__(
@@ -135,21 +135,21 @@ class Registry(Mapping[str, T], Generic[T]):
 
     @property
     def plug_ins(self) -> tuple[PlugIn, ...]:
-        """All plug-ins of this kind, with those that cannot be used."""
+        """All plug-ins of this kind, including unusable ones."""
         return self._read()[0]
 
     @property
     def others(self) -> Mapping[str, T]:
-        """Those of plug-ins alone."""
+        """The descriptors of plug-ins only."""
         return self._read()[1]
 
     def plug_in(self, name: str) -> PlugIn | None:
-        """Return the plug-in that has a name; None if it is the program's own, or none has it."""
+        """Return the plug-in that defines a name; None if it is the program's own, or unknown."""
         found = () if name in self.own else self.plug_ins
         return next((plug_in for plug_in in found if plug_in.name == name and not plug_in.fault), None)
 
     def missing(self, name: str) -> tuple[str, str]:
-        """Return why the name of a plug-in is not here, and what to do."""
+        """Return why the name of a plug-in is missing, and the remedy."""
         package = name.partition(":")[0]
         versions = [point.dist.version for point in _points() if point.dist and _canonical(point.dist.name) == package]
         if not versions:
@@ -171,7 +171,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return len(self.own) + len(self.others)
 
     def _read(self) -> tuple[tuple[PlugIn, ...], Mapping[str, T]]:
-        """Load the entry points, once; what is wrong with one is its fault."""
+        """Load the entry points once; a problem with one is stored as its fault."""
         if self._found is None:
             plug_ins, others = [], dict[str, T]()
             for point, plug_in in _of_kind(self.kind):
@@ -188,7 +188,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return self._found
 
     def _name_of(self, found: Any, place: str, package: str, others: Mapping[str, T]) -> str:
-        """Return the name of what an entry point holds; a StudyError says why it has none."""
+        """Return the name of an entry point's object; raise a StudyError with the reason if it has none."""
         if self._key == "name" and not isinstance(found, self._base):
             raise StudyError(f"{place} is not a {self._base.__name__} but a {type(found).__name__}")
         if self._key != "name" and not (isinstance(found, type) and issubclass(found, self._base)):
@@ -237,13 +237,13 @@ class Registry(Mapping[str, T], Generic[T]):
         return found
 
     def forget(self) -> None:
-        """Look for plug-ins again when one is asked for."""
+        """Clear the cache, so that plug-ins are searched for again."""
         self._found = None
         _points.cache_clear()
 
 
 def _canonical(package: str) -> str:
-    """Return the name of a distribution as all ways to write it have it in common."""
+    """Return the normalised name of a distribution."""
     return re.sub(r"[-_.]+", "-", package).lower()
 
 
@@ -251,7 +251,7 @@ UPDATE: Final = "update or uninstall the plug-in"
 
 
 def _line(error: BaseException) -> str:
-    """Return an error in one line."""
+    """Return an error as one line."""
     words = " ".join(str(error).split())
     kind = "" if isinstance(error, StudyError) else type(error).__name__
     return ": ".join(filter(None, (kind, words)))
@@ -264,7 +264,7 @@ def registry(kind: str) -> Registry[Any]:
 
 
 def plug_ins() -> tuple[PlugIn, ...]:
-    """Return all plug-ins of all kinds, with those that cannot be used."""
+    """Return all plug-ins of all kinds, including unusable ones."""
     found: list[PlugIn] = []
     for kind in REGISTRIES:
         named = [plug_in for _, plug_in in _of_kind(kind)]
@@ -276,7 +276,7 @@ def plug_ins() -> tuple[PlugIn, ...]:
 
 
 def _checked_function(function: Callable[..., Any], plug_in: PlugIn, name: str, returns: Returns) -> Callable[..., Any]:
-    """Return a plug-in's function whose errors and wrong values are those of the plug-in."""
+    """Return a plug-in's function whose errors and invalid values are reported as those of the plug-in."""
 
     @wraps(function)
     def call(*values: Any, **named: Any) -> Any:
@@ -312,7 +312,7 @@ def _failure(package: str, version: str, words: str) -> PlugInError:
 
 
 def explained(error: BaseException) -> BaseException:
-    """Return a `PlugInError` for an error that was raised in a plug-in, else the error itself."""
+    """Return a `PlugInError` for an error raised in a plug-in, else the error itself."""
     if isinstance(error, StudyError):
         return error
     modules, trace = [], error.__traceback__

@@ -45,7 +45,7 @@ _NO_MATTER: Final = (
 
 
 def folder() -> Path:
-    """Return the folder of the pages: of the installed package, or of the checkout that it runs from."""
+    """Return the folder of the pages, in the installed package or in the checkout."""
     package = Path(str(files("study_app")))
     installed = package / "docs"
     return installed if installed.is_dir() else package.parent / "docs"
@@ -53,14 +53,14 @@ def folder() -> Path:
 
 @cache
 def names() -> tuple[str, ...]:
-    """Return the name of every page, its path in the folder without the ending, sorted."""
+    """Return the sorted names of all pages, which are their paths in the folder without the suffix."""
     top = folder()
     paths = (path.relative_to(top) for path in top.rglob("*.md"))
     return tuple(sorted(path.with_suffix("").as_posix() for path in paths if path.parts[0] != "examples"))
 
 
 def source(name: str) -> str:
-    """Return the text of a page as it stands in its file."""
+    """Return the text of a page as in its file."""
     return (folder() / f"{name}.md").read_text(encoding="utf-8")
 
 
@@ -70,7 +70,7 @@ def page(name: str) -> str:
 
 
 def with_generated_parts(text: str) -> str:
-    """Return the text of a page with the output of each function that it names in place of the comment."""
+    """Return the text of a page in which each comment that names a function is replaced by its output."""
     return _GENERATED.sub(lambda found: getattr(import_module(found[1]), found[2])(), text)
 
 
@@ -98,9 +98,8 @@ def sections() -> dict[str, tuple[str, ...]]:
 class Section(NamedTuple):
     """A heading of a page with the text below it.
 
-    `names` are the title, the heading and its synonyms; `phrases` the begins of the words of each synonym, and of the
-    title at its own heading;
-    `text` is its `source` without marks, in lowercase letters.
+    `names` are the title, the heading and its synonyms; `phrases` the word stems of each synonym, and of the title at
+    its own heading; `text` is its `source` without markup, in lower case.
     """
 
     page: str
@@ -112,11 +111,11 @@ class Section(NamedTuple):
 
 
 def search(words: str) -> tuple[Section, ...]:
-    """Return the best section of each page that has some of the words, or words that begin alike, the best page first.
+    """Return the best section of each page that contains some of the words or their stems, the best page first.
 
-    A word counts more the fewer pages have it, and most in a heading. A section counts twice if the words of one of
-    its phrases were typed: among others if they are several, alone if it is one. Decisions, and pages that are lists,
-    count less. Pages far below the best are left out.
+    A word has more weight the fewer pages contain it, and most in a heading. A section counts double if the words of
+    one of its phrases were typed: among others for several words, as the only one for a single word. Decisions and
+    pages that are lists have less weight. Pages far below the best are omitted.
     """
     stems = _stems(words)
     score = dict.fromkeys(_sections(), 0.0)
@@ -141,7 +140,7 @@ def search(words: str) -> tuple[Section, ...]:
 
 
 def _stems(words: str) -> list[str]:
-    """Return the begins of the words that matter; of all words if none does."""
+    """Return the stems of the relevant words, or of all words if none is relevant."""
     typed, left_out = _WORD.findall(words.casefold()), _NO_MATTER.split()
     return [_ENDING.sub("", word) for word in typed if word not in left_out] or typed
 
@@ -151,7 +150,7 @@ def _has(text: str, stem: str, begins: re.Pattern[str]) -> bool:
 
 
 def anchor_of(heading: str) -> str:
-    """Return the anchor of a heading as it is shown, as GitHub and MyST make it."""
+    """Return the anchor of a heading, as made by GitHub and MyST."""
     return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
 
 

@@ -25,18 +25,18 @@ from typing import Any, Final
 
 
 class StudyError(Exception):
-    """A failure that the user can understand and mend.
+    """A failure that the user can understand and fix.
 
-    It can be pickled, whichever parameters its ``__init__`` has, so that a worker process can raise it here.
+    It can be pickled, regardless of the parameters of its ``__init__``, so that a worker process can raise it here.
     """
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Return how it is made again: without ``__init__``, whose parameters are not kept."""
+        """Return how to recreate it without ``__init__``, whose parameters are not kept."""
         return _restored, (type(self), self.args, self.__dict__)
 
 
 def _restored(kind: type[StudyError], args: tuple[Any, ...], fields: dict[str, Any]) -> StudyError:
-    """Return an error as it was pickled."""
+    """Return an error from its pickled state."""
     error = kind.__new__(kind, *args)
     error.__dict__.update(fields)
     return error
@@ -78,7 +78,7 @@ class DeviceError(StudyError):
 
 
 class DeviceNotFound(DeviceError):
-    """No such device, or none connected."""
+    """The device does not exist, or none is connected."""
 
 
 class DeviceLost(DeviceError):
@@ -94,11 +94,11 @@ class VideoError(StudyError):
 
 
 class OutletError(StudyError):
-    """A stream or a port to another program cannot be used; the session goes on without it."""
+    """A stream or port to another program cannot be used; the session continues without it."""
 
 
 class SessionError(StudyError):
-    """The session cannot take this event in its present state; nothing was changed."""
+    """The event is not allowed in the session's current state; nothing was changed."""
 
 
 class StoreError(StudyError):
@@ -110,7 +110,7 @@ class AnalysisError(StudyError):
 
 
 class MissingExtra(StudyError):
-    """What was asked for needs libraries that were not installed."""
+    """The requested function needs libraries that are not installed."""
 
 
 class PlugInError(StudyError):
@@ -123,7 +123,7 @@ ANALYSIS_LIBRARIES: Final = frozenset({"jinja2", "markupsafe", "matplotlib", "pa
 
 @contextmanager
 def naming_the_extra() -> Iterator[None]:
-    """Raise `MissingExtra` where a library of the extra ``analysis`` is imported and is not installed."""
+    """Raise `MissingExtra` if a library of the extra ``analysis`` is imported but not installed."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -141,4 +141,4 @@ class WorkerError(StudyError):
 
 
 class DisplayError(StudyError):
-    """A window cannot be opened here."""
+    """No window can be opened here."""

@@ -93,10 +93,10 @@ PLOT_SETTINGS: Final[Mapping[Any, Any]] = {
 
 @cache
 def fonts() -> tuple[str, ...]:
-    """Return the families of figures, best first: Inter, which ships with the windows, and what has other scripts.
+    """Return the font families of figures, best first: Inter, which ships with the windows, then other scripts.
 
-    Inter is here as TrueType, with Latin and Greek letters alone: PDF may not embed its PostScript outlines as type 42.
-    An installed Inter gives way to it.
+    Inter is included as TrueType, with only Latin and Greek letters, since PDF may not embed its PostScript outlines as
+    type 42. An installed Inter is preferred.
     """
     files = [Path(str(FONT_FOLDER / f"Inter-{weight}.ttf")) for weight in ("Regular", "Bold")]
     if not all(file.is_file() for file in files):
@@ -110,7 +110,7 @@ def fonts() -> tuple[str, ...]:
 
 @contextlib.contextmanager
 def own_settings(settings: Mapping[Any, Any] = SETTINGS) -> Iterator[None]:
-    """Draw by matplotlib's defaults and ``settings``, whatever the user's matplotlibrc says; restore it at the end."""
+    """Draw with matplotlib's defaults and ``settings``, regardless of the user's matplotlibrc, then restore it."""
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(settings)
@@ -118,7 +118,7 @@ def own_settings(settings: Mapping[Any, Any] = SETTINGS) -> Iterator[None]:
 
 
 def file_bytes(figure: Figure, kind: str, title: str, settings: Mapping[Any, Any] = SETTINGS) -> bytes:
-    """Return the figure as the bytes of a file of ``kind`` (one of `FORMATS`); the same figure gives the same bytes."""
+    """Return the figure as file content of ``kind`` (one of `FORMATS`); the same figure gives the same bytes."""
     metadata: dict[str, dict[str, str | None]] = {
         "png": {"Software": None, "Title": title},
         "svg": {"Date": None, "Title": title},

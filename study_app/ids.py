@@ -46,7 +46,7 @@ def file_name_fault(name: str) -> str:
 
 
 def read_as(text: str) -> str:
-    """Return what other programs read a participant's id as, "a number" of "007"; "" where they keep it.
+    """Return the type as which other programs read a participant's id, such as "a number" for "007", or "".
 
     Examples
     --------
@@ -57,9 +57,9 @@ def read_as(text: str) -> str:
 
 
 def id_of(text: str, longest: int = MAX_ID) -> str:
-    """Return the id that a text gives: its words in lowercase letters without accents, as many as there is room for.
+    """Return the id made from a text: its words in lower case without accents, as many as fit.
 
-    Its first word begins with a letter; "" where there is none.
+    Its first word begins with a letter; "" if there is none.
 
     Examples
     --------
@@ -74,17 +74,17 @@ def id_of(text: str, longest: int = MAX_ID) -> str:
 
 
 def free_id(taken: Iterable[str], name: str) -> str:
-    """Return ``name``, or with the first number from 2 on that is free, in place of one that it ends with."""
+    """Return ``name``, or the name with the first free number from 2, which replaces a number at its end."""
     return _free(taken, name, re.sub(r"_[0-9]+$", "", name), "_", MAX_ID)
 
 
 def short_name_of(text: str) -> str:
-    """Return the short name of a study that a text gives: the letters a to z and digits of its id."""
+    """Return the short name of a study made from a text: the letters a to z and digits of its id."""
     return id_of(text, _ANY_LENGTH).replace("_", "")[:MAX_SHORT_NAME]
 
 
 def free_short_name(taken: Iterable[str], name: str) -> str:
-    """Return a short name of a study that is free, as `free_id` does: "kitchen2"; a year stays: "rek2024v2"."""
+    """Return a free short name of a study, like `free_id`: "kitchen2"; a year is kept: "rek2024v2"."""
     stem = re.sub("(?<=[0-9])v[0-9]+$|(?<=[a-z])[0-9]{1,2}$", "", name)
     return _free({*taken, *_RESERVED_NAMES}, name, stem, "v" if stem[-1:].isdigit() else "", MAX_SHORT_NAME)
 

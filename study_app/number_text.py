@@ -30,20 +30,20 @@ _CONVENTIONS: Final = tuple(
 
 
 def number_of(text: str, decimal_sign: str = ".") -> int | float | None:
-    """Return the number that a text says, whole if it is written so; None if it says none or can say two.
+    """Return the number in a text, as an int if it is written so; None if there is none or it is ambiguous.
 
-    The decimal sign may be a point, a comma or the Arabic one, the digits those of any script, the minus real or a
-    hyphen; groups of three digits may stand apart. ``decimal_sign`` is that of the page's language.
+    The decimal sign may be a point, a comma or the Arabic one, the digits those of any script, the sign a minus or a
+    hyphen; groups of three digits may be separated. ``decimal_sign`` is that of the page's language.
     """
     numbers = readings_of(text, decimal_sign)
     return numbers[0] if len(numbers) == 1 else None
 
 
 def readings_of(text: str, decimal_sign: str = ".") -> tuple[int | float, ...]:
-    """Return the numbers that a text can say, none to two, the lesser first: "2,500" is 2.5 or 2500.
+    """Return the possible numbers in a text, none to two, the smaller first: "2,500" is 2.5 or 2500.
 
-    A single comma or point with three digits after it is decimal or separates thousands, unless it is the
-    ``decimal_sign`` of the page's language, or what stands before it cannot be thousands, as in "0,500".
+    A single comma or point followed by three digits is a decimal sign or separates thousands, unless it is the
+    ``decimal_sign`` of the page's language, or the part before it cannot be thousands, as in "0,500".
     """
     plain = "".join(str(unicodedata.decimal(letter, letter)) for letter in text.strip().translate(_SPELLINGS))
     numbers: dict[float, int | float] = {}
@@ -61,7 +61,7 @@ def readings_of(text: str, decimal_sign: str = ".") -> tuple[int | float, ...]:
 
 
 def unclear_number(text: str) -> str:
-    """Return why a text of an English window is refused as a number, without a full stop."""
+    """Return why a text in an English window is rejected as a number, without a full stop."""
     if len(numbers := readings_of(text)) == 2:
         either = " or ".join(exact_text(number) for number in numbers)
         return f"“{text}” can be read as {either}: write {either}"
@@ -69,10 +69,10 @@ def unclear_number(text: str) -> str:
 
 
 def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
-    """Return the numbers of a list as they are typed, with their values.
+    """Return the numbers of a list as typed, with their values.
 
-    They are separated by spaces, semicolons, lines, or commas with spaces; each may be followed by its unit. Spaces
-    that do not break, as in "45\u00a0918", separate thousands.
+    They are separated by spaces, semicolons, lines, or commas with spaces; each may be followed by its unit.
+    Non-breaking spaces, as in "45 918", separate thousands.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
 
 
 def exact_text(value: float) -> str:
-    """Return a number with every digit that it needs, without an exponent: "1000.0001", "0.00002"."""
+    """Return a number with all necessary digits, without an exponent: "1000.0001", "0.00002"."""
     from decimal import Decimal  # noqa: PLC0415 - every command loads this module, few need it
 
     text = format(Decimal(repr(value + 0)), "f")
@@ -104,17 +104,17 @@ def exact_text(value: float) -> str:
 
 
 def counted(number: int, noun: str, plural: str = "") -> str:
-    """Return "1 part", "2 parts"; ``plural`` is of a noun that has another one."""
+    """Return a count with its noun: "1 part", "2 parts"; pass ``plural`` if it is irregular."""
     return f"{number} {noun}" if number == 1 else f"{number} {plural or noun + 's'}"
 
 
 def capitalised(words: str) -> str:
-    """Return words with a capital at their begin; the other letters stay."""
+    """Return a text with a capital first letter; the other letters are unchanged."""
     return words[:1].upper() + words[1:]
 
 
 def minutes(seconds: float) -> str:
-    """Return the time of a running clock: 68 s as "1:08"; an hour and more as "1:02:03"."""
+    """Return a duration as on a clock: 68 s as "1:08"; an hour or more as "1:02:03"."""
     whole = max(0, int(seconds))
     hours, rest = divmod(whole, 3600)
     if hours:
@@ -123,7 +123,7 @@ def minutes(seconds: float) -> str:
 
 
 def duration(seconds: float, *, tenths: bool = False) -> str:
-    """Return about how long something takes: "45 s", "10 min", "1 h 05 min"; with ``tenths`` "0.6 s" below a minute."""
+    """Return an approximate duration: "45 s", "10 min", "1 h 05 min"; with ``tenths`` "0.6 s" below a minute."""
     if (whole := math.floor(seconds + 0.5)) < 60:
         return f"{seconds:.3g} s" if tenths else f"{max(0, whole)} s"
     hours, rest = divmod(math.floor(seconds / 60 + 0.5), 60)
@@ -137,7 +137,7 @@ def duration_figure(seconds: float) -> tuple[str, str]:
 
 
 def exact_duration(least_s: float, most_s: float) -> str:
-    """Return durations of the file as they are written there: "20 to 90 s", "2.5 s"; whole minutes as "2 min"."""
+    """Return durations of the file in its notation: "20 to 90 s", "2.5 s"; whole minutes as "2 min"."""
     (least, least_unit), (most, unit) = (
         (f"{one / 60:g}", "min") if one and one % 60 == most_s % 60 == 0 else (f"{one:.12g}", "s")
         for one in (least_s, most_s)
@@ -148,7 +148,7 @@ def exact_duration(least_s: float, most_s: float) -> str:
 
 
 def duration_range(least_s: float, most_s: float) -> str:
-    """Return "15 to 32 min", "55 min to 1 h 10 min", or one duration where both read the same."""
+    """Return "15 to 32 min", "55 min to 1 h 10 min", or one duration if both read the same."""
     least, most = duration(least_s), duration(most_s)
     if least == most:
         return most
@@ -162,6 +162,6 @@ def grouped(number: int) -> str:
 
 
 def duration_words(seconds: float) -> str:
-    """Return a lateness or age with the unit that suits it: "62 µs", "1.4 ms"."""
+    """Return a short time with a suitable unit: "62 µs", "1.4 ms"."""
     micros = seconds * 1e6
     return f"{micros:.0f} µs" if micros < 1000 else f"{micros / 1000:.2g} ms"

@@ -21,21 +21,21 @@ _UTF_16: Final = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 class Line(NamedTuple):
-    """The fields of a row, and the number of the line of the file on which it begins (from 1)."""
+    """The fields of a row, and the line number in the file at which it begins (from 1)."""
 
     number: int
     fields: tuple[str, ...]
 
 
 class TextTable(NamedTuple):
-    """The names of the columns, and the rows of which not all fields are empty."""
+    """The names of the columns, and the rows that are not completely empty."""
 
     names: tuple[str, ...]
     lines: tuple[Line, ...]
 
 
 def decoded(content: bytes, first_line: int = 1) -> str:
-    """Return text in UTF-8, without its byte order mark; ``first_line`` is the number of its first line in the file.
+    """Decode a UTF-8 text without its byte order mark; ``first_line`` is the number of its first line in the file.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def decoded(content: bytes, first_line: int = 1) -> str:
 
 
 def separator_of(header: str, names: Collection[str]) -> str:
-    """Return the separator with which a header has most of these names; the comma if all have equally many."""
+    """Return the separator that gives a header most of these names; the comma in a tie."""
     return max(_SEPARATORS, key=lambda separator: len({*_fields_of(header, separator)} & {*names}))
 
 
@@ -70,9 +70,9 @@ def _fields_of(line: str, separator: str) -> tuple[str, ...]:
 
 
 def split(text: str, names: Collection[str], *, comment: str = "") -> TextTable:
-    """Return the rows of a table; the names that its columns may have tell the separator.
+    """Return the rows of a table; the permitted column names determine the separator.
 
-    Lines that begin with ``comment`` are left out.
+    Lines that begin with ``comment`` are ignored.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def split(text: str, names: Collection[str], *, comment: str = "") -> TextTable:
 
 
 def wrong_length(fields: Sequence[str], columns: int) -> str:
-    """Return what is wrong with the number of a row's fields, "" if nothing is; empty ones at its end do not count."""
+    """Return what is wrong with a row's number of fields, or ""; empty fields at its end are ignored."""
     if len(fields) < columns:
         return f"has {counted(len(fields), 'field')}, fewer than the {columns} of the header"
     if any(fields[columns:]):
@@ -132,7 +132,7 @@ def decimal_sign_of(lines: Iterable[Line], places: Collection[int]) -> str:
 
 
 def number_in(field: str, decimal_sign: str = ".") -> float | None:
-    """Return the finite number that a field holds, or None."""
+    """Return the finite number in a field, or None."""
     plain = field if decimal_sign == "." else field.replace(decimal_sign, ".")
     if _NUMBER.fullmatch(plain) is None:
         return None

@@ -12,19 +12,19 @@ _SETTINGS_NAME: Final = "machine.json"
 
 
 def user_folder() -> Path:
-    """Return where the user's settings of this program are; it need not exist yet."""
+    """Return the folder of the user's settings of this program, which need not exist yet."""
     if own := os.environ.get(FOLDER_VARIABLE):
         return Path(own)
     return user_config_path("liquid-study", appauthor=False, roaming=True)
 
 
 def data_folder() -> Path:
-    """Return where the program keeps drafts and earlier contents of studies; it need not exist yet."""
+    """Return the folder of drafts and earlier contents of studies, which need not exist yet."""
     if own := os.environ.get(_DATA_VARIABLE):
         return Path(own)
     return user_data_path("liquid-study", appauthor=False)
 
 
 def settings_file() -> Path:
-    """Return where the settings of this machine are, or would be."""
+    """Return the settings file of this machine, which need not exist yet."""
     return user_folder() / _SETTINGS_NAME

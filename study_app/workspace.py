@@ -27,12 +27,12 @@ class Workspace:
 
     @property
     def protocols(self) -> Path:
-        """The studies and liquid files made here."""
+        """The folder of the workspace's studies and liquid files."""
         return self.folder / "protocols"
 
     @property
     def results(self) -> Path:
-        """The folder that holds the studies' folders."""
+        """The folder that contains the studies' results folders."""
         return self.folder / "results"
 
     def own_protocols(self) -> tuple[Path, ...]:
@@ -41,19 +41,19 @@ class Workspace:
 
 
 def workspace() -> Workspace:
-    """Return the workspace: the one that was chosen, else the one that is offered."""
+    """Return the workspace that was chosen, or the suggested one."""
     return chosen_workspace() or offered_workspace()
 
 
 def chosen_workspace() -> Workspace | None:
-    """Return the workspace of the environment or of the user's settings; None where none was chosen."""
+    """Return the workspace of the environment or of the user's settings; None if none was chosen."""
     if folder := os.environ.get(WORKSPACE_VARIABLE) or _setting():
         return Workspace(Path(folder))
     return None
 
 
 def offered_workspace() -> Workspace:
-    """Return the workspace to offer at the first start."""
+    """Return the workspace to suggest at the first start."""
     here = Workspace(Path.cwd())
     if here.protocols.is_dir() and here.results.is_dir():
         return here
@@ -61,7 +61,7 @@ def offered_workspace() -> Workspace:
 
 
 def _setting() -> str | None:
-    """Return what the settings file says; a file that cannot be used says nothing (`store.workstation` reports it)."""
+    """Return the workspace in the settings file; None if the file is unusable (`store.workstation` reports it)."""
     try:
         document = json.loads(settings_file().read_bytes())
         folder = setting_of(document) if isinstance(document, dict) else None
@@ -71,7 +71,7 @@ def _setting() -> str | None:
 
 
 def setting_of(settings: Mapping[str, Any]) -> Any:
-    """Return the workspace that a settings file holds; of an earlier one the folder above its ``results``."""
+    """Return the workspace in a settings file; for an earlier one the folder above its ``results``."""
     earlier = settings.get("results")
     if "workspace" not in settings and isinstance(earlier, str) and Path(earlier).name == "results":
         return str(Path(earlier).absolute().parent)

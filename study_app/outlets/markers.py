@@ -68,8 +68,8 @@ LOW_S: Final = 0.004
 class Marker:
     """An event for other programs.
 
-    ``time_ns`` is when it happened on the servo's clock, ``t_s`` the same on the session's, which the journal has.
-    ``byte`` is its trigger code, None of an event without one.
+    ``time_ns`` is its time on the servo's clock, ``t_s`` that on the session's, as in the journal. ``byte`` is its
+    trigger code, None for an event without one.
     """
 
     event: str

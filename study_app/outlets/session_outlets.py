@@ -31,9 +31,9 @@ class SampledServo(Protocol):
 class OutletStatus:
     """The state of an outlet, for the pre-flight.
 
-    ``listens`` tells whether a program receives it, None if unknown; ``lost`` why it does not work, empty if it does.
-    ``withheld`` tells that it is off because the study is double-blind, ``shows_force`` that it shows the force in a
-    double-blind study.
+    ``listens`` tells whether a program receives it, None if unknown; ``lost`` is the reason why it does not work, or
+    "". ``withheld`` means that it is off because the study is double-blind, ``shows_force`` that it shows the force in
+    a double-blind study.
     """
 
     title: str
@@ -77,7 +77,7 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
 
 
 class Outlets:
-    """What a session sends to other programs: markers to sinks, by their addresses, and samples; `mark` never waits."""
+    """The outlets of a session: markers to sinks, by their addresses, and samples; `mark` never waits."""
 
     def __init__(self, addresses: Sequence[str], samples: SampleChoice, servo: SampledServo, blinding: str) -> None:
         self._failed: dict[str, str] = {}
@@ -95,7 +95,7 @@ class Outlets:
 
     @contextmanager
     def _failing(self, title: str) -> Iterator[None]:
-        """Store why an outlet cannot be opened, for any error: no session depends on it."""
+        """Store the reason if an outlet cannot be opened, whatever the error, since no session depends on it."""
         try:
             yield
         except OutletError as error:

@@ -51,7 +51,7 @@ def library() -> Any:
 
 
 def stream_info(lsl: Any, name: str, kind: str, labels: Sequence[str], rate_hz: float, form: str) -> Any:
-    """Return the description of a stream: its name, its channels and the sender; no data of a session.
+    """Return the description of a stream: its name, its channels and the sender, without session data.
 
     ``labels`` are those of the channels, followed by a blank and the unit if there is one.
     """
@@ -187,7 +187,7 @@ class SampleStream:
         self._outlet = None
 
     def send_new(self) -> None:
-        """Send the samples since the last time; called in the stream's thread."""
+        """Send the samples since the previous call; called in the stream's thread."""
         samples = self._reader.read()
         if self._reader.dropped:
             self.lost = f"{counted(self._reader.dropped, 'sample')} not sent in time: this computer is too busy"

@@ -37,7 +37,7 @@ def is_installed() -> bool:
 
 
 def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **options: str) -> Any:
-    """Return an open container of PyAV with a video in it; ``kind`` is a name of FFmpeg's for a device or format."""
+    """Open a source with PyAV and return its container; ``kind`` is FFmpeg's name of a device or format."""
     try:
         import av  # noqa: PLC0415 - an optional extra
         from av.error import FFmpegError  # noqa: PLC0415

@@ -7,7 +7,7 @@ from study_app.errors import VideoError
 
 
 def stopped_error(why: str) -> VideoError:
-    """Return the error of a source that fails in a trial, without its name, which would reveal the condition."""
+    """Return the error about a source that failed in a trial, without its name, which would reveal the condition."""
     return VideoError(f"a video of the study stopped ({why}): check camera and files")
 
 
@@ -62,7 +62,7 @@ class VideoSource(Protocol):
 
 
 class VideoStatistics:
-    """Statistics of the painted frames of a video; without a frame there are none."""
+    """Statistics of the painted frames of a video."""
 
     def __init__(self) -> None:
         self._number: int | None = None
@@ -71,7 +71,7 @@ class VideoStatistics:
         self._ages_ns: list[int] = []
 
     def frame(self, painted_ns: int, video: VideoFrame, delay_s: float) -> None:
-        """Add the video frame that was painted at a time [ns], with the delay requested then [s]."""
+        """Add the video frame that was painted at a time [ns], with the delay requested at that time [s]."""
         if video.number == self._number:
             return
         error_ns = painted_ns - video.due_ns - round(delay_s * 1e9)

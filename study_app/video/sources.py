@@ -195,7 +195,7 @@ def without_login(source: str) -> str:
 
 
 class _Numbers:
-    """Number the frames of a camera, including lost ones."""
+    """Numbers the frames of a camera, including lost ones."""
 
     def __init__(self, period_ns: int) -> None:
         self.period_ns = period_ns
@@ -204,7 +204,7 @@ class _Numbers:
         self._gaps_s: deque[float] = deque(maxlen=_COUNTED)
 
     def of(self, stamp_s: float | None) -> int:
-        """Return the number of a frame with this time stamp [s]; without one, the number after the last."""
+        """Return the number of a frame with this time stamp [s]; without one, the next number."""
         missed = 0
         if stamp_s is not None and self._before_s is not None and (gap_s := stamp_s - self._before_s) > 0:
             self._gaps_s.append(gap_s)

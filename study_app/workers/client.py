@@ -75,7 +75,7 @@ class WorkerClient(Generic[Order, Answer]):
     def answers(self, wait_s: float = 0.0) -> list[tuple[int, Answer | Refused | Crashed]]:
         """Return the answers since the last call, with the numbers of their orders.
 
-        The last answer to an order is what its task returns, `Refused`, or `Crashed` if the process ended.
+        The last answer to an order is the result of its task, `Refused`, or `Crashed` if the process ended.
 
         Parameters
         ----------

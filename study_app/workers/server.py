@@ -49,7 +49,7 @@ class Refused:
 class Crashed:
     """The process ended before it had carried out the order.
 
-    ``exit_code`` is negative where a signal ended it, 1 where the terminal shows an exception.
+    ``exit_code`` is negative if a signal ended it, 1 if the terminal shows an exception.
     """
 
     exit_code: int | None
