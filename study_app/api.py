@@ -156,7 +156,7 @@ def load(study: str | Path) -> Protocol:
     Parameters
     ----------
     study : str or Path
-        Its file, or the name of one that ships or lies in the workspace.
+        Its file, or the name of a shipped study or of one in the workspace.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def simulate_force(
         A programmed path (``"circle"``, ``"line"``, ``"stop"`` …), a CSV file, or times (n,) [s] and positions (n, 3)
         [m, scene], one row per tick.
     **parameters
-        Values that differ from the file's, such as ``viscosity_pa_s=2.0``.
+        Values that override the file's, such as ``viscosity_pa_s=2.0``.
 
     Returns
     -------
@@ -249,14 +249,14 @@ def fit(
     Parameters
     ----------
     trials : DataFrame
-        Columns ``level`` and ``success`` (bool) in the order of the trials; perhaps ``participant``, ``session``,
+        Columns ``level`` and ``success`` (bool) in trial order; optionally ``participant``, ``session``,
         ``standard`` and ``arrangement`` (``"CS"``: the comparison came first).
     levels : tuple of float
-        The smallest and the largest level that could be presented.
+        The smallest and the largest possible level.
     design : str
-        Kind of the design, such as ``"2ifc"`` or ``"yesno"``: it gives the guess rate.
+        Kind of the design, such as ``"2ifc"`` or ``"yesno"``, which determines the guess rate.
     spacing : str
-        Whether levels are evenly spaced in their logarithm or in themselves.
+        Whether levels are evenly spaced logarithmically or linearly.
     distances : bool
         Whether a level is the distance from a standard, so that 0 is chance.
 
@@ -269,7 +269,7 @@ def fit(
     Raises
     ------
     AnalysisError
-        A column is missing or has other values, the design has no threshold, or the levels are not possible.
+        A column is missing or has invalid values, the design has no threshold, or the levels are invalid.
 
     Notes
     -----
@@ -325,7 +325,7 @@ def unblind(results: str | Path, *, by: str, reason: str) -> None:
     Raises
     ------
     StudyError
-        The key cannot be opened; or it was, and names the files that could not be written: unblind again.
+        The key cannot be opened; or it was opened, but the named files could not be written, so repeat the call.
     """
     from study_app.store.unblinding import unblind_folder
 
@@ -362,7 +362,7 @@ class Session:
     Attributes
     ----------
     folder : Path
-        Where it is stored.
+    The folder in which it is stored.
     """
 
     folder: Path
@@ -422,15 +422,15 @@ def open_session(
     results : str or Path
         The study folder.
     seed : int
-        All randomness of a new session comes from it.
+        Seed of all randomness of a new session.
     session : int
         The number of the participant's session.
     device : str
         A device that moves by itself.
     answer : callable, optional
         An observer: called with a `Question`, it returns the answer, answers by item id, or None for those of the
-        built-in simulated participant. Where a level is set (adjustment) it is called twice a second with the task, and
-        returns by how many steps the level is changed, above 0 towards more, or 0 to confirm it.
+        built-in simulated participant. In an adjustment it is called twice a second with the task, and returns the
+        number of steps by which the level changes, positive towards more, or 0 to confirm it.
     recordings : bool
         Whether every tick of the servo is stored.
     group : str, optional
@@ -441,8 +441,8 @@ def open_session(
     Raises
     ------
     StudyError
-        The study, the id, the group or the folder cannot be used, the session was completed or is a participant's, or
-        an answer is not permitted.
+        The study, the id, the group or the folder cannot be used, the session was completed or belongs to a real
+        participant, or an answer is not permitted.
     """
     from study_app.protocol.load import load, parse, source_bytes
     from study_app.session.simulated import rehearsal
@@ -524,7 +524,7 @@ class ForceLoop:
         Raises
         ------
         StudyError
-            A person moves the device, or the motion cannot be used.
+            A person moves the device, or the motion is invalid.
         """
         from study_app.devices.hand import hand_of
 
@@ -576,7 +576,7 @@ def open_force(
     scene : str or Path
         File or name of a study, or of a file of liquids.
     device : str
-        Such as ``"falcon"``; by default a simulated hand.
+        Name of the device, such as ``"falcon"``; by default a simulated hand.
     force_limit_n : float, optional
         The greatest force [N], above 0 and at most that of the file.
     options : mapping, optional

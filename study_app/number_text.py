@@ -77,7 +77,7 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
     Raises
     ------
     ValueError
-        There is no word, or one is not a number, or has a comma or space that may be in one number or between two.
+        The list is empty, a word is not a number, or a comma or space could be within a number or between two.
     """
     words = [word for part in _APART.split(text) if (word := part.removesuffix(unit))]
     if not words:

@@ -30,19 +30,19 @@ def export(
 
     Parameters
     ----------
-    extras : what is written in addition
-        "wide": the answers, a row a participant; "parquet": the tables as Parquet; "sav": the answers, long and wide,
-        for SPSS; "psych-ds": a folder to share that keeps the rules of Psych-DS: all tables, report, script
-        and the study's file.
+    extras : additional outputs
+        "wide": the answers, one row per participant; "parquet": the tables as Parquet; "sav": the answers, long and
+        wide, for SPSS; "psych-ds": a folder to share that conforms to Psych-DS: all tables, report, script and the
+        study's file.
     progress : callable, optional
-        Is called with what is being done and which share of all is done (0 to 1); what it raises ends the export.
+        Called with the current activity and the fraction done (0 to 1); an exception that it raises ends the export.
     failed : callable, optional
-        Is called with a line for every section of the report to share that could not be computed.
+        Called with a line for every section of the shared report that could not be computed.
 
     Raises
     ------
     AnalysisError
-        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
+        The results cannot be evaluated, or ``to`` cannot be written; nothing was written.
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """

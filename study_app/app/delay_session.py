@@ -126,15 +126,15 @@ def measure_delays(
 
     Parameters
     ----------
-    load : besides the participant's window alone the same again with "gui": the operator's window plotting, "gui+cpu":
-        and a busy process on every core; "none": no more
+    load : in addition to a run with the participant's window only, a run with "gui": the operator's window plotting;
+        "gui+cpu": and a busy process on every core; "none": no further run
 
     Raises
     ------
     StudyError
-        Seconds out of range; or the session broke.
+    The seconds are out of range, or the session broke.
     DisplayError
-        A window cannot be opened here.
+    No window can be opened here.
     """
     if not LEAST_S <= seconds <= MOST_S:
         raise StudyError(f"each delay is shown for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
@@ -262,7 +262,7 @@ class WindowsThread(QObject):
     Raises
     ------
     DisplayError
-        Windows are to be painted, and none can be opened here.
+    No window can be opened here, although the load requires one.
     """
 
     _asked = Signal(object)

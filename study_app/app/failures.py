@@ -34,7 +34,7 @@ class UncaughtExceptions:
 
     Parameters
     ----------
-    handle : is called with each exception; if it returns False, the ``previous`` hook is called too
+    handle : called with each exception; if it returns False, the ``previous`` hook is called, too
     """
 
     def __init__(self, handle: Callable[[BaseException], bool]) -> None:

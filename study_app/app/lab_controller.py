@@ -127,7 +127,7 @@ class LabOpening(QObject):
 
     Parameters
     ----------
-    open_live : opens a device by its name, as ``lab.live.open_live`` does
+    open_live : opens a device by its name, like ``lab.live.open_live``
     options : values of devices' options, by name
     """
 
@@ -240,7 +240,7 @@ class _LabSaving(QObject):
         Raises
         ------
         ProtocolError
-            Every problem of the file.
+        Lists every problem of the file.
         """
         choices = liquids_of(str(path))
         self.liquids = (*(it for it in self.liquids if it not in choices), *choices)
@@ -285,11 +285,11 @@ class LabController(QObject):
 
     Parameters
     ----------
-    place : the widgets; this ends with them
-    device, options : the device it begins with, and the values of devices' options, by name
-    open_live, make_appraiser : what opens a device by its name, what begins the process that appraises
-    chance : what a blinding is drawn from
-    bench, liquids : what it begins with, and the liquids that can be chosen
+    place : the widgets; the controller's lifetime is theirs
+    device, options : the initial device, and the values of devices' options, by name
+    open_live, make_appraiser : functions that open a device by its name, and start the appraising process
+    chance : random generator for blind comparisons
+    bench, liquids : the initial workbench, and the liquids that can be chosen
     """
 
     def __init__(

@@ -39,7 +39,7 @@ class FrameBudget:
 
     Parameters
     ----------
-    works : what is to be done and how often [s], the most urgent first
+    works : the tasks with their periods [s], the most urgent first
     """
 
     def __init__(

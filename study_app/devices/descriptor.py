@@ -121,9 +121,9 @@ class DeviceDescriptor:
     ----------
     name : for ``--device``, receipts and folders: lowercase letters, digits and hyphens
     title : displayed name
-    icon : of the theme
+    icon : name of its icon in the theme
     kind : with force, visual only, or not used by participants
-    degrees_of_freedom : of the motion it measures
+    degrees_of_freedom : number of measured degrees of freedom
     open : returns the device, open
     probe : returns all connections to it, without opening it
     argument : permitted text after its name and a colon, such as "SERIAL"; "" if none

@@ -155,7 +155,7 @@ class FramedDevice(Device):
         Raises
         ------
         DeviceError
-            It is not connected or cannot be used; nothing is left open.
+        The device is not connected or cannot be used; nothing is left open.
         """
         if self.connection is not None:
             if self.exchange.ended == RUNS:
@@ -299,7 +299,7 @@ def examine(
 
     Parameters
     ----------
-    name : as ``--device`` takes it
+    name : its name as for ``--device``
     options : values of its options, by name
     faults : of an emulated device
     progress : receives instructions, one line at a time
@@ -308,7 +308,7 @@ def examine(
     Raises
     ------
     DeviceError
-        It cannot have faults, or not these.
+    The device cannot have faults, or not these ones.
     """
     request = OpenRequest(argument=name.partition(":")[2], options=options or {}, progress=progress)
     device = framed_device(name, request)

@@ -38,9 +38,9 @@ class Guard:
 
     Parameters
     ----------
-    name : of the device, for messages
+    name : name of the device, for messages
     ends_force : "MODULE:FUNCTION" of a function that opens the device and ends its force, or raises ``DeviceError``
-    arguments : of this function
+    arguments : arguments of this function
     died : called in a separate thread if the guard ends before it is dismissed: then no force may be sent
     """
 
@@ -58,7 +58,7 @@ class Guard:
         Raises
         ------
         DeviceError
-            It does not start: no force may be sent.
+        The guard does not start, so no force may be sent.
         """
         if self.child is not None:
             return

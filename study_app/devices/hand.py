@@ -198,7 +198,7 @@ class HandOrders:
     Parameters
     ----------
     state : record with the fields ``hand`` (``hand.HAND``), ``handle`` (``plant.HANDLE``) and ``buttons``
-    workspace_m : half extents of the hand's range of motion [m]; a place outside counts as its border
+    workspace_m : half extents of the hand's range of motion [m]; positions outside are moved to its border
     """
 
     def __init__(self, state: Any, workspace_m: tuple[float, float, float]) -> None:
@@ -240,7 +240,7 @@ class HandOrders:
         Raises
         ------
         DeviceError
-            The motion is empty, of other shapes, not finite, or its times do not increase.
+            The motion is empty, has wrong shapes, is not finite, or its times do not increase.
         """
         try:
             times, places = np.asarray(t_s, np.float64), np.asarray(position_m, np.float64)

@@ -80,7 +80,7 @@ def open_device(name: str, **request: Any) -> Device:
     DeviceNotFound
         No device has this name, or none is connected.
     DeviceError
-        It is connected but cannot be used, or it does not have an option.
+    The device is connected but cannot be used, or it does not have an option.
     """
     device = descriptor_of(name)
     asked = OpenRequest(**request)
@@ -103,7 +103,7 @@ def doctor_of(name: str) -> Doctor:
     DeviceNotFound
         No device has this name.
     DeviceError
-        It has no diagnosis.
+    The device has no diagnosis.
     """
     doctor = descriptor_of(name).doctor
     if doctor is None:
@@ -117,14 +117,14 @@ def check_options(name: str, options: Iterable[str]) -> None:
 
     Parameters
     ----------
-    options : their names
+    options : names of the options
 
     Raises
     ------
     DeviceNotFound
         No device has this name.
     DeviceError
-        It does not take one of them.
+    The device does not have one of these options.
     """
     taken = {option.name for option in descriptor_of(name).options}
     for option in options:

@@ -52,7 +52,7 @@ class Rig:
         Raises
         ------
         StudyError
-            It is not there, cannot be opened, or hangs; the force is zero, and this may be called again.
+            The device is missing, cannot be opened, or hangs; the force is zero, and the call may be repeated.
         """
         self.servo.stop_force()
         self.servo.stop()
@@ -130,14 +130,14 @@ def open_rig(
 
     Parameters
     ----------
-    clock : default: the system's; on a virtual one the servo is not started, but advanced by its user
+    clock : default: the system's; on a virtual one the servo is not started, but advanced by the caller
     progress : receives the device's requests while it is opened, one line at a time
     cancelled : returns whether to stop opening it
 
     Raises
     ------
     StudyError
-        It cannot be opened; then nothing is left open.
+    The device cannot be opened; nothing is left open.
     """
     from study_app.haptics.runtime.servo import Servo  # noqa: PLC0415 - the compiler: only once it is needed
 

@@ -47,7 +47,7 @@ class SimulatedDevice(HandOrders, Device):
     Parameters
     ----------
     workspace_m : half extents of the end stops [m]
-    force_limit_n : the greatest force it may be asked for [N]
+    force_limit_n : the greatest force that may be commanded [N]
     """
 
     name = ""
@@ -186,7 +186,7 @@ class ScriptedDevice(SimulatedDevice):
 
     Parameters
     ----------
-    random : random numbers for frequencies and phases of the tremor; None: always the same ones
+    random : random numbers for frequencies and phases of the tremor; None: fixed ones
     tremor_m : amplitude of each of the tremor's three waves per axis [m]; 0: no tremor
     quantum_m : one count of the encoders [m]; 0: exact
     """

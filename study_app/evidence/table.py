@@ -118,7 +118,7 @@ def check_seconds(seconds: float, what: str) -> None:
     Raises
     ------
     StudyError
-        It is.
+        The duration is out of range.
     """
     if not _LEAST_S <= seconds <= _MOST_S:
         raise StudyError(f"{what} for {_LEAST_S:g} to {_MOST_S:g} s, not {seconds:g}")

@@ -179,7 +179,7 @@ class Live:
         Raises
         ------
         StudyError
-            No such path, or no setting is presented yet.
+        There is no such path, or no setting is presented yet.
         """
         self.path, self._ghost = None, None
         if name is None:
@@ -334,14 +334,14 @@ def open_live(
 
     Parameters
     ----------
-    options : values by name; those that the device takes are used
+    options : values of options by name; those of other devices are ignored
     progress : receives the device's requests while it is opened
     cancelled : returns whether to stop opening it
 
     Raises
     ------
     StudyError
-        It cannot be opened; then nothing is left open.
+    The device cannot be opened; nothing is left open.
     """
     taken = {option.name for option in descriptor_of(name).options}
     settings = RigSettings(

@@ -58,14 +58,14 @@ class TrialFeatures:
     speed_rms_mps
         Root mean square of the hand's (estimated, not differenced) speed [m/s].
     push_share
-        Share, 0 to 1, of the force's power that went along the motion: Σ of positive F·v over Σ |F·v|. Drag alone gives
-        0, a wake that carries the hand more.
+        Share, 0 to 1, of the force's power along the motion: Σ of positive F·v over Σ |F·v|. It is 0 for pure drag,
+        and larger for a wake that carries the hand.
     roughness_n
         Root mean square of the change of the force from one tick to the next [N].
     delay_s
-        Mean age of what was drawn, when it was drawn [s].
+        Mean age of the drawn position when it was drawn [s].
     force_delay_s
-        How late the force was sent [s]; 0 in studies that do not delay it.
+    Delay of the force [s]; 0 in studies that do not delay it.
     """
 
     force_mean_n: float
@@ -201,13 +201,13 @@ def simulate_ratings(
     items : sequence of str
         Ids of the statements.
     trials : sequence of sequence of TrialFeatures
-        What was felt in each condition, of which one trial is drawn each time.
+    Trials of each condition, from which one is drawn for each presentation.
     repetitions : int
-        Of each condition.
+    Number of presentations of each condition.
     person : Rater
-        Who answers.
+    The simulated person.
     random : random.Generator
-        Where trials and noise are drawn from.
+    Random generator for trials and noise.
 
     Returns
     -------
@@ -230,11 +230,11 @@ class Observer:
     Attributes
     ----------
     weber_fraction : float
-        Of resistance, at 75 % correct in two intervals without lapses.
+    Weber fraction of resistance, at 75 % correct in two intervals without lapses.
     delay_jnd_s : float
-        Of a delay, likewise [s].
+    Just noticeable delay, likewise [s].
     person : Person
-        In what else the observer differs from others.
+    The other individual parameters of the observer.
     estimates : tuple of float, optional
         Exponent of estimates over resistance, and the standard deviation of their logarithm; None: 1/2 of the noisy
         resistance.
@@ -427,13 +427,13 @@ def simulate_study(
     protocol : Protocol
         The study.
     people : mapping of str to Observer
-        Who answers, by the participant's id.
+    The observers by participant id.
     seed : int
-        Orders, the sealed key and answers follow from it.
+    Seed of orders, the sealed key and answers.
     study : str
-        Names the draws, so that one seed gives many independent studies.
+    Name of the random streams, so that one seed gives many independent studies.
     sense : callable
-        Returns what an observer attends to in an interval.
+    Returns the perceived quantity of an interval.
     """
     random = stream(seed, study).random
     key = Key(draw_key(protocol, random), draw_secret(random))

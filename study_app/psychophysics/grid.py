@@ -50,8 +50,8 @@ class Grid:
     guesses : tuple of float or None
         Guess rates, of equal prior weight; None: the guess rate equals the lapse rate.
     session_sd : tuple of float
-        Standard deviation of a person's threshold from one session to the next: a constant part [u], and a part that
-        is a share of the threshold.
+        Standard deviation of a person's threshold between sessions: a constant part [u], and a part relative to the
+        threshold.
     log : bool
         Whether u is the logarithm of a level.
     """
@@ -272,7 +272,7 @@ class GroupPriors(NamedTuple):
     factors : (people, widths, lapses) array
         The prior of width and lapse rate that follows from the answers of the others, over that of their grid.
     variance : float
-        Mean square error of the mean of the people's thresholds that is due to what they share [u²].
+        Mean square error of the group's mean threshold due to common parameters [u²].
     below, above : float
         How far the 95 % interval of this error extends below and above [u].
     if_many_lapses : float or None
@@ -298,9 +298,9 @@ def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
     Parameters
     ----------
     flat : sequence of Posterior
-        Of each person, over the same grid, under a flat prior on the width.
+        Posterior of each person, on the same grid, with a flat prior on the width.
     width_prior : tuple of float
-        Median and factor of the width of one person of whom nothing is known.
+        Median and factor of the width prior of a person in an unknown group.
     """
     grid = flat[0].grid
     thresholds, widths = np.array(grid.thresholds), np.log(grid.widths)

@@ -39,7 +39,7 @@ class Person(NamedTuple):
     width : float
         Of the psychometric function, as a share of that of an observer whose d′ is proportional to the level.
     lapse : float
-        Share of answers at random: of k answers, one in k of these is correct.
+    Share of random answers, of which one in k is correct with k alternatives.
     criterion, repeats : float
         Preference for the first interval, and for the last answer [SD of the decision].
     change : float
@@ -141,8 +141,8 @@ class Expected:
     threshold : float
         Approximate threshold, as a level; or the assumed d′, d_a or exponent.
     shared : mapping of str to float
-        For each kind the variance of a group's mean that is due to the width and the lapse rate that its people share,
-        times their number: that of 20 is about half that of 10.
+        For each kind the variance of a group's mean due to common width and lapse rate, multiplied by the number of
+        people: that of 20 is about half that of 10.
     """
 
     spacing: Literal["log", "linear"]
@@ -179,7 +179,7 @@ class Expected:
         Parameters
         ----------
         participants : int
-            Their number; the result is infinite below two.
+        Number of participants; the result is infinite below two.
         trials : float, optional
             Of each standard; variances of errors are taken to be inversely proportional to their number. What people
             share is an error that the standards have in common.

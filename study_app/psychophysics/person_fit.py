@@ -54,13 +54,13 @@ class Given(NamedTuple):
     levels : (k,) array
         The levels presented, ascending, in the coordinate u.
     places : (n,) array
-        Of each trial the index of its level.
+    Index of the level of each trial.
     successes : (n,) array of bool
         Whether answers are successes.
     towards, before : (n,) array
-        The correct answer, and the one before: 1 the first of two intervals, −1 the second, 0 none of them.
+        The correct answer, and the previous answer: 1 the first of two intervals, −1 the second, 0 neither.
     done : (n,) array
-        The share of the trials that is done, from 0 to 1.
+    The fraction of trials done, from 0 to 1.
     """
 
     levels: Floats
@@ -113,14 +113,14 @@ class PersonFit:
     given : Given
         The answers.
     shifts : (n,) array
-        How far a preference moves each decision towards the correct answer [SD].
+    Shift of each decision towards the correct answer due to a preference [SD].
     change : float
-        By how much the threshold rises from the first trial to the last, in u: the most probable change.
+        Most probable rise of the threshold from the first trial to the last, in u.
     named : bool
-        Whether the change is beyond chance: the threshold is then uncertain by the standard deviation of one that
-        changes evenly, in addition to how far it is from one session to the next.
+        Whether the change is significant; the threshold's uncertainty then includes the standard deviation of a
+        uniform change, in addition to that between sessions.
     flat : Posterior
-        Without both, under a flat prior on the width; its grid has the prior of the width.
+        The posterior without both, with a flat prior on the width; its grid has the prior of the width.
     """
 
     given: Given

@@ -124,7 +124,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     Raises
     ------
     StoreError
-        It has no recording, or a file cannot be read; `SealedRecording` if it is readable after unblinding.
+        The attempt has no recording, or a file cannot be read; `SealedRecording` if it is readable after unblinding.
     """
     from study_app.store import recordings  # noqa: PLC0415 - pyarrow: only once it is needed
 

@@ -37,8 +37,8 @@ def write_file(path: Path, content: bytes | bytearray, *, waits: bool = True) ->
     Raises
     ------
     StoreError
-        The file cannot be written; names the file and the system's reason. Or it has its new content, and only the
-        folder's entry could not be flushed: then the message says so.
+        The file cannot be written, for the reason in the message; or, as the message says, it was written, but the
+        folder's entry could not be flushed.
     """
     with _temporary_file(path, path) as half:
         write_new_file(half, content, waits=waits)
@@ -104,7 +104,7 @@ def make_folder(path: Path, *, waits: bool = True) -> None:
     Raises
     ------
     StoreError
-        It cannot be made.
+    The folder cannot be created.
     """
     path = path.absolute()
     missing = [level for level in (path, *path.parents) if waits and not is_there(level)]
@@ -313,7 +313,7 @@ def refuse_special_files(path: Path) -> None:
     Raises
     ------
     StoreError
-        Names the path and its type.
+    The folder contains such a file; the message names its path and type.
     """
     for inside in (path, *paths_in(path)):
         if inside.is_symlink():
@@ -374,7 +374,7 @@ def parse_json(content: bytes | str) -> Any:
     Raises
     ------
     ValueError
-        It is not JSON, which excludes NaN and Infinity, or is nested too deeply.
+        The text is not JSON, which excludes NaN and Infinity, or is nested too deeply.
     """
     try:
         value = json.loads(content, parse_constant=_refuse_constant)

@@ -161,7 +161,7 @@ def sha256(path: Path) -> str:
     Raises
     ------
     StoreError
-        It cannot be read.
+    The file cannot be read.
     """
     try:
         with open_regular(path) as file:

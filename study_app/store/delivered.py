@@ -85,11 +85,11 @@ def delivered_values(
     protocol : Protocol
         The study.
     presented : Stimulated
-        What was requested.
+    The requested contents of the interval.
     task : AnyTask
         The task that was done.
     samples : array of `JUDGED` (n,)
-        The interval's samples, from the first one that its task took to the one that ended it.
+        The interval's samples, from the first to the last one of its task.
     adjusted : bool
         Whether the participant adjusted the varied number, so that no single value was delivered.
     """
@@ -140,9 +140,9 @@ def delivered_error(
     rate_hz : float
         Samples per second.
     fade_s : float
-        How long the force fades in: the error counts from `_SETTLED_S` later.
+    Fade-in time of the force; the error is evaluated from `_SETTLED_S` later.
     law_n : callable
-        Gives the law's forces (m, 3) [N] at times (m,) [s] of positions and velocities (m, 3) of the hand [m, m/s].
+        Returns the law's forces (m, 3) [N] from times (m,) [s], positions and velocities (m, 3) of the hand [m, m/s].
     """
     samples = _plausible_samples(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
@@ -218,15 +218,15 @@ def broken_trial_limits(
     Parameters
     ----------
     limits : Limits
-        Those of the study.
+    The limits of the study.
     due : Presentation
-        What the trial presented.
+    The presentation of the trial.
     holds : sequence of bool
-        Its arrangement: of each interval whether it presented the comparison.
+    Whether each interval presented the comparison.
     errors_ms : sequence of float or None
-        Of each interval the error of the visual delay, or of that of the force [ms].
+    The error of the visual or force delay in each interval [ms].
     rate_hz : float
-        Ticks per second: the delay of a force may be wrong by one tick more.
+    Ticks per second; a force delay may deviate by one more tick.
     """
     vary = due.intervals[0].vary
     if limits.level_error_ms is None or vary not in DELAYS or len(errors_ms) < len(holds):

@@ -154,7 +154,7 @@ def include(
     Raises
     ------
     StoreError
-        It is not excluded, ``by`` or ``reason`` is empty, or a file cannot be read or written.
+        The session or trial is not excluded, ``by`` or ``reason`` is empty, or a file cannot be read or written.
     """
     by, reason = check_name_and_reason(by, reason, "reversing an exclusion needs a name and a reason")
     study = StudyFolder(folder)

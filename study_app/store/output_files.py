@@ -148,7 +148,7 @@ def write_output(
     Raises
     ------
     AnalysisError
-        They cannot be written; nothing was.
+    The files cannot be written; nothing was written.
     """
     written = write_files(to, files)
     at = datetime.now().astimezone().isoformat(timespec="seconds")

@@ -57,11 +57,11 @@ class Recorder:
     Parameters
     ----------
     folder : Path
-        Where the files go; made when the first is written.
+    The folder of the files, created with the first one.
     facts : mapping
         Metadata of every file.
     secret : bytes, optional
-        What the files are sealed with until the study is unblinded; None: they are not sealed.
+        The key that seals the files until the study is unblinded; None: they are not sealed.
     waits : bool
         Whether `append` waits for room instead of dropping: for rehearsals.
     room : int

@@ -31,10 +31,10 @@ class Run:
     version : str
         Its version.
     sessions, pilots, rehearsals : int
-        How many there are; pilots are marked as such, also those that were played in the study designer and kept;
-        rehearsals are the other sessions on simulated devices.
+    Numbers of sessions; pilots include those that were played in the study designer and kept; rehearsals are
+        the other sessions on simulated devices.
     last : str
-        When the newest began, as ISO 8601.
+    Start of the newest session, as ISO 8601.
     receipt : Path or None
         A receipt that holds the protocol, without its conditions.
     """

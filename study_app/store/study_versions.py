@@ -60,18 +60,18 @@ def save_study(file: Path, text: str, base: str) -> str:
     Parameters
     ----------
     file : Path
-        The protocol file; its permissions stay, and a link stays a link.
+        The protocol file; permissions and links are preserved.
     text : str
-        The whole text, with its own line breaks.
+    The whole text with its line endings.
     base : str
         `content_hash` of the content that the text was edited from; "" for a new file.
 
     Raises
     ------
     ChangedOutsideError
-        The file has another content than ``base``, or is already there.
+        The content of the file differs from ``base``, or a new file already exists.
     StoreError
-        It cannot be written, or another program saves it at this moment.
+        The file cannot be written, or another program is saving it.
     """
     target, source = file.resolve(), text.encode()
     with _locked_file(file):

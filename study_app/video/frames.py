@@ -24,9 +24,9 @@ class VideoFrame:
     pixels : buffer
         Rows of 32-bit pixels: blue, green, red, unused.
     due_ns : int
-        Its display time without a delay [ns, servo's clock]: when it was ready, or its time in the footage.
+        Display time without a delay [ns, servo's clock]: when it was ready, or its time in the footage.
     age_ns : int or None
-        Age of the picture then, by the source's time stamps; None if unknown, 0 for footage.
+    Age of the picture at that time, by the source's time stamps; None if unknown, 0 for footage.
     period_ns : int
         Time from one frame of the source to the next.
     """

@@ -410,7 +410,7 @@ class Videos:
         Raises
         ------
         VideoError
-            It cannot be opened; without the name of the source, which would reveal the condition.
+            A video cannot be opened; the message omits the name of the source, which would reveal the condition.
         """
         if self.open().fault:
             raise VideoError("a video of the study cannot be opened: check camera and files")

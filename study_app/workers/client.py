@@ -80,7 +80,7 @@ class WorkerClient(Generic[Order, Answer]):
         Parameters
         ----------
         wait_s : float
-            How long to wait for the first one [s].
+        Maximum time to wait for the first answer [s].
         """
         if self._closed:
             return []

@@ -30,7 +30,7 @@ def open_executor(workers: Workers = Workers()) -> Executor:
     Raises
     ------
     WorkerError
-        No cluster is at this address. The ``with`` block raises it where a process, or the cluster, was lost.
+        There is no cluster at this address. The ``with`` block raises it if a process, or the cluster, was lost.
     """
     from study_app.workers.cases import ClusterExecutor, ProcessExecutor  # noqa: PLC0415
 

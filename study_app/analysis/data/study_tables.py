@@ -323,8 +323,8 @@ def load_study(folder: Path, *, planned: bool = True) -> Study:
     Raises
     ------
     AnalysisError
-        The folder holds no sessions, a file in it is missing, damaged or of another study, or what is excluded is not
-        there: says which, where in it, and what to do.
+        The folder holds no sessions, a file in it is missing, damaged or of another study, or an excluded session or
+        trial does not exist; the message names the place and the remedy.
     StoreError
         The key was opened, and is now missing or changed; ``exclusions.csv`` cannot be read; or the folder of a site
         is missing.

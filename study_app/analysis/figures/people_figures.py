@@ -73,13 +73,13 @@ class Panel:
 
     Parameters
     ----------
-    title : what stands above it
-    places : of the columns on a numeric axis; without them columns are equally far apart
+    title : its heading
+    places : positions of the columns on a numeric axis; without them columns are evenly spaced
     joined : whether the points of a participant are joined
     share : its width as a share of all panels of a row
-    line, bound : a number, and the ends of a range, that are marked
+    line, bound : a number, and the ends of a range, to be marked
     log : whether the scale is logarithmic
-    ends : of the scale; without them from the numbers
+    ends : ends of the scale; by default from the numbers
     """
 
     title: str = ""
@@ -146,9 +146,9 @@ def draw_people(
 
     Parameters
     ----------
-    above, below : what the scale at the left shows, and what the columns are
-    members : the group of each participant, which has a colour and a marker
-    shared : whether all panels have one scale
+    above, below : the titles of the scale at the left and of the columns
+    members : the group of each participant, which determines colour and marker
+    shared : whether all panels have a common scale
     """
     groups = sorted(set((members or {}).values()))
     panel_pt = _PANEL_PT if len(panels) <= _A_ROW else _SMALL_PANEL_PT if len(panels) <= 2 * _A_ROW else _LEAST_PANEL_PT

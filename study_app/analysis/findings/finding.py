@@ -371,20 +371,20 @@ class Finding(Generic[R]):
     row_place : float
         Its place in tests.csv.
     what : str
-        What names it where it fails or is missing; empty where nothing is tested, so that there is no value.
+        Its name if it fails or is missing; empty if nothing is tested, so that there is no value.
     kinds, sealed, waits : tuple of str
         The kinds of blocks in which it is tested once the key is open, in which it is tested while the key is sealed,
         and in which it is named as waiting for the key.
     statements : bool
         Whether the value is tests of single statements whose verdicts belong to the limits of the study.
     empty : R
-        The value where nothing was tested.
+    The value if nothing was tested.
     figure_name, figure_title : str
-        The name as a file and the title of its figure; empty where it has none.
+        File name and title of its figure; empty if it has none.
     question : str
-        The question of the first page that it answers ("{kind}": what is compared); empty where it answers none.
+        The question of the first page that it answers ("{kind}": the compared kind); empty if it answers none.
     answer_figures : tuple of str
-        The names of figures that may stand beside the answer; the first that was drawn does.
+        The names of figures that may be shown next to the answer; the first one that was drawn is used.
     """
 
     key: ClassVar[str]

@@ -40,18 +40,18 @@ class LevelStatistic(Generic[R]):
     key : str
         Its name in report.json.
     place : float
-        Its place among the others: statistics with lower places are computed before.
+        Its place in the order: statistics with lower places are computed first.
     since : int
         The first format of the study's file whose report.json has it even if there are no rows.
     compute : callable
-        Returns the rows of a block from the block, the rows of `tracks`, the study, and what was found before.
+        Returns the rows of a block from the block, the rows of `tracks`, the study, and the earlier results.
     title : str
         The heading of its part of the report.
     figures : tuple of str
-        What the figures below its table are called.
+    The names of the figures below its table.
     table : str
         The name of the exported table (CSV, Parquet, SPSS, codebook) in `columns.RESULTS`, whose columns are attributes
-        of rows of participants; empty where it exports none.
+        of rows of participants; empty if none is exported.
     """
 
     key: ClassVar[str]

@@ -754,7 +754,7 @@ def write_power(power: Powers, to: Path) -> tuple[Path, ...]:
     Raises
     ------
     AnalysisError
-        ``to`` cannot be written; nothing was.
+        ``to`` cannot be written; nothing was written.
     """
     files = {"power.md": power_markdown(power).encode(), "power.csv": power_csv(power)}
     for block in power.plan.blocks:

@@ -64,7 +64,7 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
     Raises
     ------
     AnalysisError
-        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
+        The results cannot be evaluated, or ``to`` cannot be written; nothing was written.
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """

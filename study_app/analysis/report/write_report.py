@@ -247,17 +247,17 @@ def report(
     Parameters
     ----------
     progress : callable, optional
-        Is called with what is being done and which share of all is done (0 to 1); what it raises ends the report.
+        Called with the current activity and the fraction done (0 to 1); an exception that it raises ends the report.
     warn : callable, optional
-        Is called with a line for every file that is not as it was recorded, and is used as it is.
+        Called with a line for every file that differs from its recorded state but is used.
     failed : callable, optional
-        Is called with a line for every section that could not be computed: the report says so in its place, and holds
-        everything else.
+        Called with a line for every section that could not be computed; the report says so there, and contains all
+        others.
 
     Raises
     ------
     AnalysisError
-        The results cannot be evaluated, or ``to`` cannot be written; nothing was.
+        The results cannot be evaluated, or ``to`` cannot be written; nothing was written.
     StoreError
         The key was opened, and is now missing or changed; or ``exclusions.csv`` cannot be read.
     """

@@ -81,13 +81,13 @@ def tost(
     Parameters
     ----------
     differences : (participants,) array
-        NaN where an answer is missing: dropped.
+    NaN for a missing answer, which is dropped.
     bound : float
-        In points of the scale.
+    The equivalence bound in scale points.
     alpha : float
         Level of each one-sided test.
     seed : int
-        Of the resamples.
+    Seed of the resamples.
     largest : float
         Largest difference of a participant that the scale permits, in points.
     """

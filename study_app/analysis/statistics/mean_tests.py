@@ -100,14 +100,14 @@ def means_of(
     Parameters
     ----------
     values : (studies, participants) array
-        One number of each of two participants or more. The participant with the smallest has the first random weight,
-        and so on, so that names do not matter; with ``weights`` they must ascend.
+        One number for each of two or more participants. Random weights are assigned by rank, so that names do not
+        matter; with ``weights`` the numbers must ascend.
     weights : (participants,) array, optional
-        Of the participants in the means; by default all are equal.
+    Weights of the participants in the means; by default all are equal.
     seed, group : int
-        Of the resamples; groups that are compared need different numbers.
+    Seed of the resamples; groups that are compared need different group numbers.
     resamples : int
-        How many are drawn.
+    Number of resamples.
     """
     n, values = values.shape[1], np.sort(values, axis=1)
     weights = np.ones(n) if weights is None else weights / weights.mean()

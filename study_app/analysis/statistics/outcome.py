@@ -113,16 +113,16 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     Parameters
     ----------
     looks : tuple of int
-        Participants at each look, ascending.
+    Number of participants at each look, ascending.
     alpha : float
-        Of all looks.
+    Overall error rate.
     spending : "obrien-fleming" | "pocock"
-        How much is spent until a look (Lan & DeMets 1983, Biometrika 70, 659–663).
+    Spending function (Lan & DeMets 1983, Biometrika 70, 659–663).
 
     Notes
     -----
-    The sums of a study's data are a random walk; its density within the bounds of the looks before is integrated
-    numerically (Armitage, McPherson & Rowe 1969, J. R. Stat. Soc. A 132, 235–244).
+    The cumulative sums of a study's data are a random walk; its density within the bounds of earlier looks is
+    integrated numerically (Armitage, McPherson & Rowe 1969, J. R. Stat. Soc. A 132, 235–244).
     """
     shares = np.array(looks) / looks[-1]
     spent = alpha * np.log1p((math.e - 1) * shares)

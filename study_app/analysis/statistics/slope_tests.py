@@ -46,12 +46,11 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     Parameters
     ----------
     values : (participants, settings) array
-        NaN where an answer is missing: such participants are dropped.
+        Participants with NaN, a missing answer, are dropped.
     columns : (settings, columns) array, optional
-        What is tested: numbers for amounts (a delay in units of 100 ms). Without, every setting is compared with the
-        first.
+        The tested contrasts, such as a delay in units of 100 ms. By default every setting is compared with the first.
     direction : "increasing" | "decreasing", optional
-        Of a single slope, where it was stated before: the test is then one-sided.
+        Direction of a single slope that was stated in advance; the test is then one-sided.
     """
     rows, dropped = complete(values, at_least=2, why=" for a test of means")
     design = _design(rows.shape[1], columns)

@@ -77,11 +77,11 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     values : (participants, levels) or (participants, levels, presentations) array
         Answers in points of the scale.
     levels : sequence of float
-        What was presented; equal levels are replicates of one.
+        The presented levels; equal levels are replicates.
 
     Notes
     -----
-    Whether noticing rises with the level at all is asked elsewhere: where it does not, the curve means nothing.
+    Another test decides whether noticing increases with the level; if it does not, the curve is meaningless.
     """
     array = np.asarray(values, float)
     array = checked(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")

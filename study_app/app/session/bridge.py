@@ -163,7 +163,7 @@ class SessionBridge(QObject):
 
     Parameters
     ----------
-    refresh_hz : frames a second of the participant's screen
+    refresh_hz : frames per second of the participant's screen
     """
 
     done = Signal()
@@ -702,7 +702,7 @@ def show_windows(
     Raises
     ------
     DisplayError
-        A screen was removed since the windows were made: the participant's would cover the force stop.
+        A screen was removed after the windows were made, so that the participant's would cover the force stop.
     """
     if not played:
         shown_on, operated_on = screens()

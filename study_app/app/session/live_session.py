@@ -441,17 +441,17 @@ def run(
     device, language : default: the mouse, the protocol's first language
     device_options : values of the device's options, by name
     windowed, screen : where the participant's window opens; screens count from 1
-    results : the study's folder; default ``results/<study>`` of the workspace, of a pilot ``results/<study>-pilot``
-    pilot : to try it out: in a window with a frame, apart from the data and marked
-    row_of : the participant who is replaced, whose order, and place in the group, the session takes; default: nobody
-    group : the participant's pre-existing group; of a participant with an earlier session default: the recorded one
-    recordings : whether every tick of the servo and every frame of a trial is kept
-    progress : is given the lines of the pre-flight, before the first page
+    results : the study's folder; default: ``results/<study>`` in the workspace, for pilots ``results/<study>-pilot``
+    pilot : a trial run in a framed window, marked and stored apart from participants' data
+    row_of : the replaced participant, whose order and place in the group the session gets; default: none
+    group : the participant's pre-existing group; default, if there is an earlier session: the recorded one
+    recordings : whether every tick of the servo and every frame of a trial is recorded
+    progress : called with the lines of the pre-flight, before the first page
 
     Raises
     ------
     StudyError
-        The session could not begin, and then nothing was created; or device or servo failed while it ran.
+        The session could not begin, and nothing was created; or device or servo failed during the session.
     """
     study = load(protocol)
     chosen = NewSession(
@@ -499,14 +499,14 @@ def resume(
 
     Parameters
     ----------
-    protocol : file or name of its protocol; default: looked for among those at hand
-    device : default: the one it began with
+    protocol : file or name of its protocol; default: searched for among the available ones
+    device : default: the device of its start
     device_options, operator, windowed, screen, progress : as for ``run``
 
     Raises
     ------
     StudyError
-        It cannot go on (finished, of a changed protocol, open elsewhere); or device or servo failed while it ran.
+        It cannot be resumed (finished, changed protocol, open elsewhere), or device or servo failed meanwhile.
     """
     folder = Path(session_folder)
     session = locate_session(folder)[1]

@@ -51,7 +51,7 @@ class Excitation:
 
     Attributes
     ----------
-    stiffness_npm, damping_nspm, integral_per_s, centre_m : the spring to a place
+    stiffness_npm, damping_nspm, integral_per_s, centre_m : the spring to a position
     push_n : the constant force, reached at 2 N/s
     axis, wave_n, from_hz, hz_per_s : the chirp; -1: none
     rise_nspm_per_s, most_nspm : the damper

@@ -276,10 +276,10 @@ class EmulatedFalcon(FalconDevice):
 
     Parameters
     ----------
-    random : random numbers for the hand's tremor and the emulator's faults; None: always the same ones
+    random : random numbers for the hand's tremor and the emulator's faults; None: fixed ones
     firmware : file to load into it; without one its program runs already
     emulator : an existing one to use
-    given : of a `FalconDevice`
+    given : arguments of a `FalconDevice`
     """
 
     name = "falcon-emulated"

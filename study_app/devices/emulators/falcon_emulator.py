@@ -272,14 +272,14 @@ class Emulator(HandOrders):
 
     Parameters
     ----------
-    random : random numbers for tremor and faults; None: always the same ones
+    random : random numbers for tremor and faults; None: fixed ones
     geometry : its dimensions, or the name of published ones
     running : whether its program is loaded already
-    serial : of its bridge
-    workspace_m : half extents of where the hand can be sent [m]
+    serial : serial number of its bridge
+    workspace_m : half extents of the hand's range [m]
     tremor_m : amplitude of the tremor's waves [m]; 0: no tremor
     units_per_nm : motor units for an arm torque of 1 N m
-    arm_offset_rad : by how much each arm's encoder was assembled off its zero
+    arm_offset_rad : assembly error of each arm's encoder zero
     """
 
     def __init__(

@@ -93,9 +93,9 @@ class EmulatedForceDimension(ForceDimensionDevice):
 
     Parameters
     ----------
-    random : where the hand's tremor is drawn from; None: always the same one
+    random : random numbers for the hand's tremor; None: fixed ones
     tremor_m : amplitude of the tremor's waves [m]
-    given : of a `ForceDimensionDevice`
+    given : arguments of a `ForceDimensionDevice`
     """
 
     name = "force-dimension-emulated"

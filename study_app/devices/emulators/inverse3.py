@@ -48,9 +48,9 @@ class EmulatedInverse3(Inverse3Device):
 
     Parameters
     ----------
-    random : where the hand's tremor is drawn from; None: always the same one
-    service : another than a new one
-    given : of an `Inverse3Device`
+    random : random numbers for the hand's tremor; None: fixed ones
+    service : an existing service; by default a new one
+    given : arguments of an `Inverse3Device`
     """
 
     name = "inverse3-emulated"

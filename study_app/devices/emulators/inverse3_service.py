@@ -104,7 +104,7 @@ def _state_message(
 
     Parameters
     ----------
-    buttons : of the wireless grip: a is bit 0
+    buttons : pressed buttons of the wireless grip; a is bit 0
     full : its configuration, for an inventory or a full state
     """
 
@@ -185,15 +185,15 @@ class Service(HandOrders):
 
     Parameters
     ----------
-    random : where the hand's tremor is drawn from; None: always the same one
-    workspace_m : half extents of where the hand can be sent [m]
+    random : random numbers for the hand's tremor; None: fixed ones
+    workspace_m : half extents of the hand's range [m]
     tremor_m : amplitude of the tremor's waves [m]
     quantum_m : one count of the encoders [m]
 
     Attributes
     ----------
-    config, status : of the device, as the documentation shows them; may be changed before a client connects
-    force_scale : the answer about the setting devices/force_scale; None: there is none
+    config, status : the device's state as documented; may be changed before a client connects
+    force_scale : the answer about the setting devices/force_scale; None: no answer
     """
 
     def __init__(

@@ -256,9 +256,9 @@ def boot_falcon(
 
     Parameters
     ----------
-    transport : the Falcon's bridge; each attempt but the first opens it anew
+    transport : the Falcon's bridge; each attempt except the first reopens it
     firmware : the bytes of its file
-    attempts : their greatest number
+    attempts : maximum number of attempts
     progress : receives a line about each failed attempt
     """
     image = check_firmware(firmware)

@@ -74,13 +74,13 @@ def fit(
     Parameters
     ----------
     poses : (n, 3) array, encoder counts
-    forces_n : (n, 3) array [N], what pulled at the grip: (0, -weight, 0) of a hung weight
-    units : (n, 3) array, motor units that held it
+    forces_n : (n, 3) array [N], the external force on the grip: (0, -weight, 0) for a suspended weight
+    units : (n, 3) array, motor units that balanced it
 
     Raises
     ------
     DeviceError
-        There are fewer than five poses, the forces are all alike, or the result is impossible for a Falcon.
+        There are fewer than five poses, all forces are equal, or the result is impossible for a Falcon.
     """
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
@@ -163,7 +163,7 @@ def save_calibration(serial: str, calibration: Calibration) -> Path:
     Raises
     ------
     DeviceError
-        It cannot be written.
+    The calibration cannot be written.
     """
     file = calibration_file(serial)
     fresh = file.with_suffix(".new")

@@ -38,9 +38,9 @@ class FalconDevice(FramedDevice):
 
     Parameters
     ----------
-    serial : of its bridge; "": the first one
-    firmware : file of its program, which it needs after it was switched on
-    geometry : published dimensions, unless a calibration names others
+    serial : serial number of its bridge; "": the first one
+    firmware : file of its program, which it needs after power-on
+    geometry : published dimensions, unless a calibration has others
     progress : receives instructions while it is opened, one line at a time
     cancelled : returns during homing whether to stop
     patience_s : time limit of homing [s]

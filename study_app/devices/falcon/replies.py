@@ -105,7 +105,7 @@ def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
 
     Parameters
     ----------
-    parser : record of ``PARSER``; zeros at the begin of a stream
+    parser : record of ``PARSER``; zeros at the start of a stream
     data : (>= length,) bytes, without the bridge's status bytes
     status : record of ``STATUS``
     """

@@ -130,10 +130,10 @@ class PyUsbTransport(Transport):
 
     Parameters
     ----------
-    backend : pyusb's; None: libusb. One that is not libusb may bring its own clock and C functions: ``now_s()``,
-        ``pause(seconds)``, ``c_calls(handle) -> BulkCalls`` with the handle that its ``open_device`` gave.
-    index : which Falcon, of several
-    serial : its serial number; then ``index`` does not count
+    backend : pyusb's; None: libusb. Another backend may have its own clock and C functions: ``now_s()``,
+        ``pause(seconds)``, ``c_calls(handle) -> BulkCalls`` with the handle returned by its ``open_device``.
+    index : index of the Falcon if there are several
+    serial : its serial number, which overrides ``index``
     """
 
     def __init__(self, backend: Any = None, *, index: int = 0, serial: str | None = None) -> None:
@@ -333,8 +333,8 @@ class FtdiTransport(Transport):
 
     Parameters
     ----------
-    library : D2XX as ctypes loads it; None: it is loaded by name
-    serial : number of the Falcon that is meant; None: the first
+    library : D2XX loaded by ctypes; None: it is loaded by name
+    serial : serial number of the Falcon; None: the first
     """
 
     def __init__(self, library: Any = None, *, serial: str | None = None) -> None:

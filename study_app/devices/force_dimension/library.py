@@ -98,7 +98,7 @@ class Library:
 
     Parameters
     ----------
-    path : of the library; None: as the environment variable states, else the usual names
+    path : path of the library; None: that of the environment variable, else the usual names
     """
 
     id = -1  # of the open device
@@ -131,7 +131,7 @@ class Library:
         Raises
         ------
         DeviceFailure
-            There is none that can be opened.
+        No device can be opened.
         """
         device_id = self._functions.dhdOpenSerial(int(serial)) if serial else self._functions.dhdOpen()
         if device_id < 0:
@@ -145,7 +145,7 @@ class Library:
         Raises
         ------
         DeviceFailure
-            It is not calibrated, not safe, or its force cannot be enabled.
+        The device is not calibrated, not safe, or its force cannot be enabled.
         """
         call, device = self._functions, self.id
         if not call.drdIsInitialized(device) or self._status()[RESET]:

@@ -27,7 +27,7 @@ class Inverse3Device(FramedDevice):
     Parameters
     ----------
     where : "", "ID", "HOST:PORT" or "HOST:PORT:ID"
-    progress : is given what to do while it is opened, a line at a time
+    progress : receives instructions while it is opened, one line at a time
     """
 
     name = "inverse3"

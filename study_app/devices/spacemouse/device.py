@@ -39,7 +39,7 @@ class SpaceMouseDevice(PointedDevice):
 
     Parameters
     ----------
-    hid : the module to talk through; None: hidapi's, loaded when it is opened
+    hid : the HID module; None: hidapi's, loaded when the device is opened
     """
 
     name = "spacemouse"
@@ -66,9 +66,9 @@ class SpaceMouseDevice(PointedDevice):
         Raises
         ------
         DeviceNotFound
-            None is connected.
+        No SpaceMouse is connected.
         DeviceError
-            It cannot be opened or reports no motion.
+        The SpaceMouse cannot be opened or reports no motion.
         """
         if self.thread is not None and self.thread.is_alive():
             return

@@ -182,16 +182,16 @@ def release(
     handle_kg : float
         Mass of the handle.
     phase : float
-        When it is let go, in periods of the stroke.
+    Time of the release, in periods of the stroke.
     delay : int
-        Ticks by which each force acts late.
+    Delay of each force [ticks].
 
     Returns
     -------
     given_j : float
         Greatest kinetic energy after the release beyond that at the release [J]; infinite if a force is not finite.
     fails : bool
-        Whether that exceeds what the hand had put into the liquid, or the handle rings on.
+        Whether that exceeds the hand's work on the liquid, or the handle keeps oscillating.
     """
     step = engine({**setup, "handle_kg": handle_kg, "delay_ticks": delay})
     way = 2 * math.pi * _STROKE_HZ

@@ -52,7 +52,7 @@ def solve(to: Path, executor: Executor, progress: Callable[[str], None]) -> tupl
     Raises
     ------
     StudyError
-        NGSolve is not installed, a solution is not good enough, or a file cannot be written.
+        NGSolve is not installed, a solution is not accurate enough, or a file cannot be written.
     """
     library()
     solved = {

@@ -81,7 +81,7 @@ def stored(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]
     Raises
     ------
     StudyError
-        There is none, or one cannot be understood.
+    There is no such table, or one cannot be parsed.
     """
     place = folder or package()
     place = place / of if of else place
@@ -130,7 +130,7 @@ def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> 
     Raises
     ------
     StudyError
-        It is not there, or cannot be understood.
+    The file does not exist, or cannot be parsed.
     """
     try:
         lines = file.read_text(encoding="utf-8").splitlines()

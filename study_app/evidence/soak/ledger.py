@@ -70,8 +70,8 @@ class Ledger:
 
         Returns
         -------
-        |wake - definition| at the last accepted of them, in units of Σ|e|/S; infinite where that is not finite, None
-        where there is nothing to compare
+        |wake - definition| at the last accepted sample, in units of Σ|e|/S; infinite if that is not finite, None
+        if there is nothing to compare
         """
         records_here = self._ledger[0], self._wake[0], self._elements
         last = _last_accepted(samples)

@@ -192,7 +192,7 @@ def parse(line: str) -> Case:
     Raises
     ------
     StudyError
-        A word of another form, an unknown name, or a value that is not permitted.
+        A word has another form, a name is unknown, or a value is not permitted.
     """
     usual = Case()
     kinds: dict[str, type] = {field.name: type(getattr(usual, field.name)) for field in fields(Case)}

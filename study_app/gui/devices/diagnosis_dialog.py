@@ -37,9 +37,9 @@ class DiagnosisDialog(QDialog):
 
     Parameters
     ----------
-    name : which device: as ``--device`` takes it
-    note : what else should be known, in a sentence
-    begin : starts an examination; it takes name and options
+    name : name of the device as for ``--device``
+    note : a sentence with further information
+    begin : starts an examination from name and options
     """
 
     over = Signal(bool)

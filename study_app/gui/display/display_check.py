@@ -27,7 +27,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
     Raises
     ------
     DisplayError
-        There is no display, it cannot be reached, or a system library is missing; says what to do.
+        There is no display, it cannot be reached, or a system library is missing; the message gives the remedy.
     """
     if platform != "linux":
         return
@@ -74,7 +74,7 @@ def naming_missing_library() -> Iterator[None]:
     Raises
     ------
     DisplayError
-        Something could not be imported.
+    A system library is missing.
     """
     try:
         yield

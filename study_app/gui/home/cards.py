@@ -261,10 +261,10 @@ class _FileCard(Card):
 
     Parameters
     ----------
-    facts : what is said of it
-    title : what it is called; of two lines at most
-    copies : whether it is not edited but copied
-    first : whether its draft is the one that was edited last
+    facts : the facts on the card
+    title : the title; at most two lines
+    copies : whether *Edit* makes a copy
+    first : whether its draft is the most recently edited one
     sign : an icon before the title, "" for none
     """
 

@@ -54,7 +54,7 @@ class RehearsalDialog(Work):
     Parameters
     ----------
     facts : the protocol
-    results : folder that holds the studies' folders; the rehearsal gets one of its own
+    results : folder that contains the studies' folders; the rehearsal gets its own
     """
 
     def __init__(
@@ -179,8 +179,8 @@ class NewSessionDialog(QDialog):
     Parameters
     ----------
     facts : the protocol to run
-    results : folder that holds the studies' folders; the study's own is suggested
-    machine : what is set for this machine: device, its options and screen to begin with
+    results : folder that contains the studies' folders; the study's own is suggested
+    machine : the settings of this machine: initial device, its options and screen
     """
 
     def __init__(

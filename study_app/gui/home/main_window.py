@@ -120,7 +120,7 @@ class _Rail(Coloured, QWidget):
 
     Parameters
     ----------
-    names : the places there are, of `DESTINATIONS`
+    names : the available pages, of `DESTINATIONS`
     """
 
     go_asked = Signal(str)
@@ -175,9 +175,9 @@ class MainWindow(Themed, QMainWindow):
 
     Parameters
     ----------
-    makers : what makes each place, by its name; the first is where one begins
+    makers : functions that create the pages, by name; the first page is shown at the start
 
-    ``closed`` comes when the operator is done, ``theme_changed`` with the `Theme` that was asked for here.
+    ``closed`` is emitted when the operator closes the window, ``theme_changed`` carries the requested `Theme`.
     """
 
     closed = Signal()

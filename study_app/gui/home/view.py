@@ -74,8 +74,8 @@ class HomePlace(Place):
 
     Parameters
     ----------
-    results : folder that holds the studies' folders; it need not exist
-    draft_words : loads what describes a draft
+    results : folder that contains the studies' folders; it need not exist
+    draft_words : loads the object that describes drafts
     """
 
     session_asked = Signal(object)

@@ -16,15 +16,15 @@ class Command:
     Attributes
     ----------
     id, words : str
-        Its name in the program, and what it does.
+    Its name in the program, and its description.
     keys : tuple of str
-        Each does it.
+    Alternative keys.
     within : str
-        Which part of the window listens to its keys; "" for the whole window.
+    The part of the window in which its keys work; "" for the whole window.
     held : bool
         Whether the key is held, not pressed.
     run : callable
-        What it does in the study designer, whose place it takes; None where a part of the place does it.
+        Its action in the study designer, called with the page; None if a part of the page handles it.
     """
 
     id: str

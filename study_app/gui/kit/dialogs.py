@@ -33,14 +33,14 @@ class Question(QDialog):
 
     Parameters
     ----------
-    go_on : the button of the step that goes on
-    back : the words on the way back
-    other : a button of another step, which closes the question, too
-    fields : what is asked
-    needs : what is said where one of these fields is empty
-    warning : what is said below the explanation, with a sign
-    inside : what is shown below that
-    width : the least width [px]
+    go_on : the text of the button that continues
+    back : the text of the button that goes back
+    other : the text of a third button, which also closes the question
+    fields : the fields of the question
+    needs : the message if one of these fields is empty
+    warning : a warning below the explanation
+    inside : a widget below the warning
+    width : the minimum width [px]
     """
 
     def __init__(

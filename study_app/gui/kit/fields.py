@@ -27,10 +27,10 @@ class Field:
 
     Attributes
     ----------
-    options : what can be chosen, and its words
-    limits : of a count
-    hint : the line below; ``aside`` stands at the right of the label
-    parse, write : read what is typed (a ValueError says what is wrong with it), and its inverse
+    options : the choices with their labels
+    limits : limits of an integer
+    hint : the line below; ``aside`` is at the right of the label
+    parse, write : parse the typed text (ValueError with the reason if it is invalid), and its inverse
     """
 
     name: str

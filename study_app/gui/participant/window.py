@@ -198,21 +198,22 @@ class ParticipantWindow(QWidget):
 
     Parameters
     ----------
-    said : the interface's words in the participant's language, until a page is in another
+    said : the interface's texts in the participant's language, until a page has another one
     clock : seconds since the session's origin, for the events' times
-    windowed : a window of at least 1024 × 640 instead of the whole screen
-    captures_pointer : hold and hide the pointer in the tank, because it is the device
-    pilot : a coloured frame and the title say that this is no participant's session
-    text_scale : how much larger than designed words must be at least, for this screen at this distance
+    windowed : whether to open a window of at least 1024 × 640 instead of using the whole screen
+    captures_pointer : whether to capture and hide the pointer in the tank, because it is the device
+    pilot : whether a coloured frame and the title mark the session as a pilot
+    text_scale : minimum scale of text for this screen and viewing distance
     on_card : whether the tank is drawn on a surface of the graphics card, in step with the screen
-    photodiode : whether the tank has a corner that a photodiode looks at
-    strip : what stands above every page, where the operator has no screen of their own
+    photodiode : whether the tank has a corner for a photodiode
+    strip : a widget above every page, if the operator has no separate screen
 
-    While ``may_close`` is false, closing the window in the middle of a session is a pause.
-    ``event`` carries the session's events; ``pointer`` the hand's place [m] and ``buttons`` the buttons' bits while the
-    pointer is captured; ``painted`` the time of the sample [ns] of every view, while it is drawn, and ``swapped`` comes
-    where a surface has just swapped; ``left`` where the participant closed the last page. ``painting`` is the last
-    thread that painted ahead.
+    While ``may_close`` is false, closing the window during a session is a pause.
+
+    ``event`` carries the session's events; ``pointer`` the hand's position [m] and ``buttons`` the buttons' bits while
+    the pointer is captured; ``painted`` the sample time [ns] of every view, while it is drawn. ``swapped`` is emitted
+    after each buffer swap, ``left`` when the participant has closed the last page. ``painting`` is the last thread that
+    painted in advance.
     """
 
     event = Signal(object)  # type: ignore[assignment]  # hides QWidget.event() from Python, not from Qt

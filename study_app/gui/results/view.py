@@ -89,9 +89,9 @@ class WriteDialog(Work):
 
     Parameters
     ----------
-    to : the folder that is suggested
-    extras : what can be written in addition
-    opens_file : whether the first file is what opens, not the folder
+    to : the suggested folder
+    extras : the optional outputs
+    opens_file : whether to open the first file instead of the folder
     """
 
     def __init__(
@@ -140,9 +140,9 @@ class LeaveOutDialog(Question):
 
     Parameters
     ----------
-    sessions : those that are not left out yet
-    trials : of each session (participant, number) the main trials and the words for them
-    chosen : the session to begin with
+    sessions : the sessions that are not excluded yet
+    trials : the main trials of each session (participant, number) with their labels
+    chosen : the initially selected session
     proposed : an exclusion that a rule proposes
     """
 
@@ -376,7 +376,7 @@ class ResultsPlace(Place):
 
     Parameters
     ----------
-    results : folder that holds the studies' folders; it need not exist
+    results : folder that contains the studies' folders; it need not exist
     """
 
     version_asked = Signal(object)

@@ -92,7 +92,7 @@ def read_record(folder: Path) -> SessionRecord:
     Raises
     ------
     StoreError
-        It is no session's folder, or its journal or the list of exclusions cannot be read.
+        It is not a session folder, or its journal or the list of exclusions cannot be read.
     """
     study, session = locate_session(folder)
     key = opened_key(study)

@@ -68,7 +68,7 @@ class SessionsTable(QWidget):
 
     Parameters
     ----------
-    none : the sentence in place of rows where there are none
+    none : the sentence shown if there are no rows
     """
 
     opened = Signal(object)

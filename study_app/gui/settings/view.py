@@ -69,8 +69,8 @@ class FrameTimes:
 
     Parameters
     ----------
-    refresh_hz : how often the screen shows one, as the system says
-    least_s : so long frames are taken before anything is said of them
+    refresh_hz : refresh rate reported by the system
+    least_s : minimum duration before figures are shown
     """
 
     def __init__(self, refresh_hz: float, least_s: float = _LEAST_S) -> None:
@@ -171,9 +171,9 @@ class DisplayTest(QWidget):
 
     Parameters
     ----------
-    screen_words : which screen it is, for the heading
-    refresh_hz : how often it shows a frame, as the system says
-    least_s : so long frames are counted before anything is said of them
+    screen_words : name of the screen, for the heading
+    refresh_hz : refresh rate reported by the system
+    least_s : minimum duration before figures are shown
     """
 
     left = Signal()

@@ -66,9 +66,9 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
     Parameters
     ----------
     scale : float
-        Factor on the size, for pages that grow with their window.
+    Size factor, for pages that grow with their window.
     weight, tabular : int, bool, optional
-        In place of the role's own: 400, 500, 600, 700; figures of one width.
+        Override those of the role: 400, 500, 600 or 700; tabular figures.
     """
     step = TYPE[role]
     chosen = step.weight if weight is None else weight

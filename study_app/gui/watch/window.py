@@ -219,8 +219,8 @@ class WatchWindow(Themed, QDialog):
 
     Parameters
     ----------
-    trial, attempt : the trial's number, and which of its presentations
-    presented : what was presented, for the heading
+    trial, attempt : numbers of the trial and of its presentation
+    presented : the presented condition, for the heading
     """
 
     def __init__(

@@ -41,7 +41,7 @@ class Rows(QAbstractTableModel):
 
     Parameters
     ----------
-    headings : of each column its name and its heading
+    headings : name and heading of each column
     cell : returns the values of a row's cell in the column of a name, by their roles
     """
 
@@ -118,7 +118,7 @@ class Table(Themed, QTableView):
 
     Parameters
     ----------
-    widths : of each column the share of the width and the least width [px]
+    widths : share of the width and minimum width [px] of each column
     """
 
     opened = Signal(QModelIndex)

@@ -87,7 +87,7 @@ def rules_from(described: Mapping[str, Any]) -> ForceRules:
     Raises
     ------
     StoreError
-        They are of a version that this program does not know.
+    The version of the rules is unknown to this program.
     """
     version = described.get("force_rules", 1)
     if version not in VERSIONS:

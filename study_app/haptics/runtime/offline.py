@@ -86,7 +86,7 @@ def samples_along(scene: Scene, motion: Motion, dynamics: Dynamics | None = None
     Raises
     ------
     StudyError
-        The scene wants a given velocity and there is none.
+        The scene requires a given velocity and there is none.
     """
     along = ModelAlong(scene, dynamics, given=motion.velocity_mps is not None, smooths=smooths)
     return along.follow(motion.t_s, motion.position_m, motion.velocity_mps)
@@ -121,7 +121,7 @@ class ModelAlong:
     Raises
     ------
     StudyError
-        The scene wants a given velocity and there is none.
+        The scene requires a given velocity and there is none.
     """
 
     def __init__(

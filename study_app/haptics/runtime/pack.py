@@ -170,7 +170,7 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
     Raises
     ------
     StudyError
-        The scene does not fit, or takes its velocity from a table: a device has none.
+        The scene does not fit, or requires a given velocity, which a device does not have.
     """
     if isinstance(scene.velocity, Given):
         raise StudyError('velocity "given" is for motions from a file; a device needs an estimator such as "ewma"')

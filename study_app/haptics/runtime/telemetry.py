@@ -25,7 +25,7 @@ class Telemetry:
     Parameters
     ----------
     history : int
-        How many samples are kept.
+    Number of samples that are kept.
     """
 
     def __init__(self, history: int = HISTORY) -> None:

@@ -97,7 +97,7 @@ def read(path: Path) -> Measured | FlowCurve:
     Raises
     ------
     StudyError
-        The file cannot be read or used; with its first error in one line.
+        The file cannot be read or is invalid; the message is one line with the first error.
     """
     try:
         refuse_device(path)
@@ -155,7 +155,7 @@ def with_centred_velocity(motion: Motion) -> Motion:
     Raises
     ------
     StudyError
-        Rows too few or too far apart.
+    There are too few rows, or they are too far apart.
     """
     if motion.velocity_mps is not None:
         return motion

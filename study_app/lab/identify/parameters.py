@@ -48,7 +48,7 @@ def find_parameters(scene: Scene, liquid_id: str, names: Sequence[str]) -> tuple
     Raises
     ------
     StudyError
-        No such liquid or parameter, one named twice, or one that cannot be fitted.
+        There is no such liquid or parameter, or a parameter is named twice or cannot be fitted.
     """
     tables = dict(_tables(scene, _liquid(scene, liquid_id)))
     if not names:

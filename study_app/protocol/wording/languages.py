@@ -92,7 +92,8 @@ def read_language(file: File) -> Words:
     Raises
     ------
     StudyError
-        It cannot be read, or texts are missing, unknown, or have other slots than the English ones: says which.
+        The file cannot be read, or texts are missing, unknown, or have other slots than the English ones, which
+        the message lists.
     """
     try:
         table = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode("utf-8"))

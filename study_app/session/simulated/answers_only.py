@@ -79,24 +79,24 @@ def rehearse_answers(
     protocol : str or Path
         File or name of a protocol.
     participants : int
-        How many.
+    Number of participants.
     seed : int
-        All randomness comes from it, the key's too.
+    Seed of all randomness, including the key's.
     results : Path, optional
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
     group : str, optional
-        The pre-existing group of all of them; by default they are dealt evenly to such groups.
+        The pre-existing group of all participants; by default they are distributed evenly.
     features : ConditionFeatures, optional
-        What each condition feels like; by default rehearsed first.
+    The features of each condition; by default they are rehearsed first.
     progress : callable, optional
-        Called with a line now and then.
+    Called with a line from time to time.
 
     Raises
     ------
     ProtocolError
         The protocol cannot be used.
     StoreError
-        The folder holds another study or an id is used already, and then nothing was touched; or it cannot be written.
+        The folder holds another study or an id is used already, and nothing was changed; or it cannot be written.
     SessionError
         A session broke.
     """
@@ -270,7 +270,7 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
     source : bytes
         Its source.
     start : SessionStart
-        What the session begins with.
+    The initial data of the session.
     step : int
         The index of the step in the schedule of `preview.preview` with the same seed and participant.
 

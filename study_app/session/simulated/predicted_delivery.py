@@ -84,11 +84,11 @@ def _withheld_shares(
     Parameters
     ----------
     rig : Rig
-        That of `_late_rig`.
+    The rig of `_late_rig`.
     scene : Scene
         The liquid.
     task : AnyTask
-        What the simulated hand does in it.
+    The task of the simulated hand.
     workspace_m : tuple of float
         Full sizes of the tank [m, hand frame].
     """

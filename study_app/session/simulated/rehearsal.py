@@ -484,9 +484,9 @@ def rehearse(
     protocol : str or Path
         File or name of a protocol.
     participants : int
-        How many.
+    Number of participants.
     seed : int
-        All randomness comes from it, the key's too.
+    Seed of all randomness, including the key's.
     device : str
         A simulated device.
     results : Path, optional
@@ -494,23 +494,23 @@ def rehearse(
     recordings : bool
         Whether every tick of the servo and every frame of a trial is recorded.
     group : str, optional
-        The pre-existing group of all of them; by default they are dealt evenly to such groups.
+        The pre-existing group of all participants; by default they are distributed evenly.
     progress : callable, optional
         Called with a line after each session.
     observer : Observer, optional
-        Discriminates the intervals of a trial; by default each participant is one of people drawn at random.
+        The observer of interval trials; by default each participant's is drawn at random.
 
     Raises
     ------
     ProtocolError
         The protocol cannot be used.
     StoreError
-        The folder holds another study or an id is used already, and then nothing was touched; or results cannot be
+        The folder holds another study or an id is used already, and nothing was changed; or results cannot be
         written.
     DeviceError
         The device is not known, or cannot be opened.
     SessionError
-        The device does not move by itself, or a session broke; what was kept before is safe.
+        The device does not move by itself, or a session broke; earlier data are safe.
     """
     source = source_bytes(protocol)
     study = parse(source, str(protocol))
@@ -555,9 +555,9 @@ def finish_session(
     protocol : str or Path
         File or name of a protocol.
     participant : str
-        Whose session it is.
+    The participant's id.
     seed : int
-        All randomness of a new session comes from it, the key's too.
+    Seed of all randomness of a new session, including the key's.
     device : str
         A simulated device, for a new session.
     results : Path
@@ -568,7 +568,7 @@ def finish_session(
     Raises
     ------
     StudyError
-        As `rehearse` and `reopen_session`; what was kept before is safe.
+    As for `rehearse` and `reopen_session`; earlier data are safe.
     """
     folder = StudyFolder(results)
     session = folder.session(participant, 1)
@@ -627,15 +627,15 @@ def open_session(
     Parameters
     ----------
     study : Protocol
-        What is run.
+    The study to run.
     source : bytes
         Its source.
     participant : str
-        Whose session it is.
+    The participant's id.
     results : Path
         The study folder.
     seed : int
-        All its randomness comes from it.
+    Seed of all its randomness.
     session : int
         The number of the participant's session.
     device : str
@@ -647,9 +647,9 @@ def open_session(
     row_of : str, optional
         The id of the participant who is replaced.
     observer : Observer, optional
-        Discriminates the intervals of a trial; by default each participant is one of people drawn at random.
+        The observer of interval trials; by default each participant's is drawn at random.
     answer : callable, optional
-        Answers the pages of questions in place of the simulated participant.
+        Answers the question pages instead of the simulated participant.
 
     Raises
     ------
@@ -708,16 +708,16 @@ def reopen_session(
     session_folder : Path
         The session's ``ses-NN`` folder.
     protocol : str or Path, optional
-        File or name of its protocol; by default it is looked for.
+        File or name of its protocol; by default it is searched for.
     answer : callable, optional
-        Answers the pages of questions in place of the simulated participant.
+        Answers the question pages instead of the simulated participant.
 
     Raises
     ------
     StoreError
         The session cannot be opened, is finished, or began with another protocol.
     SessionError
-        No protocol at hand is the session's, or the session broke; what was kept before is safe.
+        No available protocol is the session's, or the session broke; earlier data are safe.
     """
     lines = journal.read(locate_session(session_folder)[1].journal)
     begun = start_of(lines)

@@ -209,7 +209,7 @@ def check_session(
     Raises
     ------
     StudyError
-        No participant has it, or this one's group has fewer sessions; group or replaced participant are refused
+        No participant has this session, or the group has fewer; group or replaced participant are rejected
         (`check_choice`); or the study's key cannot be read.
     """
     check_session_number(protocol, session)

@@ -70,9 +70,9 @@ class SessionClock:
     now_ns : callable
         The monotonic clock [ns]: the servo's own, so that recordings and journal share an axis.
     origin_at : datetime, optional
-        Wall time at the origin, with its zone; by default so that the present moment is now.
+        Wall time at the origin, with its zone; by default derived from the current wall time.
     shown_s : float
-        Present time of the clock, more than 0 in a resumed session [s].
+    Current time of the clock [s], above 0 in a resumed session.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ def read(path: Path) -> list[Event]:
     Raises
     ------
     StoreError
-        It cannot be read, or is damaged before its last line.
+    The journal cannot be read, or is damaged before its last line.
     """
     return read_complete(path).lines
 
@@ -250,7 +250,7 @@ class Journal:
         Raises
         ------
         StoreError
-            It exists already, or cannot be created.
+        The file exists already, or cannot be created.
         """
         with contextlib.ExitStack() as failing:
             try:
@@ -273,7 +273,7 @@ class Journal:
         Raises
         ------
         StoreError
-            It cannot be read or written, or has changed since.
+        The journal cannot be read or written, or has changed since.
         """
         try:
             if contents.torn_bytes:
@@ -339,7 +339,7 @@ class Journal:
         Raises
         ------
         StoreError
-            Gives the reason why the last flush in the background failed.
+        The last flush in the background failed; the message gives the reason.
         """
         if (failed := self._failed) is not None:
             raise cannot_write(self.path, failed)

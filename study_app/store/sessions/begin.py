@@ -62,7 +62,7 @@ class SessionStart:
     participant : str
         The participant's id.
     seed : int
-        What all its randomness comes from.
+    Seed of all its randomness.
     operator : str
         Name or initials of the operator.
     language : str
@@ -74,15 +74,15 @@ class SessionStart:
     simulated : bool
         Whether the participant, or the hand, is simulated.
     session : int
-        Its number among the participant's, from 1.
+    Number of the participant's session, from 1.
     pilot : bool
-        Whether the session only tries the study out.
+    Whether the session is a pilot.
     recordings : bool
         Whether the trials' samples and frames are recorded, by the ``recorder`` of the store.
     motors_masked : mapping, optional
-        How the motors of the device are masked, for the receipt; None where that was not asked.
+        The masking of motor noise, for the receipt; None if it was not asked.
     outlets : mapping, optional
-        What the session sends to other programs, for the receipt; None where it sends nothing.
+        The outlets to other programs, for the receipt; None without any.
     video : mapping, optional
         Description of camera and footage for the receipt; None in a study without a video.
     row_of : str, optional
@@ -122,19 +122,19 @@ def begin_session(
     results : Path
         The study folder.
     protocol : Protocol
-        What is run.
+    The protocol to run.
     source : bytes
         The content of the protocol's file, hashed into the receipt.
     start : SessionStart
-        Whose session it is, and with what.
+    Participant, device and other initial data.
     clock : SessionClock, optional
         Its origin is the session's; by default the system's monotonic clock from now.
 
     Raises
     ------
     StoreError
-        The id is used, reserved or misspelt, the folder cannot be written or holds something else, or the key is not in
-        order.
+        The id is used, reserved or misspelt, the folder cannot be written or has other contents, or the key is
+        invalid.
     """
     study_folder = StudyFolder(Path(results))
     check_participant(start.participant, pilot=start.pilot)
@@ -303,7 +303,7 @@ class UsedIds:
         Raises
         ------
         StoreError
-            Names the three possible remedies.
+        The session or id is used; the message names the three possible remedies.
         """
         if not 1 <= number <= MAX_SESSION:
             raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
@@ -351,7 +351,7 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
     Raises
     ------
     StoreError
-        Names the id and the permitted characters.
+    The id is invalid; the message names the permitted characters.
     """
     if not ID_PATTERN.fullmatch(participant) or len(participant) > _MAX_ID_LENGTH:
         raise StoreError(
@@ -371,7 +371,7 @@ def refuse_never_begun(session: SessionFolder) -> None:
     Raises
     ------
     StoreError
-        Says how it is begun.
+    The session was never begun; the message says how to begin it.
     """
     if is_abandoned(session.path):
         raise StoreError(

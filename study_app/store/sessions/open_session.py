@@ -124,7 +124,7 @@ class SessionStore:
         Raises
         ------
         StoreError
-            It was not written, or is not on the disk; the journal is as before and can be tried again.
+            The event was not written, or is not on the disk; the journal is unchanged, and the call can be repeated.
         """
         event = replace(event, t_s=self.clock.seconds() if t_s is None else t_s)
         if self._lines:
@@ -167,7 +167,7 @@ class SessionStore:
         Raises
         ------
         StoreError
-            Says why.
+        A flush failed; the message gives the reason.
         """
         self.journal.check_flushed()
 
@@ -200,7 +200,7 @@ class SessionStore:
         Raises
         ------
         StoreError
-            One of them could not be written; earlier journal lines are safe. Called again, it continues from there.
+            A file could not be written; earlier journal lines are safe. A repeated call continues from there.
         """
         if self._over or not self.journal.is_closed:
             if self.recorder is not None:

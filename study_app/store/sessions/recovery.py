@@ -89,7 +89,7 @@ def reopen_store(
     session_folder : Path
         The session's ``ses-NN`` folder.
     protocol : Protocol
-        What is run.
+    The protocol to run.
     source : bytes
         The content of the protocol's file, with the hash recorded when the session began.
     operator : str
@@ -99,9 +99,9 @@ def reopen_store(
     screens : mapping
         Description for the receipt.
     motors_masked : mapping, optional
-        How the motors of the device are masked, for the receipt; None where that was not asked.
+        The masking of motor noise, for the receipt; None if it was not asked.
     outlets : mapping, optional
-        What the session sends to other programs, for the receipt; None where it sends nothing.
+        The outlets to other programs, for the receipt; None without any.
     video : mapping, optional
         Description of camera and footage for the receipt; None in a study without a video.
     now_ns : callable
@@ -112,9 +112,10 @@ def reopen_store(
     Raises
     ------
     StoreError
-        It is not a session folder, open in another program, finished, damaged, with a journal that tells less than the
-        other files, or of another protocol (the differences are named where they are not blinded); the key is not
-        in order; or the folder cannot be written. But for the torn tail nothing has changed then.
+        It is not a session folder, or the session is open in another program, finished, damaged, has a journal with
+        less information than the other files, or another protocol (the message names differences that are not
+        blinded); the key is invalid; or the folder cannot be written. Except for an incomplete last line nothing
+        has changed then.
     """
     study_folder, folder = locate_session(session_folder)
     refuse_never_begun(folder)
@@ -159,7 +160,7 @@ def check_resumable(session_folder: Path, protocol: Protocol, source: bytes) -> 
     Raises
     ------
     StoreError
-        As `reopen_store`.
+    As for `reopen_store`.
     """
     study_folder, folder = locate_session(session_folder)
     refuse_never_begun(folder)
@@ -173,7 +174,7 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
     Raises
     ------
     StoreError
-        It is not a session folder.
+    The path is not a session folder.
     """
     study_folder, _ = locate_session(session_folder)
     try:
@@ -193,8 +194,8 @@ def rebuild_session(session_folder: Path) -> Rebuilt:
     Raises
     ------
     StoreError
-        It is not a session folder, open in another program, or its journal is empty, damaged or tells less than the
-        session's other files; or a file cannot be written.
+        It is not a session folder, is open in another program, or its journal is empty, damaged or has less
+        information than the session's other files; or a file cannot be written.
     """
     study_folder, folder = locate_session(session_folder)
     with lock_folder(folder.path):

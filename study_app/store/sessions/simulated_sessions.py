@@ -43,13 +43,13 @@ class SimulatedStudy:
     results : Path
         The study folder.
     protocol : Protocol
-        What is answered.
+    The protocol to answer.
     source : bytes
         The content of the protocol's file, hashed into the receipts.
     participants : tuple of str
-        Ids of all that are to come; none may be used.
+    Ids of all coming participants; none may be used.
     seed : int
-        Of the sessions and of the key.
+    Seed of the sessions and of the key.
     device : mapping
         Description for the receipts.
     screens : mapping
@@ -58,7 +58,7 @@ class SimulatedStudy:
     Raises
     ------
     StoreError
-        The folder holds something else, or an id is used or misspelt, and then nothing was touched; or it cannot be
+        The folder has other contents, or an id is used or misspelt, and nothing was changed; or it cannot be
         written.
     """
 
@@ -109,7 +109,7 @@ class SimulatedStudy:
         Raises
         ------
         StoreError
-            Another program was first, or it cannot be written.
+        Another program wrote the session first, or it cannot be written.
         """
         place, lines, key = session.place, session.lines, opened_key(self.folder)
         ended = {**lines[-1].fields(), "ended_at": lines[-1].at}
@@ -191,7 +191,7 @@ class SimulatedSession:
         Raises
         ------
         StoreError
-            It cannot be written, or exists already.
+        The session cannot be written, or exists already.
         """
         self.append(SessionEnded(status=status, reason=reason))
         self._study.keep(self)

@@ -66,8 +66,8 @@ def read_proof(path: Path) -> Proof:
     Raises
     ------
     StoreError
-        It cannot be read, a line is none or was mistyped, a line is below a signature or stamp, or these are not of its
-        lines.
+        The proof cannot be read, a line is invalid or mistyped, a line is below a signature or stamp, or these do not
+        belong to its lines.
     """
     if not path.is_file():
         raise StoreError(f"{path} is not a file: specify a copy of a study's fingerprints.txt")

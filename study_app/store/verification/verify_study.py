@@ -68,13 +68,13 @@ def verify_study(folder: Path, fingerprints: Path | None = None) -> Findings:
     folder : Path
         The study folder.
     fingerprints : Path, optional
-        A copy of the ``fingerprints.txt`` of a study that is not merged, or its proof (`proofs`), which was kept
-        elsewhere: every session that ended must be in it, and be the same, and every record in it must be there.
+        A copy of the ``fingerprints.txt`` of a study that is not merged, or its proof (`proofs`), which was stored
+        elsewhere: it must contain every ended session unchanged, and all its records must exist.
 
     Raises
     ------
     StoreError
-        It is not a study folder, or ``fingerprints`` no copy of fingerprints.
+        The path is not a study folder, or ``fingerprints`` is not a copy of fingerprints.
     """
     merged = read_merged(folder)
     findings = Findings(folder)

@@ -86,8 +86,8 @@ class PageContext:
 
     Attributes
     ----------
-    clock : returns the time of an event, at the moment of the key or the click [s]
-    text_scale : how much larger than designed words must be at least, for this screen at this distance
+    clock : returns the time of an event when the key or button is pressed [s]
+    text_scale : minimum scale of text for this screen and viewing distance
     by_mouse : whether the mouse is the device
     """
 

@@ -54,7 +54,7 @@ def make_high_priority(thread: int, nice: int, address: str | None = None) -> in
     Raises
     ------
     OSError
-        There is no bus or no such service here, or it refuses.
+        There is no bus or no such service, or the service refuses the request.
     """
     with _Bus(address or _system_bus()) as bus:
         level = max(nice, bus.number("MinNiceLevel"))
