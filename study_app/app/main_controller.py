@@ -51,9 +51,9 @@ if TYPE_CHECKING:
 
 
 class WorkstationController(QObject):
-    """Holds the settings, keeps them at once, and takes the last change back.
+    """Holds the settings, stores changes at once, and can undo the last one.
 
-    ``changed`` comes when something else is set; ``troubled(title, sentence)`` where they cannot be read or kept.
+    ``changed`` is emitted when a setting changes; ``troubled(title, sentence)`` if settings cannot be read or stored.
     """
 
     changed = Signal(object)
@@ -107,7 +107,7 @@ class WorkstationController(QObject):
 
     @property
     def undo_name(self) -> str:
-        """The name of the change that undo takes back; "" if there is none."""
+        """The name of the change that undo reverts; "" if there is none."""
         return self._before[-1][0] if self._before else ""
 
     def _save_settings(self, settings: MachineSettings) -> None:
@@ -152,7 +152,7 @@ def run_home_window(
 ) -> int:
     """Open the home window on the results folder; return the exit code when it is closed.
 
-    By default the folder is the workspace's. ``then`` is called once the window stands.
+    By default the folder is the workspace's. ``then`` is called once the window is open.
 
     Raises
     ------
@@ -181,7 +181,7 @@ def _with_guarded_painting(make: Callable[[], Place]) -> Callable[[], Place]:
 
 
 class MainController(QObject):
-    """The home window's stay: one session at a time, and home again after it."""
+    """Controls the home window: one session at a time, after which it is shown again."""
 
     def __init__(self, results: Path | None = None) -> None:
         super().__init__()
@@ -239,7 +239,7 @@ class MainController(QObject):
         self._opened.start()
 
     def show_bug(self, error: BaseException) -> bool:
-        """Show an exception that no slot caught, once, unless a session shows it; return False: it is printed, too."""
+        """Show an unhandled exception once, unless a session shows it; return False, so that it is printed, too."""
         bug, said = bug_sentence(error), error is self.window.not_opened
         if self.live is None and self.window.isVisible() and not said and bug not in self._bugs:
             self._bugs.add(bug)
@@ -315,7 +315,7 @@ class MainController(QObject):
         self._go_to_designer(lambda designer: designer.open(source))
 
     def show_version(self, session: SessionFacts) -> None:
-        """Open the study designer at the changes since a session was run; without the file, list what receipts hold."""
+        """Open the designer at the changes since a session; without the study's file, list those between sessions."""
         try:
             protocol_file(session.study)
         except StudyError:
@@ -349,7 +349,7 @@ class MainController(QObject):
         self.lab.feel_study_liquids(liquids.a, liquids.b, liquids.study)
 
     def _forget_study(self) -> None:
-        """Another study is open in the designer: the lab no longer offers to put liquids back."""
+        """Note that another study is open in the designer, so that the lab no longer offers to take changes back."""
         if self.lab is not None:
             self.lab.study = ""
 
@@ -425,9 +425,9 @@ class MainController(QObject):
         self.window.go("help")
 
     def end(self) -> None:
-        """Release everything that the pages hold, and wait for work in other threads: a device may be opening.
+        """Release everything that the pages hold, and wait for work in other threads, such as opening a device.
 
-        After a signal the program waits for 2 s at most; a device that is still being opened then gets no force.
+        After a signal the program waits for at most 2 s; a device that is still being opened then gets no force.
         """
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
         self._opened.stop()  # a thread that it starts would outlive Python

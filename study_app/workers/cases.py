@@ -42,9 +42,9 @@ _LOGGERS: Final = ("distributed", "distributed.client", "tornado.application")
 
 
 class ProcessExecutor(ProcessPoolExecutor):
-    """Processes that start when there are cases, import their own modules, and ignore Ctrl+C.
+    """Processes that start with the first cases, import their own modules, and ignore Ctrl+C.
 
-    They end with the executor, at once where cases are cancelled, or with its program.
+    They end with the executor (at once if cases are cancelled) or with the program.
     """
 
     def __init__(self, workers: int) -> None:
@@ -52,14 +52,14 @@ class ProcessExecutor(ProcessPoolExecutor):
         super().__init__(workers, mp_context=CONTEXT, initializer=_start_process, initargs=(self._watched,))
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Compute a case; a process that cannot be started is a `WorkerError`."""
+        """Compute a case; raise `WorkerError` if a process cannot be started."""
         try:
             return super().submit(_run, fn, args, kwargs)
         except OSError as error:
             raise _lost_process() from error
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Finish all cases; or cancel them, and end the processes without waiting for them."""
+        """Finish all cases, or cancel them and end the processes without waiting for them."""
         super().shutdown(wait and not cancel_futures, cancel_futures=cancel_futures)
         if cancel_futures:
             self._held.close()
@@ -88,14 +88,14 @@ def _start_process(watched: Connection) -> None:
 
 
 def _exit_at_end_of(watched: Connection) -> None:
-    """End this process when the other end of the pipe is closed: by the executor, or because its program was killed."""
+    """End this process when the other end of the pipe is closed, because the executor or its program has ended."""
     with suppress(EOFError, OSError):
         watched.recv_bytes()
     os._exit(0)
 
 
 class ClusterExecutor(Executor):
-    """The workers of a Dask cluster; a case whose worker is lost is computed again by another one."""
+    """The workers of a Dask cluster; a case whose worker is lost is recomputed by another one."""
 
     def __init__(self, address: str) -> None:
         self.address = address
@@ -159,7 +159,7 @@ class ClusterExecutor(Executor):
             future.cancel()
 
     def _watch(self) -> None:
-        """Cancel all cases when the scheduler is lost: the client then leaves some without an outcome."""
+        """Cancel all cases when the scheduler is lost, since the client leaves some without an outcome."""
         while not self._ended.wait(_WATCH_S):
             if self._client.status != "running":
                 self._cancel()
@@ -216,7 +216,7 @@ def _version(name: str) -> str:
 
 
 def _check_that_something_answers(address: str) -> None:
-    """Reject an unusable address within seconds; Dask would wait for long or fail at exit."""
+    """Reject an unusable address within seconds; Dask would wait for a long time or fail at exit."""
     parts = _ADDRESS.fullmatch(address)
     if parts is None:
         raise WorkerError(
@@ -232,7 +232,7 @@ def _check_that_something_answers(address: str) -> None:
 
 
 def _receive_greeting(connection: socket.socket) -> None:
-    """Receive a scheduler's greeting: a length as eight bytes, and as many bytes."""
+    """Receive a scheduler's greeting: a length as eight bytes, followed by as many bytes."""
     until_s = time.perf_counter() + CONNECT_S
     came, wanted = b"", 8
     while len(came) < wanted:

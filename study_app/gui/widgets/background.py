@@ -22,20 +22,20 @@ _telling, _program_ends = threading.Lock(), threading.Event()
 
 @atexit.register
 def _abandon_jobs() -> None:
-    """Abandon running jobs before Python takes Qt down: a late signal would crash."""
+    """Abandon running jobs before Qt is shut down, because a late signal would crash."""
     with _telling:
         _program_ends.set()
 
 
 def wait_for_jobs(seconds: float) -> None:
-    """Wait a limited time for the jobs of every `Background`: Python aborts if it ends during an import."""
+    """Wait a limited time for the jobs of every `Background`; Python aborts if it exits during an import."""
     until_s = time.perf_counter() + seconds
     for thread in tuple(_threads):
         thread.join(max(until_s - time.perf_counter(), 0.0))
 
 
 class _Ends(QObject):
-    """Brings the ends of jobs to the windows' thread; a job may outlive its `Background`, but not this."""
+    """Delivers the ends of jobs to the GUI thread; a job may outlive its `Background`, but not this object."""
 
     came = Signal(object)
 
@@ -64,11 +64,11 @@ def delayed_call(owner: QObject, milliseconds: int, run: Callable[[], Any]) -> Q
 
 
 class Background(QObject):
-    """Runs one job at a time in a thread; ``done`` carries what the last job that was asked for returned.
+    """Runs one job at a time in a thread; ``done`` carries the result of the last requested job.
 
-    A job that was asked for while another runs begins after it, unless a newer one takes its place. What the job raises
-    comes by ``failed``; what is none of ``refusals`` also goes to ``threading.excepthook``. A refusal is logged where
-    nothing is connected to ``failed``.
+    A job that is requested while another runs starts after it, unless a newer one replaces it. Exceptions are emitted
+    by ``failed``; those that are not ``refusals`` also go to ``threading.excepthook``. A refusal is logged if nothing
+    is connected to ``failed``.
     """
 
     done = Signal(object)
@@ -86,7 +86,7 @@ class Background(QObject):
         return self._wanted is not None
 
     def run(self, job: Callable[[], Any]) -> None:
-        """Run ``job`` in a thread; the result of an earlier job is dropped."""
+        """Run ``job`` in a thread; the result of an earlier job is discarded."""
         self._wanted = job
         if self._thread is None:
             self._start_job(job)
