@@ -553,11 +553,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"{10**SESSION_SD:.2f} (one standard deviation), and for a change over the trials. The group is the "
             "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp if there are at least three "
             "participants. Each variance is replaced by its geometric mean with the median "
-            f"variance.{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers; for the group, "
-            "by how many standard errors errors follow errors more often than expected, with “!” above "
-            f"{MOST_CLUSTERED:g}. Drift: correlation of trial number and deviance residual, with “!” if the threshold changes over the trials by "
-            f"more than {BEYOND_CHANCE:g} standard errors; for the group, by how many standard errors thresholds rose "
-            f"or fell after the first trials. n counts answers{catch}."
+            f"variance.{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers; for the "
+            "group, by how many standard errors errors follow errors more often than expected, with “!” above "
+            f"{MOST_CLUSTERED:g}. Drift: correlation of trial number and deviance residual, with “!” if the threshold "
+            f"changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, by how many "
+            f"standard errors thresholds rose or fell after the first trials. n counts answers{catch}."
             + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
@@ -719,9 +719,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "mean with the median variance, the between-person variance of Paule and Mandel (1982) and, with at "
                 f"least {FEWEST} participants, the interval of Hartung and Knapp (2001), widened by the uncertainty of "
                 "the width and the lapse rate that all have in common. Whether thresholds rose or fell after the first "
-                f"trials was tested by the score of a change that fades over {EARLY_TRIALS:g} trials. Whether errors form "
-                "clusters was tested by the errors beyond those expected, each weighted by the probability that the "
-                f"answers before it, at most {BURST_TRIALS - 1}, were random guesses."
+                f"trials was tested by the score of a change that fades over {EARLY_TRIALS:g} trials. Whether errors "
+                "form clusters was tested by the errors beyond those expected, each weighted by the probability that "
+                f"the answers before it, at most {BURST_TRIALS - 1}, were random guesses."
             )
 
 
