@@ -247,7 +247,7 @@ def mentioned(folder: Path, text: str) -> list[Path]:
 def test_each_answer_is_found_once_where_it_belongs(number: int, tmp_path: Path) -> None:
     text, study = drawn(number)
     file, results = tmp_path / "drawn.toml", tmp_path / "results"
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text, encoding="utf-8", newline="\n")
     answers = held(study, file.read_bytes(), results, made_up(str(file)), number)
     if number % 2:
         unblind_folder(results, by="AB", reason="a test")
