@@ -25,9 +25,6 @@ GROUPS: Final = {
     "Devices": "devices outlets plugins",
     "Help": "docs",
 }
-_REMOVED: Final = {"emulate-falcon": "--device falcon-emulated runs the Falcon's driver on an emulated Falcon"}
-_RENAMED: Final = {"run": {"--by": "--operator"}, "resume": {"--by": "--operator"}, "merge": {"--site": ""}}
-"""Options of earlier versions by command, and what they are now; "": what followed them stands alone."""
 _SAMPLES: Final = {
     "FILE": "rek2024",
     "RESULTS": "rek2024",
@@ -61,18 +58,7 @@ EXIT_CANCELLED: Final = 130
 
 
 class GroupedCommands(click.Group):
-    """Commands that ``--help`` lists under the headings of `GROUPS`; options of earlier versions are accepted."""
-
-    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
-        """Return a command by its name."""
-        if args and args[0] in _REMOVED:
-            ctx.fail(f"'{args[0]}' is no longer a command: {_REMOVED[args[0]]}")
-        for old, new in _RENAMED.get(args[0] if args else "", {}).items():
-            if any(word.partition("=")[0] == old for word in args):
-                click.echo(f"{old} is {new} now" if new else f"{old} is no longer needed", err=True)
-            renamed = [word for word in args if word != old or new]
-            args[:] = [_current_option(word, old, new) for word in renamed]
-        return super().resolve_command(ctx, args)
+    """Commands that ``--help`` lists under the headings of `GROUPS`."""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands by group."""
@@ -83,12 +69,6 @@ class GroupedCommands(click.Group):
                 formatter.write_dl(
                     [(name.ljust(width), command.get_short_help_str(_LONGEST)) for name, command in listed]
                 )
-
-
-def _current_option(word: str, old: str, new: str) -> str:
-    """Return a word of the command line with the option's current name; without a name only the value."""
-    option, equals, value = word.partition("=")
-    return word if option != old else f"{new}{equals}{value}" if new else value
 
 
 def example_of(ctx: click.Context) -> str:

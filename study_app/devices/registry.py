@@ -18,9 +18,6 @@ from study_app.errors import DeviceError, DeviceNotFound
 if TYPE_CHECKING:
     from study_app.devices.base import Device
 
-_REMOVED: Final = {"falcon-socket": "falcon-emulated, or falcon"}
-"""Devices of earlier versions, with their replacements."""
-
 
 def _are_backends(value: object) -> bool:
     """Return whether a value is a sequence of backends; an iterator would be consumed by the check."""
@@ -54,8 +51,6 @@ def descriptor_of(name: str) -> DeviceDescriptor:
     """
     kind, _, argument = name.partition(":")
     descriptor = DEVICES.get(kind)
-    if descriptor is None and kind in _REMOVED:
-        raise DeviceNotFound(f"device '{name}' was removed: choose {_REMOVED[kind]}")
     if descriptor is None or (argument and not descriptor.argument):
         known = ", ".join(device.usage for device in all_devices())
         raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")

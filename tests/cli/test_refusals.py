@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import click
 import pytest
 from click.testing import CliRunner
 
@@ -71,18 +70,3 @@ def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.Monkey
     done = CliRunner().invoke(commands, ["accuracy", "--liquids", "--to", str(tmp_path)])
     assert (done.exit_code, (tmp_path / "survey.md").read_text("utf-8")) == (0, "compared"), done.output
     assert done.stdout.strip() == str(tmp_path / "survey.md")
-
-
-@pytest.mark.parametrize(
-    ("command", "words", "taken"),
-    [
-        ("run", ("--by=AK", "--by", "AK"), ("--operator=AK", "--operator", "AK")),
-        ("run", ("--operator", "AK, not --by=BM", "--site=x"), ("--operator", "AK, not --by=BM", "--site=x")),
-        ("merge", ("--site", "A=x", "--site=Delft=x", "B=a --site=b"), ("A=x", "Delft=x", "B=a --site=b")),
-        ("exclude", ("--by=AK", "--reason", "--by=BM"), ("--by=AK", "--reason", "--by=BM")),
-    ],
-)
-def test_former_options_are_renamed_and_texts_that_contain_them_are_not(
-    command: str, words: tuple[str, ...], taken: tuple[str, ...]
-) -> None:
-    assert commands.resolve_command(click.Context(commands), [command, *words])[2] == [*taken]

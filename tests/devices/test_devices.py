@@ -33,11 +33,6 @@ def test_a_device_without_the_parts_of_a_device_is_closed_and_named(monkeypatch:
     assert bare.closed
 
 
-def test_a_device_that_was_removed_is_refused_with_what_to_choose() -> None:
-    with pytest.raises(DeviceNotFound, match="'falcon-socket:/x' was removed: choose falcon-emulated"):
-        open_device("falcon-socket:/x")
-
-
 @pytest.mark.usefixtures("falcon_socket")
 def test_a_name_that_is_not_enough_is_refused_with_what_is_missing() -> None:
     with pytest.raises(DeviceNotFound, match="falcon-socket:PATH"):

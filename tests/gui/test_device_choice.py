@@ -47,7 +47,7 @@ def test_firmware_is_for_falcons_alone(tmp_path):
     with pytest.raises(DeviceError, match="device 'mouse' does not use firmware; only these do: Novint Falcon,"):
         check_choices(chosen, study)
     check_choices(replace(chosen, device="falcon"), study)
-    with pytest.raises(DeviceNotFound, match="'falcon-socket:/run/f' was removed: choose falcon-emulated, or falcon"):
+    with pytest.raises(DeviceNotFound, match="'falcon-socket:/run/f' is not known; choose one of: "):
         check_choices(replace(chosen, device="falcon-socket:/run/f"), study)
 
 
