@@ -150,11 +150,13 @@ commands() {
     fi
     step "An export over a file that another program has open"
     wine_python -c "
-import time
-with open(r'C:\\study\\export\\codebook.json', 'rb'):
-    time.sleep(60)" &
+import os, time
+with open('C:/study/export/codebook.json', 'rb'):
+    while not os.path.exists('C:/study/exported'):
+        time.sleep(1)" &
     sleep 15
     expect "codebook.json cannot be replaced" study export demo-rehearsal-2 --to 'C:\study\export'
+    touch "$studies/exported"
     wait "$!" || true
 }
 
