@@ -6,6 +6,7 @@ Every one must follow from the change of the program; one that you cannot explai
 Regenerate windows with the Qt of ``tests/gui/golden/qt_version``; commit texts and program together.
 """
 
+import os
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -73,6 +74,9 @@ def compare(
         kept.parent.mkdir(parents=True, exist_ok=True)
         kept.write_text("\n".join(found) + "\n", encoding="utf-8", newline="\n")
     expected = kept.read_text(encoding="utf-8").removesuffix("\n").split("\n")
+    if os.sep == "\\":  # paths of Windows
+        found = [line.replace("WindowsPath", "PosixPath").replace("\\", "/") for line in found]
+        expected = [line.replace("\\", "/") for line in expected]
     pairs = zip_longest(expected, found)
     alike = found == expected if exact else all(None not in pair and _alike(*pair, rel, abs_) for pair in pairs)
     if not alike:
