@@ -618,4 +618,4 @@ def open_force(
         try:
             yield loop
         finally:
-            loop._end()  # noqa: SLF001 - it is of this module
+            loop._end()  # noqa: SLF001 - it belongs to this module

@@ -197,7 +197,7 @@ class Registry(Mapping[str, T], Generic[T]):
             raise StudyError(f"{place} lacks {', '.join(sorted(lacking))}: define them")
         name, begins = getattr(found, self._key, ""), f"{_canonical(package)}:"
         if self._key == "kind":
-            found.model_json_schema()  # what its keys lack is said now, not by a form
+            found.model_json_schema()  # missing keys are reported now rather than by a form
             kind = found.model_fields.get("kind")
             if kind is not None and kind.is_required():
                 raise StudyError("its kind does not have a default: set the default to the value of the Literal")

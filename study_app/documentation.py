@@ -146,7 +146,7 @@ def _stems(words: str) -> list[str]:
 
 
 def _has(text: str, stem: str, begins: re.Pattern[str]) -> bool:
-    return stem in text and begins.search(text) is not None  # the first alone takes a tenth of the time
+    return stem in text and begins.search(text) is not None  # the first search alone takes a tenth of the time
 
 
 def anchor_of(heading: str) -> str:

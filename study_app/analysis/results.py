@@ -96,7 +96,7 @@ class Failures:
         """Return the result of ``compute``, or the failure, which is recorded."""
         try:
             return compute()
-        except Exception as error:  # noqa: BLE001 - one part must not take the report with it
+        except Exception as error:  # noqa: BLE001 - a failing part must not prevent the report
             last = traceback.extract_tb(error.__traceback__)[-1]
             words, where = f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}"
             if isinstance(said := explained(error), PlugInError):

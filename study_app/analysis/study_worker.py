@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from study_app.analysis.data.study_tables import Study
     from study_app.analysis.page_layout import Picture
 
-# The libraries of an evaluation are loaded where they are needed: sessions are listed before.
+# The libraries of an evaluation are loaded only when needed, after the sessions are listed.
 
 Send: TypeAlias = Callable[[Answer], object]
 
@@ -83,11 +83,11 @@ def _studies(results: Path) -> Iterator[StudyAt]:
     for folder in folders:
         try:
             sessions = sessions_in(folders_of(folder).values())
-        except StoreError:  # said when the study is read
+        except StoreError:  # reported when the study is read
             sessions = ()
         first: dict[str, Any] = {}
         if sessions:
-            with contextlib.suppress(StoreError):  # said when the study is read
+            with contextlib.suppress(StoreError):  # reported when the study is read
                 first = receipt.read(sessions[0].receipt)
         newest = 0.0
         for session in sessions:

@@ -314,7 +314,7 @@ class WindowsThread(QObject):
             left -= 1
             try:
                 fire()
-            except Exception as error:  # noqa: BLE001 - handed over to whoever asked
+            except Exception as error:  # noqa: BLE001 - passed on to the caller
                 timer.stop()
                 fired.set_exception(error)
             else:
@@ -335,7 +335,7 @@ class _Painting(QObject):
     def __init__(self) -> None:
         super().__init__()
         self.frames = 0
-        settings = study_settings(load("rek2024"), Random(0))  # noqa: S311 - a hand trembles, it keeps no secrets
+        settings = study_settings(load("rek2024"), Random(0))  # noqa: S311 - a simulated tremor, not a secret
         self._rig = open_rig("scripted", settings, clock=VirtualClock())
         hand = hand_of(self._rig.device)
         assert hand is not None  # noqa: S101 - the scripted device has one

@@ -197,7 +197,7 @@ class Patience:
 def log_off_signal() -> SignalInstance:
     """Return the signal that the system emits before it ends the program, so that work can be saved."""
     application = QGuiApplication.instance()
-    assert isinstance(application, QGuiApplication)  # noqa: S101 - whoever shows windows has made it
+    assert isinstance(application, QGuiApplication)  # noqa: S101 - the application exists once windows are shown
     return application.commitDataRequest
 
 

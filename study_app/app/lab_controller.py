@@ -175,7 +175,7 @@ class LabOpening(QObject):
         QCoreApplication.sendPostedEvents()
 
     def _start_opening(self) -> None:
-        assert self._wanted is not None  # noqa: S101 - begun only where something is wanted
+        assert self._wanted is not None  # noqa: S101 - called only with a request
         self._cancelled, self._began_s = threading.Event(), time.perf_counter()
         self._background.run(partial(self._open_device, self._wanted, self._cancelled))
 
@@ -190,7 +190,7 @@ class LabOpening(QObject):
             made: object = self._open_live(name, progress=self.said.emit, cancelled=cancelled.is_set)
             if loads:
                 gc.freeze()  # keep the loaded objects out of the windows' thread's collections
-        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
+        except Exception as error:  # noqa: BLE001 - passed on: a thread has no caller to raise it to
             made = error
         return made, cancelled
 
@@ -204,7 +204,7 @@ class LabOpening(QObject):
         if not isinstance(made, Exception):
             try:
                 made.close()  # type: ignore[attr-defined]
-            except Exception as error:  # noqa: BLE001 - reported: it may push, and the next one does not wait
+            except Exception as error:  # noqa: BLE001 - reported: the device may exert force, and the next request must not wait
                 self.failed.emit(error)
         if self._wanted is not None:
             self._start_opening()
@@ -228,7 +228,7 @@ class _LabSaving(QObject):
 
     def save_preset(self, path: Path, setting: Setting) -> None:
         at_hand = (*(it.source for it in self.liquids), str(path))
-        # Not a pool, whose threads Python waits for at its end: a drive may never answer.
+        # Not a pool, since Python waits for its threads at exit, and a drive may never respond.
         self._before = threading.Thread(
             target=self._write_preset, args=(self._before, path, setting, at_hand), name="preset", daemon=True
         )
@@ -261,7 +261,7 @@ class _LabSaving(QObject):
         try:
             save_preset(path, preset_text(setting))
             outcome: object = f"Saved as {path.name} in {path.parent}", available_liquids(saved=at_hand)
-        except Exception as error:  # noqa: BLE001 - handed over: a thread has no caller to raise it to
+        except Exception as error:  # noqa: BLE001 - passed on: a thread has no caller to raise it to
             outcome = error
         self._done.emit(outcome)
 
@@ -430,7 +430,7 @@ class LabController(QObject):
         known = isinstance(error, StudyError)
         said = f"{error}" if known else f"{type(error).__name__}: {error}; the force is off"
         before, self.trouble = self.trouble, said
-        if not known and self.trouble != before:  # once, though every frame may raise it
+        if not known and self.trouble != before:  # only once, although every frame may raise it
             log.error("the lab failed: %s", error, exc_info=error)
 
     def view(self) -> LabView:

@@ -274,7 +274,7 @@ class MainController(QObject):
         self._loading.run(load_modules)
 
     def _make_lab_place(self) -> LabPlace:
-        self._loading.wait()  # two threads that load modules of one import cycle may see them half loaded
+        self._loading.wait()  # two threads that import modules of the same cycle may see them partially initialised
         from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
         from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
 
@@ -339,7 +339,7 @@ class MainController(QObject):
 
     def _go_to_designer(self, *actions: Callable[[DesignerController], object]) -> None:
         self.window.go("designer")
-        assert self.designer is not None  # noqa: S101 - else the window has said why, and raised that
+        assert self.designer is not None  # noqa: S101 - otherwise the window has shown and raised the error
         for act in actions:
             act(self.designer)
 

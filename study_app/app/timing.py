@@ -69,7 +69,7 @@ class FrameBudget:
 
 
 _PERIOD_MS = 200
-YOUNG, OLDEST = 1, 2  # generations; collecting up to the first takes no time
+YOUNG, OLDEST = 1, 2  # generations; collecting up to the first is fast
 _LONG_S = 0.02
 MOST_FROZEN = 500_000  # objects; the modules of home, designer, lab and session have 170 000
 _session_runs = threading.Event()

@@ -77,7 +77,9 @@ def main() -> None:
     """
     ended: list[int] = []
     atexit.register(_exit_at_once, ended)  # registered first, so it is called last
-    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # none is used, and searching them reads every package
+    os.environ.setdefault(
+        "PYDANTIC_DISABLE_PLUGINS", "__all__"
+    )  # they are not used, and searching for them reads every package
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # an old console may lack a letter; a pipe or file is UTF-8
             stream.reconfigure(encoding=None if stream.isatty() else "utf-8", errors="backslashreplace")
@@ -93,7 +95,7 @@ def main() -> None:
         sys.exit(130)
     except StudyError as error:
         if isinstance(error, PlugInError):
-            logging.getLogger(__name__).info("%s", error, exc_info=True)  # the terminal has the line alone
+            logging.getLogger(__name__).info("%s", error, exc_info=True)  # the terminal shows only the line
         click.echo(f"liquid-study: {_shortened(str(error))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (Exception, SystemExit) as error:
@@ -106,7 +108,7 @@ def main() -> None:
         if (said := explained(error)) is error:
             log.critical("a bug ended the program", exc_info=True)
             raise
-        log.info("%s", said, exc_info=True)  # in the log alone: the terminal has the line below
+        log.info("%s", said, exc_info=True)  # only in the log: the terminal shows the line below
         click.echo(f"liquid-study: {_shortened(str(said))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     code = code if isinstance(code, int) else 0

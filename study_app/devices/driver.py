@@ -312,7 +312,7 @@ def examine(
     """
     request = OpenRequest(argument=name.partition(":")[2], options=options or {}, progress=progress)
     device = framed_device(name, request)
-    assert device is not None  # noqa: S101 - a doctor of this kind is that of such a driver
+    assert device is not None  # noqa: S101 - this kind of doctor belongs to a `FramedDevice`
     for fault in faults:
         device.take_fault(fault)
     table = device.failures

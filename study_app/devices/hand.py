@@ -41,7 +41,7 @@ _MOTION_ROW = np.dtype([("t_s", np.float64), ("position_m", np.float64, (3,))], 
 
 HAND = np.dtype(
     [
-        ("serial", np.int64),  # of the posted order; odd while it is being written
+        ("serial", np.int64),  # serial of the posted order; odd while it is being written
         ("posted", _ORDER),
         ("taken", np.int64),  # serial of the order in force
         ("order", _ORDER),
@@ -289,7 +289,7 @@ class HandOrders:
 
     def _tremble(self, random: Random | None, tremor_m: float) -> None:
         """Draw frequencies and phases of a tremor with this amplitude; with None they are always the same."""
-        draw = (random or Random(0)).random  # noqa: S311 - a hand trembles, it keeps no secrets
+        draw = (random or Random(0)).random  # noqa: S311 - a simulated tremor, not a secret
         hand = self.state.hand
         hand.tremor_m = tremor_m
         lowest, highest = _TREMOR_HZ

@@ -78,7 +78,7 @@ def _lag_s(scene: Scene) -> float:
     motion = Motion(t_s, np.column_stack([0.5 * _RAMP_MPS2 * t_s**2, rest, rest]))
     still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
     seen = simulate(still, motion)
-    last = len(t_s) // 4  # of the end, at which the filter has settled
+    last = len(t_s) // 4  # share of the motion's end in which the filter has settled
     return float(np.mean(_RAMP_MPS2 * t_s[-last:] - seen["vx_mps"][-last:])) / _RAMP_MPS2
 
 

@@ -117,7 +117,7 @@ _ELEMENT = np.dtype(
         ("velocity_mps", np.float64, (3,)),
         ("speed_mps", np.float64),  # 0: an element at rest
         ("segment", np.int64),
-        ("age_ns", np.int64),  # of the list when it was stored
+        ("age_ns", np.int64),  # scale of the list when it was stored
         ("arc_m", np.float64),
     ],
     align=True,

@@ -115,7 +115,7 @@ between laws of the Reynolds number that are as small cannot be separated from t
 _OSEEN_REYNOLDS: Final = 0.5
 _CREEPING_REYNOLDS: Final = 0.01
 _START_S: Final = 2.0
-_UNCOUNTED_S: Final = 0.01  # after a step the force of the added mass is infinite for an instant
+_UNCOUNTED_S: Final = 0.01  # at a step the added-mass force is infinite for an instant
 _SPEEDS: Final = 60
 CYCLES: Final = 6
 

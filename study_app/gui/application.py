@@ -25,7 +25,9 @@ def application_here() -> QApplication:
         instance.setQuitOnLastWindowClosed(False)
         return instance
     check_display()
-    os.environ.setdefault("MESA_SHADER_CACHE_DISABLE", "true")  # its idle thread delays the end by seconds under load
+    os.environ.setdefault(
+        "MESA_SHADER_CACHE_DISABLE", "true"
+    )  # its idle thread delays the program's exit by seconds under load
     if sys.platform == "win32":  # else the taskbar shows Python's icon
         ctypes.windll.shell32.SetCurrentProcessExplicitAppUserModelID("LiquidStudy")
     QGuiApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)

@@ -13,7 +13,7 @@ from PySide6.QtGui import QGuiApplication, QKeyEvent, QWindow
 from PySide6.QtWidgets import QWidget
 
 RELEASE_MS: Final = 30  # a release is real unless a press with its time stamp follows within this time
-CLICK_MS: Final = 250  # a page ignores clicks for so long after it appeared
+CLICK_MS: Final = 250  # time during which a new page ignores clicks
 _MOVING: Final = frozenset({
     Qt.Key.Key_Left, Qt.Key.Key_Right, Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown,
     Qt.Key.Key_Backspace, Qt.Key.Key_Delete,

@@ -170,7 +170,7 @@ class SinkThread:
         with self._changed:
             if self.lost or self._closing:
                 return
-            since_s = self._since_s  # read once: the thread clears it at any time
+            since_s = self._since_s  # read once, since the thread may clear it at any time
             taken_s = 0.0 if since_s is None else perf_counter() - since_s
             if taken_s > HANGS_S:
                 self._give_up(f"a marker was not sent in {taken_s:.1f} s (limit {HANGS_S:g} s): {_ADVICE}")

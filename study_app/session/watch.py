@@ -137,7 +137,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
         raise StoreError(f"{session.journal} does not contain attempt {attempt} at {named}: choose another trial")
     _, *own = open_events([lines[0], *lines[first : next((at for at in begun if at > first), None)]], shown)
     started = own[0]
-    assert isinstance(started, events.TrialStarted)  # noqa: S101 - it was looked for
+    assert isinstance(started, events.TrialStarted)  # noqa: S101 - checked before
     which: events.Which = (trial, attempt, interval if started.has_intervals else None)
     stored = next((line for line in lines if isinstance(line, _STORED) and line.which == which), None)
     if not isinstance(stored, events.Recorded):

@@ -139,7 +139,7 @@ class Camera:
         try:
             self._read()
             failure = "it ended"
-        except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no common base but this
+        except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no other common base class
             failure = failure_reason(error)
         with self._changed:
             self._failure = failure
@@ -234,7 +234,7 @@ class Footage:
                 stream = container.streams.video[0]
                 self._period_ns = period_ns(stream)
                 if (first := next(container.decode(stream), None)) is None:
-                    raise VideoError("it does not contain frames")  # noqa: TRY301 - said with the file's name below
+                    raise VideoError("it does not contain frames")  # noqa: TRY301 - reported with the file's name below
                 self._start_s = first.time or 0.0
                 self.size = (stream.width, stream.height)
         except Exception as error:
@@ -311,7 +311,7 @@ class Footage:
                     for frame in self._decoded(container, play):
                         if not self._put(frame, play):
                             break
-        except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no common base but this
+        except Exception as error:  # noqa: BLE001 - FFmpeg's errors have no other common base class
             with self._changed:
                 self._failure = failure_reason(error)
 

@@ -83,7 +83,7 @@ def _lost_process() -> WorkerError:
 def _start_process(watched: Connection) -> None:
     """Prepare a process of the pool before it imports the computing modules."""
     ignore_interrupts()
-    compute_in_one_thread()  # there are as many processes as cores
+    compute_in_one_thread()  # there is one process per core
     threading.Thread(target=_exit_at_end_of, args=(watched,), name="end of program", daemon=True).start()
 
 

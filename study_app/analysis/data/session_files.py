@@ -344,7 +344,7 @@ def with_excluded(table: pd.DataFrame, listed: Sequence[Exclusion]) -> pd.DataFr
     matching = [
         [
             exclusion
-            for which in dict.fromkeys((None, None if pd.isna(trial) else trial))  # the session's before the trial's
+            for which in dict.fromkeys((None, None if pd.isna(trial) else trial))  # exclusions of sessions first
             for exclusion in by_what.get((participant, session, which), ())
         ]
         for participant, session, trial in zip(table["participant"], table["session"], trials, strict=True)

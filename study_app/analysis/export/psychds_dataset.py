@@ -83,7 +83,7 @@ def _study_file(study: str, hashes: set[str], footage: dict[str, str]) -> tuple[
             if not _is_of(study, file):  # the footage of other studies is not hashed: it may be large
                 continue
             source = source_bytes(name)
-        except ProtocolError:  # of another study, perhaps: what cannot be read cannot be shared
+        except ProtocolError:  # possibly another study's; unreadable files cannot be shared
             continue
         content, liquids = unbundle(source)
         if any(has_hash(bundle(content, liquids.get, footage), digest) for digest in hashes):

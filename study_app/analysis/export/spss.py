@@ -37,7 +37,7 @@ _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", 
 def long_sav(study: Study, table: Delivered) -> bytes:
     """Return the long table of responses as an SPSS file."""
     frame = table.frame
-    if study.protocol_format > 1:  # the answers of all kinds in one column are texts, without levels
+    if study.protocol_format > 1:  # a column with answers of all kinds has texts without value labels
         return sav(study, table, {})
     answers = frame["response"].astype("Float64").fillna(_NOT_ANSWERED).mask(frame["cannot_judge"], _CANNOT_JUDGE)
     labels = {block.labels for block in study.blocks}

@@ -71,7 +71,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
     if not study.revealed:
         return
     frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
-    # of an interval that no trial reached, the frame has no column
+    # the frame has no column for an interval that no trial reached
     of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
     yield delivered("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     results = level_results(study, frame.rename(columns={"level_asked": "level"}))
@@ -258,7 +258,7 @@ def _wide_cells(study: Study) -> dict[str, Cells | QuestionCells]:
     ]
     found: dict[str, Cells | QuestionCells] = {}
     asked: tuple[PlacedQuestion | PlacedScore, ...] = (*study.others.questions, *study.others.scores)
-    levels = {block.id for block in study.levels}  # their answers are pooled by no track: see the table of tracks
+    levels = {block.id for block in study.levels}  # their answers belong to no track: see the table of tracks
     for other in (one for one in asked if one.where.id not in levels):
         called = other.name if isinstance(other, PlacedScore) else other.id
         for about in other.where.settings or (None,):

@@ -255,7 +255,7 @@ class _SessionsDiffer(StatementTests):
             each = np.stack([medians(np.where(of == one, single, np.nan)) for one in numbers], axis=2)
             common = np.asarray(~np.isnan(each).any(axis=2))
             outcomes[item.id] = _alike(answers, medians(np.where(common[..., None], each, np.nan).transpose(0, 2, 1)))
-        ungated = replace(answers, gate=0.0)  # sessions may differ where settings do not
+        ungated = replace(answers, gate=0.0)  # sessions may differ even if settings do not
         tested = in_family(outcomes, ungated, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False)
         if all(test.outcome.n == 0 for test in tested):
             return (), (NotTested(cls.what, "no participant answered the same setting in all sessions"),)

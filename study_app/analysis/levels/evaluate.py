@@ -38,7 +38,7 @@ def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[Level
         return ()
     timed = answers_timed(study)
     opened = rows if rows is not None else tracks(study) if study.revealed else None
-    opened = None if opened is None else opened[list(READ)]  # groups of few columns are made in less time
+    opened = None if opened is None else opened[list(READ)]  # grouping few columns is faster
     return tuple(_levels_of_block(study, block, timed, opened) for block in main)
 
 

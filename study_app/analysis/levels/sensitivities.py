@@ -94,7 +94,9 @@ def preferences(of_people: Iterable[SensitivityEstimate]) -> dict[str, float]:
             or estimate.high is None
         ):
             continue
-        error = (estimate.high - estimate.d_prime) / Z_95 / math.sqrt(2)  # of a criterion, whose rates are those of d′
+        error = (
+            (estimate.high - estimate.d_prime) / Z_95 / math.sqrt(2)
+        )  # rows with a criterion also have the rates of d′
         counts.setdefault(estimate.participant, []).append((estimate.criterion, error))
     means = {person: np.mean([criterion for criterion, _ in rows]) for person, rows in counts.items()}
     errors = {person: math.hypot(*(error for _, error in rows)) / len(rows) for person, rows in counts.items()}

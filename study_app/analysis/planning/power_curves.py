@@ -554,7 +554,7 @@ def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float
     root, freedom = _precision(n, second)
     tested = min(n, second or n) - 1  # the report's degrees of freedom are those of the smaller group
     critical = float(student.isf(tail, tested))
-    most = (2 * critical + 10) / root  # of so large a difference more than 80 % show it
+    most = (2 * critical + 10) / root  # more than 80 % of studies show such a large difference
     least = float(brentq(lambda size: nct.sf(critical, freedom, size * root) - WANTED, 0.0, most))
     return float(student.ppf(0.975, tested)) / root, least
 

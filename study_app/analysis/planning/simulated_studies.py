@@ -391,7 +391,7 @@ def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: 
         for name, shown in contrasts(plan, [one[:, :, :n] for one in given], decided.alpha).items():
             of_sizes.setdefault((name, "contrast"), []).append(shown)
     for numbers in of_sizes.values() if plan.decided.looks else ():
-        numbers[:] = np.logical_or.accumulate(numbers)  # a study that shows it at a look ends there
+        numbers[:] = np.logical_or.accumulate(numbers)  # a study that shows it at a look is stopped
     counts = {what: np.array(numbers, np.float64).sum(axis=1) for what, numbers in of_sizes.items()}
     means = {(block.id, "means"): here.mean(axis=2).sum(axis=1) for block, here in zip(plan.blocks, given, strict=True)}
     return counts | means

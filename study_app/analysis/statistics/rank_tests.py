@@ -396,7 +396,7 @@ def _p_over_all(scores: Array, found: float, draws: int, seed: int) -> tuple[flo
     orders = math.factorial(k)
     if (n - 1) * math.log(orders) <= math.log(_EXACT_OVER_ALL):
         people = scores.transpose(1, 0, 2)
-        sums = people[:1]  # the first participant may stay as he or she is
+        sums = people[:1]  # the first participant need not be permuted
         every = np.array(list(permutations(range(k))))
         for person in people[1:]:
             sums = (sums[:, None] + person[:, every].transpose(1, 0, 2)[None]).reshape(-1, *person.shape)

@@ -71,7 +71,7 @@ def load_windows() -> None:
     import study_app.app.session.preflight_controller  # noqa: PLC0415
     import study_app.gui.devices.diagnosis_dialog  # noqa: PLC0415
     import study_app.store.receipt  # noqa: PLC0415
-    import study_app.store.recordings  # noqa: PLC0415 - and pyarrow, which the recorder is made with
+    import study_app.store.recordings  # noqa: PLC0415 - and pyarrow, which the recorder needs
 
     study_app.store.receipt.versions()
 
@@ -217,7 +217,7 @@ class LiveSession(QObject):
         """Run a step towards the first page; an error closes the session in the proper order."""
         try:
             step()
-        except Exception as raised:  # noqa: BLE001 - told; what is open must be closed in order
+        except Exception as raised:  # noqa: BLE001 - reported; open parts must be closed in order
             error = explained(raised)
             if isinstance(error, StudyError):
                 self.error = error
@@ -305,7 +305,7 @@ class LiveSession(QObject):
         """Open the diagnosis of the device above the operator's window; the bridge has stopped the force."""
         from study_app.gui.devices.diagnosis_dialog import open_diagnosis  # noqa: PLC0415 - the note comes before it
 
-        assert self.bridge is not None  # noqa: S101 - it has just asked
+        assert self.bridge is not None  # noqa: S101 - the window that asks exists
         name = self.chosen.device
         device = descriptor_of(name)
         if device.doctor is None:
@@ -330,7 +330,7 @@ class LiveSession(QObject):
 
     def _finish_session(self) -> None:
         """Close the session after its windows; keep the error that ended it for the caller."""
-        assert self.bridge is not None  # noqa: S101 - it has just spoken
+        assert self.bridge is not None  # noqa: S101 - the sender exists
         self.theme = self.bridge.operator.theme
         if (proof := self.bridge.parts.journal.fingerprint) and self._store is not None:
             tell = self._progress or logging.getLogger(__name__).info
@@ -372,7 +372,7 @@ class LiveSession(QObject):
                     self.bridge.leave_without_asking()  # no window stays open without its session
         except StudyError as error:
             self.error = self.error or error  # the first error is the cause
-        except Exception:  # noqa: BLE001 - printed; whoever waits for the end must be notified
+        except Exception:  # noqa: BLE001 - printed; listeners of the end must be notified
             traceback.print_exc()
             self.code = BUG
         self.over.emit()

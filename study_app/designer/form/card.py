@@ -487,7 +487,7 @@ class _FormHead(QWidget):
         self.feel.setAccessibleName(form.feel or "Feel")
         self.feel.setToolTip(f"{form.feel} in the lab")
         self.series.setVisible(form.series and not read_only)
-        alone = form.position is not None  # next to the arrows there is room for the icon alone
+        alone = form.position is not None  # next to the arrows there is only room for the icon
         self.series.show_action("bars", "" if alone else "Series …")
         self.series.setMaximumWidth(34 if alone else QWIDGETSIZE_MAX)
         self.series.setAccessibleName(f"Series of {form.title}")
@@ -668,7 +668,7 @@ class FormCard(Card):
                 self.adds |= {(*form.path, *inner): made for inner, made in part.buttons.items()}
         gone = next((part for part in old.values() if inside_form and part.isAncestorOf(keyboard)), None)
         if gone is not None and keyboard is not None:
-            keyboard.clearFocus()  # else Qt moves the keyboard focus
+            keyboard.clearFocus()  # otherwise Qt moves the keyboard focus
         self._remove_parts(old)
         for place, part in enumerate(self._parts.values()):
             if self.sections.indexOf(part) != place:

@@ -64,15 +64,15 @@ class _LevelAxis:
     # the ends of the axis
     least: float
     most: float
-    logarithmic: bool  # whether levels are in ratio, not even
+    logarithmic: bool  # whether levels are spaced logarithmically
     levels: tuple[float, ...]  # the levels between which a method chooses
-    factor: float  # the factor of written levels
-    unit: str  # the unit of a written level
-    caption: str  # what a level is, and how the levels are spaced
+    factor: float  # the display factor of levels
+    unit: str  # the display unit of levels
+    caption: str  # the kind of level and its spacing, as text
     standard: str  # the highest standard in words, "" without one
     # the levels of the force limit ("norm") and the slope limit, if near
     limits: Mapping[Limit, _AxisLimit]
-    ticks: Ticks  # levels at which the axis is written at
+    ticks: Ticks  # labelled levels of the axis
     sentence: str  # the axis in a sentence
 
 
@@ -222,7 +222,7 @@ class _Phase:
     """A phase of a trial."""
 
     kind: _PhaseKind  # what it is
-    # its name, and what is written in its picture
+    # its name, and the text in its picture
     name: str
     words: str
     duration_s: float  # how long it takes [s]

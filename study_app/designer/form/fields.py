@@ -162,7 +162,7 @@ class _Typed(_Base):
         super().focusOutEvent(event)
         if event.reason() != Qt.FocusReason.MouseFocusReason:
             self.flush()
-            QTimer.singleShot(0, self, self.left.emit)  # after the focus has moved: the form may be made anew
+            QTimer.singleShot(0, self, self.left.emit)  # after the focus has moved, since the form may be rebuilt
         else:
             self._rest.start(CLICK_MS)
 

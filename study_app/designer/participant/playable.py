@@ -254,7 +254,7 @@ class Playable:
     source: bytes = field(repr=False)
     folder: Folder  # where its footage is
     protocol: Protocol = field(repr=False)
-    step: int  # of the preview's schedule: the first that is shown
+    step: int  # index in the preview's schedule of the first step shown
     words: str  # that step, as "Liquids, trial 3 of 6"
     position: StepPosition  # language and seed
 

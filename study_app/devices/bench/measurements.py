@@ -23,7 +23,7 @@ _DIFFERENCE: Final = 5
 _COUNTING_MPS: Final = (0.02, 0.2)
 """Speeds at which positions show the encoder's count."""
 _LEAST_COUNTED: Final = 200
-_MEDIAN_OF_NORMAL: Final = 0.6745  # of a normal distribution's absolute value, by its standard deviation
+_MEDIAN_OF_NORMAL: Final = 0.6745  # median absolute value of a normal distribution, in standard deviations
 _STEP_S: Final = 0.1e-3
 _NEAR: Final = 10
 _REACH: Final = 5  # widths of the Gaussian on either side
@@ -210,7 +210,7 @@ def _prepare_segment(samples: Any, axis: int, step_s: float) -> _Prepared:
     smooth, v_mps, a_mps2 = (np.convolve(x_m - x_m.mean(), it, "valid") for it in (bell, kernels.first, kernels.second))
     friction = np.convolve(np.tanh(v_mps / _SLOW_MPS), bell, "valid")
     reach = len(bell) // 2
-    whole = slice(reach, len(smooth) - reach)  # where friction is smoothed like the rest
+    whole = slice(reach, len(smooth) - reach)  # points at which friction is smoothed like the other terms
     terms = np.column_stack([a_mps2[whole], v_mps[whole], friction, smooth[whole], np.ones_like(friction)])
     sent_s = (samples.time_ns - samples.time_ns[0]) * 1e-9
     # A force acts from its write to the next: its middle is half a tick later.

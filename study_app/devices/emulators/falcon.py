@@ -208,7 +208,9 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
         code, moved = self._claimed(dev_handle).write(bytes(data), timeout)
-        if moved == 0 or code != constants.ERROR_TIMEOUT:  # what went before the time was out is reported, as by libusb
+        if (
+            moved == 0 or code != constants.ERROR_TIMEOUT
+        ):  # the bytes transferred before the time-out are reported, as by libusb
             _check(code)
         return moved
 

@@ -29,7 +29,7 @@ ARMS = np.dtype(
         ("units_per_nm", np.float64),  # motor units that make an arm torque of 1 N m; a positive unit pulls inward
         ("centre_m", np.float64),  # the hand's origin, in front of the base
         ("angle_rad", np.float64, (3,)),  # last result
-        ("force_n", np.float64, (3,)),  # of the motors on the grip, as last found
+        ("force_n", np.float64, (3,)),  # force of the motors on the grip, as last computed
     ],
     align=True,
 )
@@ -45,7 +45,7 @@ _LEAST_LEVER_M = 0.012
 """Smallest change of the rod's length per arm rotation [m/rad]: below it the arm is nearly stretched, at its stop. All
 that a Falcon is used for is twice as far from that."""
 
-_STEP_M = 2e-5  # of the differences: truncated at 1e-7 of a derivative, rounded at 1e-11
+_STEP_M = 2e-5  # step of the differences: truncation error 1e-7 of a derivative, rounding error 1e-11
 _STEP_RAD = 2e-4
 _ENOUGH_RAD = 1e-14
 _SLACK_M = 1e-9
@@ -170,7 +170,7 @@ def _stretch(arms: Any, arm: int, angle: float, x: float, y: float, z: float) ->
     aside = link_x * cx + link_y * cy
     flat_x, flat_y = link_x - aside * cx, link_y - aside * cy
     flat = math.sqrt(flat_x * flat_x + flat_y * flat_y + link_z * link_z)
-    kept = 1.0 - arms.ends_m / flat  # the end links lie in the arm's plane, in line with what is seen of the rod there
+    kept = 1.0 - arms.ends_m / flat  # the end links lie in the arm's plane, in line with the rod's projection onto it
     rod_x, rod_y, rod_z = kept * flat_x + aside * cx, kept * flat_y + aside * cy, kept * link_z
     stretch: float = math.sqrt(rod_x * rod_x + rod_y * rod_y + rod_z * rod_z) - arms.rod_m
     return stretch

@@ -55,7 +55,7 @@ _word_at = record_at(_WORD)
 
 _USB_NS: Final = 30_000  # least duration of a transfer, in the emulator's own time
 _ENDLESS_NS: Final = 3_600_000_000_000
-_BACK_NS: Final = 1_000_000_000  # a clock this far behind is another one, or was reset
+_BACK_NS: Final = 1_000_000_000  # a clock this far behind was replaced or reset
 _STATUS = (0x01, 0x60)  # modem status, line status: ready and empty
 _EIGHTHS = (0, 4, 2, 1)  # of a divisor, by its two highest bits
 

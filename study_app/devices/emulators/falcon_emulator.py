@@ -301,7 +301,7 @@ class Emulator(HandOrders):
         self.recorded: list[tuple[int, int]] = []
         self.memory = memory
         self._address = int(memory.ctypes.data)
-        random = random or Random(0)  # noqa: S311 - faults and tremor keep no secrets
+        random = random or Random(0)  # noqa: S311 - simulated faults and tremor, not secrets
         self._now_ns = memory["bridge"]["now_ns"]
         self._tremble(random, tremor_m)
         self.faults = falcon_processor.Faults(self.state.faults, random)

@@ -300,7 +300,7 @@ RUN = np.dtype(
     align=True,
 )
 
-_INDEX_RAD: Final = 0.0  # arms are at their index here: further in than any place in use
+_INDEX_RAD: Final = 0.0  # arms are at their index here, further in than any position in use
 _ANSWER_NS: Final = 20_000  # from the end of a packet to the start of its reply
 
 _STROKES_M: Final = (0.047, -0.045, 0.047, 0.0)  # along z: out, in, out, and to the middle

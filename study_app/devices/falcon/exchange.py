@@ -105,7 +105,7 @@ def limit_growth(falcon: Any) -> None:
             given_n = kept * held_n[axis] + braking * v_mps[axis]
             force_n[axis] = given_n + share * (force_n[axis] - given_n)
         shorter = math.sqrt(min(asked_n2 / max(square(force_n), asked_n2), 1.0))
-        for axis in range(3):  # the force held may be longer, or what brakes may point elsewhere
+        for axis in range(3):  # the previous force may be greater, or the braking part may have another direction
             force_n[axis] *= shorter
 
 
@@ -119,7 +119,7 @@ _SMOOTHING_S: Final = 2e-3
 BRIDGE_LOST: Final = FIRST_CAUSE
 _LONGEST_GAP_NS: Final = 20_000_000
 """Greatest waiting time of a reply before the loop reads it: older ones are not used."""
-_BEYOND = 2  # positions in a row that show an out-stroke: a single one may be from a corrupted packet
+_BEYOND = 2  # consecutive positions that show an out-stroke, since a single one may come from a corrupted packet
 _READS = 2  # most reads of the bridge per tick: an answer may contain only status bytes
 _TIMEOUT_MS = 1
 _NORM_SLACK = 1.001
@@ -147,7 +147,7 @@ _FALCON = np.dtype(
         ("posed_ns", np.int64),  # time of the last pose; 0: none since the stream was reset
         ("previous_m", np.float64, (3,)),  # the pose before
         ("velocity_mps", np.float64, (3,)),
-        ("tick_s", np.float64),  # how long the last one was
+        ("tick_s", np.float64),  # duration of the last one
         ("slew_n_per_s", np.float64),  # growth rate of a force that does not brake the grip
         ("force_n", np.float64, (3,)),  # as it passed the gate
         ("held_n", np.float64, (3,)),  # force of the motors by the command before
@@ -173,7 +173,7 @@ _FALCON = np.dtype(
         ("asked", np.int64),  # packets sent since the last read
         ("owed", np.int64),  # missing replies so far
         ("delay", np.int64),  # reads after which a packet's reply comes, as measured
-        ("measured", np.int64),  # result of a measurement to be confirmed by another one
+        ("measured", np.int64),  # result of a measurement that awaits confirmation
         ("testing", np.int64),  # packets omitted so far to measure it; 0: no measurement
         ("astray", np.int64),  # reads in a row with more or fewer replies owed than the delay explains
         ("unsure", np.int64),  # 1: the delay has to be measured
@@ -189,7 +189,7 @@ _FALCON = np.dtype(
         ("cut_short", np.int64),  # reads that ended within a packet
         ("read_errors", np.int64),
         ("write_errors", np.int64),
-        ("shortened", np.int64),  # forces that were more than the motors give
+        ("shortened", np.int64),  # forces that exceeded the motors' range
     ],
     align=True,
 )

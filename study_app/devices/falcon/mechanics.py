@@ -47,7 +47,7 @@ class Geometry:
     ends_m: float  # d + e: its two end links, which stay in the arm's plane
     base_m: float  # r: from the centre of the base to an arm's axis
     platform_m: float  # c: from the centre of the platform to the end link
-    aside_m: float  # f - s: how far base and platform are off each other across an arm
+    aside_m: float  # f - s: offset between base and platform across an arm
     drum_ratio: float  # turns of a motor for one of its arm
     zero_rad: float  # theta where an encoder counts 0
     azimuths_rad: tuple[float, float, float] = (math.radians(105), math.radians(-15), math.radians(-135))
@@ -148,7 +148,7 @@ START_M: Final = (0.0, 0.0, 0.12)
 """Start position from which `forward` finds every pose of the workspace."""
 
 _STEPS = 30
-_LEAST_ROD_M = 1e-6  # what is seen of a rod that lies across its arm
+_LEAST_ROD_M = 1e-6  # projection of a rod across its arm
 _ENOUGH_M = 1e-12  # step at which Newton's method ends: the error is then of the order of rounding
 
 

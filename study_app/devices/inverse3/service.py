@@ -189,7 +189,7 @@ def _get_json(host: str, path: str, ports: tuple[int, ...] = PORTS) -> Any:
             closing(SocketLink(host, port, max(until_s - time.perf_counter(), 0.01))) as link,
         ):
             link.send(f"GET {path} HTTP/1.1\r\nHost: {host}:{port}\r\nConnection: close\r\n\r\n".encode())
-            answer = HTTPResponse(link)  # type: ignore[arg-type] # it needs no more of a socket than its file
+            answer = HTTPResponse(link)  # type: ignore[arg-type] # only the file of a socket is needed
             answer.begin()
             if answer.status == HTTPStatus.OK:
                 return json.loads(answer.read(LONGEST))

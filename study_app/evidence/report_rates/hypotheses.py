@@ -97,14 +97,14 @@ def _compares_thresholds(n: int, ratio: float) -> Trial:
 
     def trial(rng: np.random.Generator) -> bool:
         middle = sum(plan.stimulus.domain) / 2
-        spread = math.log10(BETWEEN_PEOPLE) / math.sqrt(2)  # the difference has that of `power`
+        spread = math.log10(BETWEEN_PEOPLE) / math.sqrt(2)  # the difference has the standard deviation of `power`
         own = middle + spread * rng.normal(size=n)
         fits = [
             fit
             for shift in (math.log10(ratio), 0.0)
             for fit in plan.fits(plan.answers(own + spread * rng.normal(size=n) + shift, rng))
         ]
-        estimates = plan.grouped(fits, 2 * n)  # both blocks have a width in common
+        estimates = plan.grouped(fits, 2 * n)  # both blocks have a common width
         values, variances = (
             estimates.medians[:n] - estimates.medians[n:],
             estimates.variances[:n] + estimates.variances[n:],

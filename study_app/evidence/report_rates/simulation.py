@@ -339,7 +339,7 @@ def report(
             decided,
             people,
             {item.id: values[:, :, [column]] for column, item in enumerate(block.items)},
-            seed=1 + study,  # draws of its own: the same draws in all studies would shift the rate
+            seed=1 + study,  # separate draws, since the same draws in all studies would bias the rate
             failures=failures,
             verdicts_only=True,
         )
@@ -501,7 +501,7 @@ def count_single(case: _Case, seed: int, batch: int, studies: int) -> tuple[Rate
     rate = partial(Rate, cell=case[0], participants=case[1])
     if what != COVERS:
         return (rate(what=what, limit=limit, hits=sum(map(bool, p_values)), studies=len(p_values)),)
-    half: _Limit = "counted" if case[1] == _SIZES[0] else "60 to 80 %"  # of five people intervals are wide by t
+    half: _Limit = "counted" if case[1] == _SIZES[0] else "60 to 80 %"  # with five participants t intervals are wide
     return (
         rate(what=PRINTED, limit="at least 93 %", hits=len(p_values), studies=studies),
         rate(what=what, limit=limit, hits=sum(one <= 1.0 for one in p_values), studies=len(p_values)),

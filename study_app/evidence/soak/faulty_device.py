@@ -31,7 +31,7 @@ NON_FINITE, GLITCH, SILENCE, JUMP, BUTTON, LOST, LOST_AT_WRITE = range(7)
 KINDS: Final = ("non_finite", "glitch", "silence", "clock_jump", "stop_button", "lost", "lost_at_write")
 _NONE: Final = -1
 
-GLITCH_M: Final = 0.1  # in a millisecond: 100 m/s
+GLITCH_M: Final = 0.1  # per millisecond: 100 m/s
 _SHORTEST_JUMP_NS: Final = 1_000_000
 _LONGEST_JUMP_NS: Final = 2_000_000_000
 
@@ -42,17 +42,17 @@ FAULTS = np.dtype(
         ("read", np.intp),
         ("write", np.intp),
         ("clock", np.intp),
-        # what may go wrong; written by the host
-        ("share", np.float64, (len(KINDS),)),  # of the faults that are of a kind; all 0: nothing goes wrong
+        # the permitted faults; written by the host
+        ("share", np.float64, (len(KINDS),)),  # share of each kind of fault; all 0: no faults
         ("least", np.int64, (len(KINDS),)),  # readings that one lasts
         ("most", np.int64, (len(KINDS),)),
         ("gap", np.int64, (2,)),  # fewest and most sound readings between two
         # where it is
         ("random", np.uint64),
-        ("kind", np.int64),  # of the fault under way or the next one
+        ("kind", np.int64),  # of the current fault or the next one
         ("wait", np.int64),  # sound readings before it
         ("left", np.int64),  # readings it still lasts
-        ("choice", np.int64),  # drawn for the whole of it: axis, and which number that is none
+        ("choice", np.int64),  # drawn once per fault: axis, and which invalid number
         ("losing", np.int64),  # 1: the next write says that the device is lost
         # what was done
         ("reads", np.int64),

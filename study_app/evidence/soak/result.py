@@ -11,7 +11,7 @@ from study_app.evidence.soak.sample_audit import TOLERANCE_N
 from study_app.evidence.table import Evidence
 from study_app.haptics.model.layout import LIMITER_NAMES
 
-_MOST_DRIFT: Final = 1e-9  # of the wake, in units of Σ|e|/S
+_MOST_DRIFT: Final = 1e-9  # greatest wake error, in units of Σ|e|/S
 _MOST_GROWTH_BYTES: Final = 5 * 2**20
 _MOST_RESIDUE_N: Final = 1e-12
 PERCEPTIBLE_N: Final = 0.05
@@ -116,7 +116,7 @@ class SoakResult:
         yield f"{counts.accepted} implausible readings accepted{first}", counts.accepted > 0
         yield f"the clock is off its ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
         yield f"the last force written is {device.last_n.tolist()} N, not zero", bool(device.last_n.any())
-        drift, rests = self.drift.worst, self.rests  # what must not build up; NaN counts as too much
+        drift, rests = self.drift.worst, self.rests  # values that must not accumulate; NaN counts as too large
         yield f"the wake is off its definition by {drift:.2g} of Σ|e|/S", not drift <= _MOST_DRIFT
         yield f"a wake of {rests.wake_mps:.2g} m/s is left after a rest", rests.wake_mps != 0.0
         yield f"a force of {rests.force_n:.2g} N is left after a rest", not rests.force_n <= _MOST_RESIDUE_N

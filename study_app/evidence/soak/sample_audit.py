@@ -32,7 +32,7 @@ TOLERANCE_N: Final = 1e-9
 _COUNTS = np.dtype(
     [
         ("limit_n", np.float64),  # of the force
-        ("slew_n", np.float64),  # of its change from tick to tick
+        ("slew_n", np.float64),  # limit of its change per tick
         ("period_ns", np.int64),
         # where it is
         ("follows", np.int64),  # 1: the next sample comes a period after the last one, of the same run
@@ -41,12 +41,12 @@ _COUNTS = np.dtype(
         ("last_n", np.float64, (3,)),
         # counted
         ("samples", np.int64),
-        ("missing", np.int64),  # ticks that no sample came of
+        ("missing", np.int64),  # ticks without a sample
         ("overruns", np.int64),
         ("limiters", np.int64, (len(LIMITER_NAMES),)),
         ("refused", np.int64),  # readings
-        ("not_finite", np.int64),  # readings that are no place
-        ("displaced", np.int64),  # readings beyond anything the device reaches
+        ("not_finite", np.int64),  # readings that are not a position
+        ("displaced", np.int64),  # readings beyond the device's reach
         ("silent", np.int64),  # ticks without a new reading
         ("lost", np.int64),  # ticks in which the device was lost when it was read
         ("lost_at_write", np.int64),  # and when it was written to
@@ -55,17 +55,17 @@ _COUNTS = np.dtype(
         ("long_ticks", np.int64),  # ticks that took a period or more
         ("most_n", np.float64),
         ("steepest_n", np.float64),  # greatest change between two forces, where a limit is promised
-        ("release_step_n", np.float64),  # where a stop or a fault let go
-        ("energy_step_n", np.float64),  # where the passivity controller took what was owed
-        ("latest_s", np.float64),  # how late a tick began at most
-        # broken promises: how often, and the tick of the first
+        ("release_step_n", np.float64),  # while a stop or a fault released the force
+        ("energy_step_n", np.float64),  # while the passivity controller repaid a debt
+        ("latest_s", np.float64),  # greatest lateness of a tick
+        # violated guarantees: number, and the tick of the first
         ("accepted", np.int64),
         ("excess", np.int64),
         ("no_number", np.int64),
         ("steps", np.int64),
         ("unstopped", np.int64),
-        ("drift_ns", np.int64),  # greatest difference between a deadline and where it had to be
-        ("first_tick", np.int64),  # of all broken promises; -1: none
+        ("drift_ns", np.int64),  # greatest difference between a deadline and its prediction
+        ("first_tick", np.int64),  # first tick of any violated guarantee; -1: none
     ],
     align=True,
 )

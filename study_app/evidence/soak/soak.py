@@ -49,7 +49,7 @@ from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import HISTORY
 
-_REACH_M: Final = 0.04  # how far from the middle it goes, to every side
+_REACH_M: Final = 0.04  # range of the hand to every side of the centre
 _ROW_S: Final = 4e-3
 _SLOWEST_MPS: Final = 0.02
 _FASTEST_MPS: Final = 1.0
@@ -119,13 +119,13 @@ _FEWEST_TICKS: Final = 1_000
 _LONGEST_ROUND_S: Final = 3600.0
 _SHORTEST_ROUND_S: Final = 5.0
 _ROUGH: Final = 0.35  # share of a round
-_SETTLING_S: Final = 2.0  # until a hand that keeps still has come to rest, and its velocity too
-_LONGEST_REST: Final = 0.4  # share of a round; where a rest takes more, there is none
+_SETTLING_S: Final = 2.0  # time for a hand at rest, and its velocity estimate, to settle
+_LONGEST_REST: Final = 0.4  # greatest share of a round for a rest; longer rests are omitted
 _MOST_TICKS: Final = (
-    1000  # between two looks: fewer than a wake is long, so that what spoils it is seen before it is gone
+    1000  # ticks between two checks, fewer than a wake's elements, so that an error is seen before it is evicted
 )
-_WAITING_S: Final = 0.25  # likewise, on a clock that runs by itself
-PATIENCE_S: Final = 10.0  # with a servo that takes no tick
+_WAITING_S: Final = 0.25  # the same on a clock that runs by itself
+PATIENCE_S: Final = 10.0  # while the servo runs no tick
 
 # kind: share of all faults, fewest and most readings
 _ROUGH_FAULTS: Final = {
@@ -179,7 +179,7 @@ class Soak:
         if not fewest <= hours <= _MOST_HOURS:
             raise StudyError(f"a soak lasts {fewest:.2g} to {_MOST_HOURS:g} hours, not {hours:g}")
         self.ticks = round(hours * 3600 * self._rate_hz)
-        self._draw = Random(seed).random  # noqa: S311 - faults keep no secrets
+        self._draw = Random(seed).random  # noqa: S311 - simulated faults, not secrets
         clock = VirtualClock() if virtual else SystemClock()
         hand = _RestlessHand(Random(seed + 1))  # noqa: S311
         self.hand = hand
@@ -208,7 +208,7 @@ class Soak:
         ledger.prepare()
         self.servo.prepare()
         for _ in range(2):
-            records(SAMPLE, HISTORY).status = 1  # the most that a look takes: what the system keeps of it is no growth
+            records(SAMPLE, HISTORY).status = 1  # the most memory that a check needs, which does not count as growth
         self._began_s = time.perf_counter()
         self._ticked_s = time.perf_counter()
         if not self.virtual:

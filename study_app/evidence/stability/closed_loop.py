@@ -48,9 +48,9 @@ _MEASURED = np.dtype(
         ("lag", np.float64),  # mean [ticks]
         ("noise_mps", np.float64),  # from peak to peak
         ("count_mps", np.float64),  # the velocity is a whole number of them; 0: any
-        ("ticks", np.int64),  # how many velocities it has taken in
+        ("ticks", np.int64),  # number of velocities processed
         ("kept_mps", np.float64, (_KEPT, 3)),  # the last of them
-        ("slow_mps", np.float64, (3,)),  # of the filter of first order
+        ("slow_mps", np.float64, (3,)),  # state of the first-order filter
         ("seen_mps", np.float64, (3,)),  # as it is measured
     ],
     align=True,
@@ -105,7 +105,7 @@ _ARM = np.dtype(
         ("coulomb_n", np.float64),  # f_c
         ("motor_limit_n", np.float64),  # per axis
         ("motor_step_n", np.float64),  # per axis; 0: any force
-        ("delay", np.int64),  # a force acts so many writes later
+        ("delay", np.int64),  # delay of a force in writes
         ("queue_n", np.float64, (MOST_DELAY + 1, 3)),  # forces written, newest first
         ("force_n", np.float64, (3,)),  # F, the force that acts
         ("arm_m", np.float64, (3,)),
@@ -224,7 +224,7 @@ LOOP = np.dtype(
     [
         ("safe", np.int64),  # 1: with the safety layer, 0: the force of the effects goes to the motors as it is
         ("motion", np.int64),
-        ("rigid", np.int64),  # 1: in `follow`, the handle is where the hand means it to be
+        ("rigid", np.int64),  # 1: in `follow`, the handle is at the hand's intended position
         ("speed_mps", np.float64),  # greatest speed of the hand
         ("way_m", np.float64),  # length of a reach, diameter of a circle, twice the amplitude of a sine
         ("moving_s", np.float64),  # then the hand rests
@@ -234,11 +234,11 @@ LOOP = np.dtype(
         ("noise_m", np.float64),  # from peak to peak, on top of the encoder
         ("lost", np.float64),  # share of ticks without a new sample
         ("duplicated", np.float64),  # share of samples that repeat the position of the sample before
-        ("burst_s", np.float64),  # how long there is no new sample at all, at the end of each `BURST_PERIOD_S`
-        ("jump_m", np.float64),  # greatest offset of all positions along an axis, drawn anew after each such gap
+        ("burst_s", np.float64),  # duration without any new sample at the end of each `BURST_PERIOD_S`
+        ("jump_m", np.float64),  # greatest offset of all positions along an axis, redrawn after each such gap
         ("offset_m", np.float64, (3,)),  # that offset
         ("outliers", np.float64),  # share of ticks whose position is wrong
-        ("outlier_m", np.float64),  # by at most so much along each axis
+        ("outlier_m", np.float64),  # greatest error along each axis
         ("error_m", np.float64, (3,)),  # of the newest position: offset and outlier
         ("in_burst", np.int64),  # 1 during such a gap
         ("delay", np.int64),  # of the device [ticks]
@@ -249,11 +249,11 @@ LOOP = np.dtype(
         ("now_s", np.float64),
         ("broken", np.int64),  # 1 once a force or the handle's position was not finite
         ("was_m", np.float64, (3,)),  # where the hand is
-        ("goes_m", np.float64, (3,)),  # where it will be at the next tick
-        ("measured", np.int64),  # 1 where it is of this tick
+        ("goes_m", np.float64, (3,)),  # its position at the next tick
+        ("measured", np.int64),  # 1 if it belongs to this tick
         ("seen_m", np.float64, (3,)),  # the last sample
         ("arm", _ARM),  # the second plant, where it is used
-        ("velocity", _MEASURED),  # what the device measures itself
+        ("velocity", _MEASURED),  # the device's own measurements
     ],
     align=True,
 )
@@ -272,9 +272,9 @@ TRACE = np.dtype(
         ("acting_n", np.float64, (3,)),  # from this tick to the next
         ("lift_n", np.float64, (3,)),  # buoyancy and weight in what was sent
         ("drift_mps", np.float64, (3,)),  # of the current
-        ("reserve_j", np.float64),  # what liquids and estimator could give back
+        ("reserve_j", np.float64),  # energy that liquids and estimator could return
         ("permitted_n", np.float64),  # size of the force after slope limit, norm and fade
-        ("withheld_n", np.float64),  # size of what passivity controller and slew limit changed of it
+        ("withheld_n", np.float64),  # size of the change by passivity controller and slew limit
         ("delay", np.int64),  # of the device: how many ticks ago the acting force was sent
         ("limiters", np.int64),
     ],

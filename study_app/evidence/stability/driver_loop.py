@@ -93,7 +93,7 @@ def judge_driven(case: Case) -> Verdict:
     falcon.renew()
     dynamics = falcon.dynamics
     trace = _trace(case, falcon, falcon.hand, dynamics)
-    trace.acting_n[:-1] = trace.acting_n[1:]  # of the handle, which keeps what acted up to the present
+    trace.acting_n[:-1] = trace.acting_n[1:]  # forces of the handle, which records them up to now
     if not (np.isfinite(trace.sent_n).all() and np.isfinite(trace.position_m).all()):
         return not_finite(case, trace, safe=True)
     others = _scripted_traces(case, dynamics)
@@ -188,7 +188,7 @@ def _follow(
     released: int,
 ) -> int:
     """Run one servo tick per row of ``trace`` and release before row ``released``; return the number of ticks."""
-    one: Any = np.int64(1)  # with a literal the loop is compiled a second time
+    one: Any = np.int64(1)  # a literal would compile the loop a second time
     for k in range(trace.shape[0]):
         if k == released:
             handle.held = 0

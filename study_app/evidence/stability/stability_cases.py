@@ -273,7 +273,7 @@ def of_physical2() -> tuple[str, ...]:
 
 def scene_of(case: Case) -> Scene:
     """Return the scene that the case presents."""
-    velocity = _ESTIMATORS["ewma" if case.estimator == DEVICE else case.estimator]  # a device's own takes its place
+    velocity = _ESTIMATORS["ewma" if case.estimator == DEVICE else case.estimator]  # replaced by a device's own
     link = _link_of(case)
     changed = {"scale": case.scale, "rate_hz": case.rate_hz, "velocity": velocity, "link": link}
     return Scene.model_validate(scenes()[case.liquid].model_copy(update=changed).model_dump())

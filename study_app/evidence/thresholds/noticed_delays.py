@@ -104,7 +104,7 @@ def compare(count: int, seed: int) -> Compared:
 def detected(people: Sequence[Person], seed: int) -> Detected:
     """Return the group's threshold in `FORCED_CHOICE` with its 95 % interval [ms]."""
     known = known_value(FORCED_CHOICE, load(FORCED_CHOICE))
-    assert isinstance(known, KnownThreshold)  # noqa: S101 - it has forced choices alone
+    assert isinstance(known, KnownThreshold)  # noqa: S101 - it has only forced choices
     (group,) = known.simulate(0, seed, observers=[person.observer for person in people]).group
     return Detected(value=group.value, low=group.low, high=group.high)
 

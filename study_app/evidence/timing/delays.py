@@ -140,7 +140,7 @@ class Delayed:
 
 
 _LAYOUT: Final = Layout(height_pt=212, top_pt=46, left_pt=34, gap_pt=46, right_pt=44)
-_MOST_FRAMES: Final = 1.5  # of the axis: what lies beyond is written at its top
+_MOST_FRAMES: Final = 1.5  # limit of the axis; values beyond it are written at its top
 _APART: Final = 0.34
 
 _LOOKS: Final[dict[LoadName, dict[str, Any]]] = {

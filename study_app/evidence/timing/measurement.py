@@ -101,7 +101,7 @@ Kind: TypeAlias = Literal["servo", "bare", "thread", "qt"]
 _Whole: TypeAlias = NDArray[np.int64]
 
 PERIOD_NS: Final = 1_000_000
-LEAD_IN: Final = 50  # ticks at the start of each while that are not counted: threads begin, scenes are loaded
+LEAD_IN: Final = 50  # ticks at the start of each turn that are not counted, while threads start and scenes are loaded
 NAMES: Final[dict[Kind, str]] = {
     "servo": "this servo",
     "bare": "bare compiled loop",

@@ -147,7 +147,9 @@ class _PageReader(Coloured, QTextBrowser):
         self.setAccessibleName("Page")
         self.setOpenLinks(False)
         self.setFrameShape(QTextBrowser.Shape.NoFrame)
-        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOn)  # else it changes the width: drawn twice
+        self.setVerticalScrollBarPolicy(
+            Qt.ScrollBarPolicy.ScrollBarAlwaysOn
+        )  # otherwise it changes the width, and the page is drawn twice
         self.anchorClicked.connect(self._follow_link)
 
     def show_page(self, name: str, anchor: str = "") -> None:
@@ -196,7 +198,7 @@ class _PageReader(Coloured, QTextBrowser):
         self.setDocument(document)  # last: laid out once
         before, self._drawn = self._drawn, document
         if before is not None:
-            before.deleteLater()  # with its cached pictures: it is this widget's, which would keep it
+            before.deleteLater()  # with its cached pictures, which this widget would otherwise keep
 
     def _style_blocks(self, document: QTextDocument) -> None:
         cursor = QTextCursor(document)

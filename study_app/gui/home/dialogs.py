@@ -105,7 +105,7 @@ class RehearsalDialog(Work):
 
     def _read_answers(self) -> None:
         """Read the new answers; close the dialog once a stopped rehearsal's process has ended."""
-        assert self.worker is not None  # noqa: S101 - listening begins with it
+        assert self.worker is not None  # noqa: S101 - answers are read only after its start
         if not self.back.isEnabled():
             if self.worker.ended:
                 self._listening.stop()
@@ -399,7 +399,7 @@ class NewSessionDialog(QDialog):
         except (StudyError, ValueError) as error:
             fault = str(error)
         sentence = fault or f"{participant} is free, session {session}"
-        by_id = sentence.startswith(f"{participant} ")  # an id stands as it was typed
+        by_id = sentence.startswith(f"{participant} ")  # an id is kept as typed
         self.verdict.setText(sentence if by_id else sentence[:1].upper() + sentence[1:])
         set_ink(self.verdict, "bad" if fault else "ok")
         self.verdict_icon.show_icon(*(("warning", "bad") if fault else ("check", "ok")))

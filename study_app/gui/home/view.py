@@ -92,7 +92,7 @@ class HomePlace(Place):
         self.dialog: QDialog | None = None
         self._opened: list[str] = []
         self._facts: tuple[Facts, ...] = ()
-        self._files: frozenset[tuple[Path, int, int]] | None = None  # as the studies were read from them last
+        self._files: frozenset[tuple[Path, int, int]] | None = None  # their state when the studies were last read
         self._unread = False  # whether reading them failed
         self._last: Path | None = None  # the folder of the session that was held last
         self._read_once = False
@@ -392,7 +392,7 @@ class HomePlace(Place):
         In a low window the lab, which is also in the rail, and most rows of the sessions are hidden. If the page still
         scrolls, the cards get their full height, so that there is only one scroll bar.
         """
-        if (whole := self.grid.whole_height) <= 0:  # cards that came just now have no height yet
+        if (whole := self.grid.whole_height) <= 0:  # new cards have no height yet
             return
         for low, beyond in ((False, _NEXT_ROW_PX), (True, _NEXT_ROW_PX), (True, 0)):
             self.lab.setVisible(not low or self.sessions.is_empty)

@@ -27,7 +27,7 @@ _STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 MOST_TICKS, TICK_PX = 5, 22
 LEGEND_LINE, LEGEND_GAP, STROKE_WIDTH = 20, 16.0, 24.0
 _LABEL_PX = 9.0  # half of a tick's number
-_SHRINKS_BELOW = 0.45  # share of the height: a plot that follows every peak never rests
+_SHRINKS_BELOW = 0.45  # hysteresis as a share of the height, so that the scale does not follow every peak
 _DASH: dict[str, tuple[float, float] | None] = {"solid": None, "long": (6.0, 3.0), "short": (3.0, 2.0)}
 
 
@@ -249,7 +249,7 @@ _NAME_WIDTH = 84
 _LINE = 26
 COST_HEIGHT, ERROR_HEIGHT = 252, 3 * _LINE + 6  # usual heights, kept free until the measurement
 _UNKNOWN = "–"
-_LEAST_NS = 1.0  # the smallest cost that a measurement next to a running servo resolves
+_LEAST_NS = 1.0  # the smallest cost that can be measured next to a running servo
 _LimiterState = Literal["acting", "acted", "quiet"]
 
 

@@ -50,7 +50,7 @@ THICKEST_PX, THINNEST_PX = 5.0, 1.6
 _RING_PX = 4.6
 _HEAD_PX = 11.0
 _STEP_PX = 2.5
-_LEAST_FOR_HEAD_PX = 46.0  # of a segment's length on the screen
+_LEAST_FOR_HEAD_PX = 46.0  # minimum length of a segment on the screen
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,7 @@ def _points(pixels: Floats) -> list[QPointF]:
 
 
 _WORKSPACE_M: Point = (0.1, 0.06, 0.06)
-_BALL_M = 0.0034  # radius for which the glass is made: it stays while the ball's radius changes
+_BALL_M = 0.0034  # radius for which the glass is drawn, independent of the ball's radius
 _RING = "break"
 Words: TypeAlias = tuple[str, str]
 """What a plate says, and the icon before it."""

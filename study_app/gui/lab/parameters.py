@@ -124,7 +124,7 @@ class _SideSwitch(QWidget):
 
 _BUTTON = 44
 _FREE = "Free motion"
-_LETTERS = 13  # of a choice before it is cut
+_LETTERS = 13  # width of a choice before it is elided
 
 
 class _Picker(Choice):

@@ -327,7 +327,7 @@ def _setting_line(session: Session, progress: Progress, *, answering: bool) -> s
         doing = "paused"
     elif answering:
         doing = "answering"
-    if task.targets_m and not (progress.start and progress.start.measures_sealed):  # a delay shows in their number
+    if task.targets_m and not (progress.start and progress.start.measures_sealed):  # their number would reveal a delay
         doing += f"  ·  {progress.targets} {'targets' if task.wanted is None else f'of {task.wanted} targets'}"
     if trial.phase != "main":
         return doing.capitalize()

@@ -219,7 +219,7 @@ class OperatorWindow(Themed, QMainWindow):
         """Show a part that the session does not depend on; if it fails, the session continues."""
         try:
             show(*shown)
-        except Exception as error:  # noqa: BLE001 - told, and passed on to the log and the journal
+        except Exception as error:  # noqa: BLE001 - reported, and passed on to log and journal
             self.report_failure(error)
 
     def report_failure(self, error: BaseException) -> None:

@@ -188,7 +188,7 @@ LEAST_SIZE = QSize(1024, 640)
 _WINDOWED_SIZE = QSize(1366, 768)
 _PILOT_FRAME = 10
 _WAITING_MS = 15
-_TIME_UP_MS = 1500  # "Time is up" is shown for so long before the questions
+_TIME_UP_MS = 1500  # duration of "Time is up" before the questions
 _AHEAD_MS = 100  # delay after a page before painting the next one ahead
 _SETTLING_MS = 100  # longest time without a focused window when the focus moves between the program's windows
 

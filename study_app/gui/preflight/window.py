@@ -318,7 +318,7 @@ class PreflightWindow(QWidget):
         self.start.setEnabled(not view.busy and not view.failures)
         self.again.setEnabled(not view.busy)
         if self._busy and not view.busy:
-            self.start.setFocus()  # the pressed button lost the focus to Cancel meanwhile
+            self.start.setFocus()  # meanwhile the pressed button has lost the focus to Cancel
         self._busy = view.busy
         if [row.check for row in self.rows] != list(view.checks):
             self.rows = _check_rows(view.checks, self.rows, self.checks.column)

@@ -282,7 +282,7 @@ class WatchWindow(Themed, QDialog):
         vbox(head, self.lacking, (self.room, 1), foot, spacing=10, margins=(24, 16, 24, 16), parent=self)
         for button in (self.play, self.export, self.close_button, *self.steps.values()):
             button.setAutoDefault(False)
-            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # after a click, keys still go to the time line
+            button.setFocusPolicy(Qt.FocusPolicy.TabFocus)  # after a click, the time line keeps the focus
         self._set_enabled(False)
 
     def _connect(self) -> None:
@@ -291,7 +291,7 @@ class WatchWindow(Themed, QDialog):
             actions[command.id] = command.action(self.room, partial(self.step, kind, way))  # type: ignore[arg-type]
         actions[_PLAY.id].setShortcutContext(
             Qt.ShortcutContext.WidgetWithChildrenShortcut
-        )  # else the key presses the button
+        )  # otherwise the key would press the button
         for name, button in {_PLAY.id: self.play, **self.steps}.items():
             connect_button(button, actions[name])
         self.interval.activated.connect(lambda at: self._read_interval(at + 1))

@@ -32,7 +32,7 @@ _TRIAL: Final = 4  # steps from each start before the best one continues
 _MOST: Final = 100
 _STEP: Final = 1e-4
 _LENGTH_STEP: Final = 1e-2
-_ROUNDING: Final = 1e-12  # of exp(log(N)), so that S = N stays so
+_ROUNDING: Final = 1e-12  # rounding tolerance of exp(log(N)), so that S = N is kept
 
 
 class Coordinate(NamedTuple):

@@ -107,7 +107,7 @@ class Schedule:
     seed: int
     steps: tuple[Step, ...]
 
-    @cached_property  # each trial of a track asks for them
+    @cached_property  # each trial of a track needs them
     def trials(self) -> tuple[Trial, ...]:
         """The trials alone, in order."""
         return tuple(step for step in self.steps if isinstance(step, Trial))

@@ -101,7 +101,7 @@ class Condition(Table):
         )
 
 
-@lru_cache(maxsize=64)  # each trial asks for the levels; with that of `_running_grid` it takes a third less
+@lru_cache(maxsize=64)  # each trial needs the levels; with the cache of `_running_grid` it takes a third less time
 def _spaced(low: float, high: float, log: bool, count: int) -> tuple[float, ...]:
     if count == 1:
         return (high,)
@@ -261,7 +261,7 @@ def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
     """Return the default assumptions about the psychometric function."""
     low, high = stimulus.domain
     log, span = stimulus.spacing == "log", high - low
-    # Weibull where a distance of zero must mean chance
+    # Weibull, since a distance of zero must give chance performance
     by_chance = _is_distance(stimulus) and log and design.guess_rate is not None
     return Assumed(
         family="weibull" if by_chance else "normal",

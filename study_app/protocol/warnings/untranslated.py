@@ -175,7 +175,7 @@ def _read_table_or_nothing(file: File, _size: int, _changed_ns: int) -> Mapping[
     try:
         return _read_table(file)
     except (StudyError, OSError):
-        return {}  # `check` of that file says what is wrong with it
+        return {}  # `check` of that file reports the error
 
 
 def _read_table(file: File) -> Mapping[str, Any]:

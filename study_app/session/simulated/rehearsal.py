@@ -244,7 +244,7 @@ class RehearsedSession(SimulatedParticipant):
         self._tell_features = features
         self.rig = rig
         hand = hand_of(rig.device)
-        assert hand is not None  # noqa: S101 - `rehearsal_rig` has looked
+        assert hand is not None  # noqa: S101 - checked by `rehearsal_rig`
         self._hand = hand
         self._now_s = store.clock.seconds
         self._features_of: dict[int, tuple[TrialFeatures, ...]] = {}

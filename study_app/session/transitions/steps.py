@@ -298,7 +298,7 @@ def keep_setting(state: SessionState, done: Commands, at_s: float) -> Result:
 def _keep_result(state: SessionState, written: Write, at_s: float) -> Result:
     """Store the answer for later levels, and show feedback if it is due."""
     trial, due, design = state.trial, state.due, state.design
-    assert due is not None and design is not None  # noqa: S101, PT018 - the caller has looked
+    assert due is not None and design is not None  # noqa: S101, PT018 - checked by the caller
     protocol, answer = state.plan.protocol, str(state.answers[design.name].value)
     block = protocol.blocks[trial.block]
     heard = trial_result(protocol, block, trial.number, trial.code, due.level, due.arrangement, answer, catch=due.catch)

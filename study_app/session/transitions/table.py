@@ -82,7 +82,7 @@ _TRANSITIONS: dict[tuple[Phase, type[Event]], Move] = {
     **{(phase, PauseRequested): moves.pause_session for phase in _RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, PauseRequested): moves.take_over_pause,  # stays
     (Phase.PAUSED, ResumeRequested): moves.resume_session,  # → reading, answering; task, again; after feedback: next
-    # The force: off at once, wherever we are.
+    # The force is switched off at once in every phase.
     **{(phase, ForceStopped): moves.stop_force for phase in _RUNNING},  # → paused; the attempt at a trial is over
     (Phase.PAUSED, ForceStopped): moves.stop_force,  # stays
     (Phase.TROUBLE, ForceStopped): moves.stop_force_again,  # stays

@@ -362,7 +362,7 @@ class Journal:
         StoreError
             The last lines could not be flushed; the file is closed nevertheless.
         """
-        if self.is_of_another_process:  # no thread of it is here, and a lock may be held for ever
+        if self.is_of_another_process:  # a fork has no such thread, and a lock may never be released
             return
         with self._changed:
             self._closing = True
@@ -411,7 +411,7 @@ class Journal:
                 self._torn = True
                 write_all(self.file, content)
             except OSError:
-                with contextlib.suppress(OSError):  # tried again before the next line
+                with contextlib.suppress(OSError):  # retried before the next line
                     self._remove_torn_line()
                 raise
             self._torn = False

@@ -217,7 +217,7 @@ def _check_withdrawals(study: StudyFolder, findings: Findings) -> tuple[dict[str
         return {}, unerased
     for participant, tombstone in withdrawn.items():
         left: list[Path] = []
-        with contextlib.suppress(StoreError):  # said of the list that cannot be read
+        with contextlib.suppress(StoreError):  # reported for the unreadable list
             left += unerased_files(study, participant)
         for path in left:
             what = "is there" if path.is_dir() else f"still lists {participant}"
@@ -358,7 +358,7 @@ def _check_description(study: StudyFolder, findings: Findings) -> None:
     heads: set[bytes] = set()
     sealed_heads: set[bytes] = set()
     for protocol in _published_protocols(study):
-        with contextlib.suppress(KeyError, TypeError, ValueError):  # said of the receipt already
+        with contextlib.suppress(KeyError, TypeError, ValueError):  # already reported for the receipt
             head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
             describe = partial(description_bytes, head, protocol_format=number, intervals=has_intervals(protocol))
             heads.add(describe(sealed=sealed))
@@ -379,7 +379,7 @@ def _check_description(study: StudyFolder, findings: Findings) -> None:
 def _published_protocols(study: StudyFolder) -> Iterator[dict[str, Any]]:
     """Yield the protocols of the receipts that can be read."""
     for session in study.sessions():
-        with contextlib.suppress(StoreError):  # said of the receipt already
+        with contextlib.suppress(StoreError):  # already reported for the receipt
             protocol = receipt.read(session.receipt).get("protocol")
             if isinstance(protocol, dict):
                 yield protocol
@@ -453,7 +453,7 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
             findings.error(key, f"is not the key that site {site.name} was merged with: restore it from a copy")
         _check_site(merged, site, findings)
         for session in StudyFolder(folder).sessions():
-            with contextlib.suppress(StoreError):  # said when the site is checked
+            with contextlib.suppress(StoreError):  # reported when the site is checked
                 if (other := receipt.read(session.receipt)["protocol_hash"]) != merged.protocol_hash:
                     findings.error(session.receipt, f"has protocol {other}, not {merged.protocol_hash} as merged")
             begun = describe_session(session).begun
@@ -473,7 +473,7 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
     study = StudyFolder(merged.folder(site.name))
     if (name := described_study(study)) not in (None, merged.study):
         findings.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
-    with contextlib.suppress(StoreError):  # said when the site is checked
+    with contextlib.suppress(StoreError):  # reported when the site is checked
         withdrawn, merged_at = list(tombstones(study).values()), datetime.fromisoformat(site.merged_at)
         before = site.withdrawals  # clocks of sites may differ, so times decide only for format 1
         if before is None:

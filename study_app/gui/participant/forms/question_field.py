@@ -161,7 +161,7 @@ class _QuestionWords(QWidget):
         self.update()
 
 
-_LEAST_TARGET = 44.0  # of what is hit with mouse or finger [logical px]
+_LEAST_TARGET = 44.0  # minimum size of clickable parts [logical px]
 
 
 def target_px(scale: float) -> float:
@@ -454,7 +454,7 @@ class OptionLook(Button):
         self.pointed = False
         self.setAccessibleName(name)
         self.setAccessibleDescription(description)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the question holds the keyboard
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # the question has the keyboard focus
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setSizePolicy(_GROWS)
 

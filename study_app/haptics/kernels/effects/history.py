@@ -36,7 +36,7 @@ _WEIGHTS = (
     0.63661146557001,
 )  # a_i
 _NOTHING = 1e-30
-_ROUNDING_S = 1e-9  # a window of n ticks holds n of them, however their sum is rounded
+_ROUNDING_S = 1e-9  # a window of n ticks contains n of them, regardless of rounding
 
 
 @part
