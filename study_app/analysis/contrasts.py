@@ -24,6 +24,7 @@ from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic
 from study_app.analysis.levels.thresholds import Exponents, ThresholdEstimate, Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
+from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, ContrastSide, LevelsResult, Results
 from study_app.analysis.statistics.effect_sizes import (
     PRIOR_SCALE,
@@ -158,7 +159,7 @@ def _compared(
     study: Study, contrast: Contrast, answers: Sequence[BlockAnswers], levels: Sequence[LevelsResult]
 ) -> Compared:
     sides: list[Mapping[str, Measured]] = [
-        _values(contrast, block, condition, answers, levels)
+        _values(study, contrast, block, condition, answers, levels)
         for block, condition in zip(
             contrast.blocks if len(contrast.blocks) == 2 else contrast.blocks * 2,
             contrast.conditions or (None, None),
@@ -252,7 +253,24 @@ def _thresholds_of_two(study: Study, contrast: Contrast, per_u: float) -> tuple[
     ], per_u**2 * shared
 
 
+def _form_values(study: Study, contrast: Contrast, form: str, block: str) -> Mapping[str, Measured]:
+    """Return each participant's answer to a form after a block, or the score of the form; the mean over sessions."""
+    rows = [
+        study.answers_to(asked).rename(columns={"value": "score"})
+        for asked in study.others.questions
+        if (asked.where.id, asked.id) == (form, contrast.measure)
+    ] + [
+        scored(study, score)
+        for score in study.others.scores
+        if (score.where.id, score.name) == (form, contrast.measure)
+    ]
+    after = [table[(table["code"] == block) & table["score"].notna()] for table in rows]
+    means = {person: own["score"].mean() for table in after for person, own in table.groupby("participant")}
+    return {str(person): Measured(value=float(mean)) for person, mean in means.items()}
+
+
 def _values(
+    study: Study,
     contrast: Contrast,
     block: str,
     condition: str | None,
@@ -260,6 +278,8 @@ def _values(
     levels: Sequence[LevelsResult],
 ) -> Mapping[str, Measured]:
     """Return each participant's number in a block: the mean over standards or, for statements, over conditions."""
+    if contrast.form is not None:
+        return _form_values(study, contrast, contrast.form, block)
     if contrast.measure not in _STATISTICS:
         asked = next(answered for answered in answers if answered.block.id == block)
         codes = [setting.code for setting in asked.block.settings if condition in (None, setting.condition)]
@@ -374,7 +394,8 @@ def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
 
 def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
     """Return the bound on the scale of the test, and the largest possible difference (None: unlimited)."""
-    largest = None if contrast.measure in _STATISTICS else STEPS * (2 if contrast.is_interaction else 1)
+    is_statement = contrast.measure not in _STATISTICS and contrast.form is None
+    largest = STEPS * (2 if contrast.is_interaction else 1) if is_statement else None
     return abs(math.log(bound)) if ratio else bound, largest
 
 

@@ -343,7 +343,11 @@ class Contrast(Table):
 
     measure: Id = Field(
         default="threshold",
-        description='"threshold", "exponent", "d_prime" or "pse" for blocks of levels, or the ID of a statement.',
+        description='"threshold", "exponent", "d_prime" or "pse" for blocks of levels, or the ID of a statement; with '
+        "form the ID of one of its questions or scores.",
+    )
+    form: Id | None = later(
+        default=None, description="The questionnaire after the blocks whose answers or score are compared."
     )
     blocks: tuple[Id, ...] = Field(
         min_length=1,
@@ -373,6 +377,8 @@ class Contrast(Table):
     def _compares_two(self) -> Self:
         if len(self.blocks) == 2 and self.conditions is not None:
             raise invalid("give two blocks, or two conditions of one block", "conditions")
+        if self.form is not None and (self.conditions is not None or self.measure in OF_LEVELS):
+            raise invalid("compare a question or score of the form, after blocks or between groups", "form")
         if self.groups is None and self.within is None:
             raise invalid("specify two blocks, or one block and two conditions, or one block and two groups", "blocks")
         for first, second in filter(None, (self.groups, self.within)):
@@ -401,6 +407,8 @@ class Contrast(Table):
     @property
     def measure_words(self) -> str:
         """The measure in words: "threshold", "agreement with “thick”"."""
+        if self.form is not None:
+            return f"“{self.measure}” of {self.form}"
         words = {"d_prime": "sensitivity (d′)", "pse": "point of subjective equality"}
         return (
             words.get(self.measure, self.measure) if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"

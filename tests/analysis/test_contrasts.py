@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from pydantic import ValidationError
 from scipy.stats import t as student
-from scipy.stats import ttest_ind
+from scipy.stats import ttest_ind, ttest_rel
 
 from study_app.analysis.contrasts import answer
 from study_app.analysis.data.study_tables import Study, load_study
@@ -26,6 +26,7 @@ from study_app.analysis.report.methods import methods
 from study_app.analysis.report.write_report import report
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import group_mean
+from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.raters import PUBLISHED, TYPICAL
@@ -187,6 +188,48 @@ def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
     assert "never means" not in told
     rows = write_report.tests_csv(evaluate(statements(contrast))).decode().splitlines()
     assert "hypotheses" in rows[1]
+
+
+_FORM = 'sequence = ["prompt", "load", "late", "load"]\nquestionnaires.load.instrument = "nasa-tlx"\n'
+LOADED = (
+    DELAYED.replace("trials = 20", "trials = 8")
+    .replace("blocks.prompt =", f"{_FORM}blocks.prompt =")
+    .replace('measure = "threshold"', 'measure = "raw", form = "load"')
+    .replace(', expected = "higher", bound = 1.25', "")
+)
+
+
+def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) -> None:
+    (tmp_path / "loaded.toml").write_text(LOADED, encoding="utf-8", newline="\n")
+    folder = rehearse_answers(tmp_path / "loaded.toml", participants=6, seed=11, results=tmp_path / "s", features={})
+    unblind(folder, "AB", "to analyse")
+    (result,) = evaluate(load_study(folder)).contrasts
+
+    files = sorted(folder.rglob("*responses_data.csv"))
+    rows = pd.concat([pd.read_csv(file, na_values="n/a") for file in files])
+    load = rows[rows["form"] == "load"].astype({"value": float})
+    raw = load.pivot_table("value", "participant", "after_block", aggfunc="mean")  # mean of the six ratings
+    assert load.groupby(["participant", "after_block"]).size().tolist() == [6] * 12
+    expected = ttest_rel(raw["late"], raw["prompt"])
+    assert (result.statistic, result.p) == pytest.approx((expected.statistic, expected.pvalue))
+    assert result.effect == pytest.approx((raw["late"] - raw["prompt"]).mean())
+    with quick_pdfs():
+        page = report(folder, tmp_path / "report")[0].read_text(encoding="utf-8")
+    assert "“raw” of load differs between late and prompt" in page.lower()
+    assert (tmp_path / "report" / "hypothesis-1.svg").is_file()
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "words"),
+    [
+        ('"late", "load"]', '"late"]', "load is not asked after each compared block"),
+        ('measure = "raw"', 'measure = "raws"', '"load" has no number or score raws'),
+        ('measure = "raw"', 'measure = "threshold"', "compare a question or score of the form"),
+    ],
+)
+def test_a_form_that_blocks_do_not_have_in_common_is_refused(before: str, after: str, words: str) -> None:
+    with pytest.raises(ProtocolError, match=words):
+        parse(LOADED.replace(before, after).encode(), "loaded.toml")
 
 
 def test_two_groups_are_compared_with_unequal_variances() -> None:

@@ -928,6 +928,11 @@ def two_conditions(story: Story) -> None:
     story.act("ask", next(one for one in head.asks.actions() if one.text().startswith("After each block")).trigger)
     assert designer.study.faults == ()
     assert designer.study.protocol.study.block_order == "balanced"
+    story.play("@sequence")
+    line = designer.field("analysis", "contrasts").lines[0]
+    story.choose(line.measure, next(words for _, words in line.measures if words.startswith("Raw of ")))
+    (hypothesis,) = designer.study.protocol.analysis.contrasts
+    assert (hypothesis.form, hypothesis.measure, hypothesis.expected) == ("nasa_tlx", "raw", None)
 
 
 BROKEN = DEMO.replace("[study]", "[study")

@@ -158,6 +158,8 @@ def _differences(contrast: ContrastResult) -> dict[str, float]:
 
 def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
+    if contrast.contrast.form is not None:
+        return contrast.contrast.measure
     if contrast.contrast.is_interaction:
         return f"{'Ratio' if contrast.ratio else 'Difference'}, {contrast.contrast.measure_words}"
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:

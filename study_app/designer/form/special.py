@@ -41,6 +41,7 @@ from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
+from study_app.protocol.groups import follows
 from study_app.protocol.model import OF_LEVELS
 from study_app.protocol.orders.balance import block_orders_by_group
 from study_app.protocol.sequences import has_even_borders, row_count
@@ -412,7 +413,11 @@ class Compared:
 
 def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
     """Return the items that hypotheses can compare, in file order; equal titles get the block's id."""
-    every = tuple(_comparable_items(study.document))
+    after = _form_measures(study)
+    every = tuple(
+        item if item.key == "conditions" else replace(item, measures=(*item.measures, *after.get(item.block, ())))
+        for item in _comparable_items(study.document)
+    )
     every += tuple(_interaction_sides(every))
     times = Counter(item.words for item in every)
     every = tuple(
@@ -438,6 +443,21 @@ def _comparable_items(document: Mapping[str, Any]) -> Iterator[Compared]:
             for condition in inner if isinstance(inner, tuple | list) else ():
                 label = f"{title_of(document, (key, str(condition)))} in {title}"
                 yield Compared(key=key, block=name, name=str(condition), words=label, measures=measures)
+
+
+def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
+    """Return the numbers and scores of the forms after each block as FORM/ID with their words; empty if faulty."""
+    protocol, after = study.protocol, dict[str, tuple[tuple[str, str], ...]]()
+    if protocol is None:
+        return after
+    exchanged = [] if protocol.study.block_order == "fixed" else [block.id for block in protocol.main_blocks]
+    for name, form in protocol.forms.items():
+        title = title_of(study.document, ("questionnaires", name))
+        ids = [*form.scores, *(item.id for item in form.items if item.value_type != "text")]
+        measures = tuple((f"{name}/{measure}", f"{capitalised(measure)} of {title}") for measure in ids)
+        for block in filter(None, follows(protocol, name, protocol.blocks, exchanged)):
+            after[block] = (*after.get(block, ()), *measures)
+    return after
 
 
 def _interaction_sides(every: Sequence[Compared]) -> Iterator[Compared]:
@@ -496,6 +516,7 @@ class Hypothesis(QWidget):
             _MEASURES if first is None else first.measures if second is None else first.shared_measures(second)
         )
         measure, relation = value.get("measure", "threshold"), _relation(value)
+        measure = f"{value['form']}/{measure}" if value.get("form") else measure
         first_name, two = (*named, "", "")[:2]
         for box, word in ((self.measure, measure), (self.first, first_name), (self.second, two)):
             box.setPlaceholderText(str(word))  # shown where it is not among the choices
@@ -519,7 +540,7 @@ class Hypothesis(QWidget):
         """Emit the chosen hypothesis; replace choices that no longer fit the first item."""
         relation = _RELATIONS[max(0, self.relation.currentIndex())][0]
         if not self.known or self.first.currentIndex() < 0:  # what it compares is not among the choices
-            keys = ("measure", "blocks", "conditions", "groups")
+            keys = ("measure", "form", "blocks", "conditions", "groups")
             table = {key: self.value[key] for key in keys if key in self.value}
             self.changed.emit(
                 table | _relation_keys(relation, self._kept_bound(relation, str(self.value.get("measure"))))
@@ -558,7 +579,8 @@ def _relation_keys(relation: Any, bound: Any) -> dict[str, Any]:
 
 def _comparison_keys(first: Compared, second: Compared, measure: str) -> dict[str, Any]:
     """Return the keys that state the items that a hypothesis compares."""
-    table: dict[str, Any] = {"measure": measure, "blocks": [first.block]}
+    form, _, own = measure.rpartition("/")
+    table: dict[str, Any] = {"measure": own, **({"form": form} if form else {}), "blocks": [first.block]}
     return table | {first.key: [first.name, second.name]} | ({first.pair_of: [*first.pair]} if first.pair else {})
 
 

@@ -32,6 +32,7 @@ _REFERENCES = {
     "designs.*.scale": "scales",
     "analysis.contrasts.*.blocks.*": "blocks",
     "analysis.contrasts.*.conditions.*": "conditions",
+    "analysis.contrasts.*.form": "questionnaires",
     "analysis.contrasts.*.groups.*": "groups",
 }
 

@@ -12,6 +12,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
+from study_app.protocol.groups import follows
 from study_app.protocol.model import OF_LEVELS, Contrast, ExclusionRule, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.presented.presentation import scene_of
@@ -183,6 +184,9 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
         if block.phase != "main":
             yield Fault((*place, "blocks"), f"{name} is not a main block, so it is not analysed", "choose another")
             continue
+        if contrast.form is not None:
+            yield from _check_form(protocol, contrast, contrast.form, name, place)
+            continue
         items = [item.id for item in asked.statements] if asked is not None else []
         known = OF_LEVELS if block.design is not None else items
         if contrast.measure not in known:
@@ -196,6 +200,18 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
             )
         if contrast.conditions is not None and block.design is not None:
             yield Fault((*place, "conditions"), f"the results of {name} refer to all its levels", "compare two blocks")
+
+
+def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, place: Path) -> Iterator[Fault]:
+    """Check that a form is asked after a block of a contrast, and has its measure."""
+    exchanged = [] if protocol.study.block_order == "fixed" else [main.id for main in protocol.main_blocks]
+    if block not in follows(protocol, form, protocol.blocks, exchanged):
+        yield Fault((*place, "form"), f"{form} is not asked after each compared block", f"ask it after {block}")
+    asked = protocol.questionnaires[form]
+    known = [*(item.id for item in asked.items if item.value_type != "text"), *asked.scores]
+    if contrast.measure not in known:
+        words = f'"{form}" has no number or score {contrast.measure}'
+        yield unknown_name((*place, "measure"), words, contrast.measure, known)
 
 
 def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> Iterator[Fault]:
