@@ -27,7 +27,7 @@ _Origin: TypeAlias = Literal["saved", "found", "draft"]
 _ORIGINS: Final = frozenset({"saved", "found", "draft"})
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Kept:
     """A stored content of a study's file, identified by its hash; ``at`` is ISO 8601 with the time zone.
 
@@ -134,8 +134,8 @@ def _listed_versions(path: Path) -> tuple[Kept, ...]:
         with contextlib.suppress(ValueError):
             held = parse_json(line)
             if isinstance(held, dict) and held.get("origin") in _ORIGINS:
-                at, by = str(held.get("at")), str(held.get("by", ""))
-                versions.append(Kept(str(held.get("hash")), held["origin"], at, by))
+                texts = {name: str(held.get(name, "")) for name in ("hash", "at", "by")}
+                versions.append(Kept(origin=held["origin"], **texts))
     return tuple(versions)
 
 

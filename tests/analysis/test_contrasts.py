@@ -223,7 +223,7 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
     ("before", "after", "words"),
     [
         ('"late", "load"]', '"late"]', "load is not asked after each compared block"),
-        ('measure = "raw"', 'measure = "raws"', '"load" has no number or score raws'),
+        ('measure = "raw"', 'measure = "raws"', '"load" does not have a number or score raws'),
         ('measure = "raw"', 'measure = "threshold"', "compare a question or score of the form"),
     ],
 )

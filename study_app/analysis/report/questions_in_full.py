@@ -72,6 +72,6 @@ def _translations(name: str, text: Any, only: str) -> Iterable[_Text]:
     """Return a text in each of its languages; ``only`` is the language of a text that has just one."""
     by_language = text if isinstance(text, Mapping) else {only: text} if text else {}
     return [
-        _Text(name, language, " · ".join(words) if isinstance(words, list) else str(words))
+        _Text(id=name, language=language, words=" · ".join(words) if isinstance(words, list) else str(words))
         for language, words in by_language.items()
     ]

@@ -210,7 +210,7 @@ def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, p
     asked = protocol.questionnaires[form]
     known = [*(item.id for item in asked.items if item.value_type != "text"), *asked.scores]
     if contrast.measure not in known:
-        words = f'"{form}" has no number or score {contrast.measure}'
+        words = f'"{form}" does not have a number or score {contrast.measure}'
         yield unknown_name((*place, "measure"), words, contrast.measure, known)
 
 
