@@ -104,7 +104,7 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
         blocks=blocks,
         contrasts=failures.value("the hypotheses", lambda: contrast_results(study, asked, levels), ()),
         delivered=failures.value("the delays as they were shown", lambda: delivered(study), ()),
-        orders=failures.value("the orders as run", lambda: orders(study), {}),
+        orders=failures.value("the orders in which trials were run", lambda: orders(study), {}),
         seed=SEED,
         questions=failures.value("the answers to other questions", lambda: question_results(study), ()),
         scores=failures.value("scores of questionnaires", lambda: score_results(study), ()),

@@ -182,7 +182,7 @@ def study_marks(study: Study) -> list[Mark]:
     marks = (
         (study.simulated, Mark(words="SIMULATED participants", ink=style.WARN, ground=style.WARN_GROUND)),
         (study.pilot, Mark(words="PILOT", ink=style.WARN, ground=style.WARN_GROUND)),
-        (not study.revealed, Mark(words="Blinded: by code", ink=style.SEALED, ground=style.SEALED_GROUND)),
+        (not study.revealed, Mark(words="Blinded: conditions as codes", ink=style.SEALED, ground=style.SEALED_GROUND)),
     )
     return [mark for applies, mark in marks if applies]
 

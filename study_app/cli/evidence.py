@@ -409,9 +409,9 @@ def timing(
     With --delays a session presents the delays of rek2024 on screens of 60 and 144 Hz, with and without load, and
     computes the error of every frame's delay from its recordings. It does not need a display.
 
-    With --devices the servo runs alternately on each emulated device and on the scripted hand. Ends with exit code 3 if
-    the 99th percentile of the lateness on one of them is more than 1.5 times the value on the scripted hand, with its
-    whole 95 % interval.
+    With --devices the servo runs alternately on each emulated device and on the scripted hand. The command ends with
+    exit code 3 if the 99th percentile of the lateness on one of them is more than 1.5 times the value on the scripted
+    hand, and the whole 95 % interval of this ratio is above 1.5.
 
     With --lsl another process receives samples at 1 kHz and markers for the given time; then the servo runs with and
     without both streams, alternately, for up to 300 s each. Ends with exit code 3 if something is lost, a marker's
@@ -520,7 +520,7 @@ def soak(
 ) -> None:
     """Run the servo for hours with a moving hand and every fault, and report drift, leaks and failures.
 
-    FILE defines the liquids; default: rek2024. Ctrl+C ends it with the report so far.
+    FILE defines the liquids; default: rek2024. Ctrl+C ends the command and prints the report so far.
     """
     from study_app.evidence.computer import under_load
     from study_app.evidence.soak.soak import soak as soak_servo
@@ -583,8 +583,8 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     whether it meets its limit: "at most 5 %" is met if the interval ends below 7.5 %, and exceeded if an interval that
     allows for the number of rates lies above 5 %. Hypotheses, recognition, equivalence with a minority and skewed
     trends are tested on numbers drawn directly. If a rate is undecided, its cell gets more studies, up to four times as
-    many. Ctrl+C ends the command with the results so far. Ends with exit code 3 if a rate exceeds its limit, otherwise
-    with 4 if there are too few studies to decide about a rate.
+    many. Ctrl+C ends the command and prints the results so far. It ends with exit code 3 if a rate exceeds its limit,
+    otherwise with 4 if there are too few studies to decide about a rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.evidence.report_rates.simulation import Rate, evidence, validate

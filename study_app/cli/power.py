@@ -74,7 +74,7 @@ def power(
     values in [simulated_participants], with the range over consistent, typical and noisy people. For a study of
     thresholds, d′, ratings or magnitude estimation the command prints, for each number of participants and of --trials,
     the standard deviation of one participant's estimate, the half width of the group's 95 % interval, and the
-    proportion of studies that reach analysis.precision. Ctrl+C ends the command with the results so far.
+    proportion of studies that reach analysis.precision. Ctrl+C ends the command and prints the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)

@@ -27,7 +27,8 @@ class SimulatedParticipants(Table):
     """How simulated participants answer statements; without this table `power` takes published values."""
 
     noise_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
-        default=1.10, description="SD of a participant's answers to equal trials, in points (mean over participants)."
+        default=1.10,
+        description="SD of a participant's answers to identical trials, in points (mean over participants).",
     )
     bias_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
         default=0.76,

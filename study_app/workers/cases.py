@@ -149,7 +149,7 @@ class ClusterExecutor(Executor):
                 f"the cluster at {self.address} lost several workers during the same case: give its workers more memory"
             )
         elif isinstance(error, ModuleNotFoundError) and (error.name or "").startswith("study_app"):
-            why = f"a worker of {self.address} does not have this program: install liquid-study there as here"
+            why = f"a worker of {self.address} does not have this program: install this version of liquid-study there"
         else:
             return
         raise WorkerError(why) from error

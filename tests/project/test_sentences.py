@@ -32,7 +32,7 @@ PATTERNS = {
     "of one's own": re.compile(r"\bof (?:its|their|his) own\b"),
     "said of it": re.compile(r"\b(?:is|are) said\b|\bsuch as it is\b"),
     "give for specify": re.compile(r"(?:^|[:;,] |\bor )give\b(?! (?:its workers more|this account)\b)"),
-    "another … than": re.compile(r"\b(?:an)?other \w+ than\b"),
+    "another … than": re.compile(r"\b(?:an)?other \w+ (?:\([^)]*\) )?than\b"),
     "replace … by": re.compile(r"\breplace (?:[^.;:]+ )?by\b", re.IGNORECASE),
     "adjusted by Holm": re.compile(r"\bby (?:Holm|Benjamini)\b"),
     "comma for but": re.compile(r", this version (?:reads|knows)\b"),

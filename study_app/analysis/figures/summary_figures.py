@@ -268,7 +268,7 @@ def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence
     people = len({who for panel in panels for column in panel.columns for who in column.values})
     title = next(question.where.title for question in study.others.questions if question.where.id == where)
     caption = (
-        f"{title}: the number of each participant, and the mean with Student's 95 % interval. "
+        f"{title}: the value of each participant, and the mean with Student's 95 % interval. "
         f"{sample_words(study, people)}"
     )
     draw, numbers = partial(draw_people, panels, above="", members=group_members(study)), numbers_of_panels(panels)

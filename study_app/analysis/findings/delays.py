@@ -456,7 +456,7 @@ class NoticedFrom(Finding[None]):
                 text = "Agreement increases with the delay, but no single delay is shown to be noticed."
             if text:
                 return self.answered(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
-        return self.answered("not shown", f"It is not shown that any delay is noticed. {NO_EVIDENCE}")
+        return self.answered("not shown", f"No delay is shown to be noticed. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
         """Return a sentence on the shortest delay that changes one of these statements, or ""."""

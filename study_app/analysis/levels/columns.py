@@ -241,8 +241,8 @@ RESULTS: Final = {
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown, with a heading and a table for each."""
     added = (
-        "columns that `export` adds to responses, trials and intervals; `trials_missing` in studies with "
-        "trials of intervals, the last four after unblinding"
+        "columns that `export` adds to responses, trials and intervals; `trials_missing` only in studies with trials "
+        "of intervals, and the last four only after unblinding"
     )
     of_tracks = (
         "one row per trial with a design, after unblinding; it also contains the IDs and the condition of the trial, "

@@ -517,7 +517,7 @@ def smallest_differences(
     heads = (first, "participants", "SD", "half width of the 95 % interval", "smallest difference", *equal)
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} over {members} hypotheses)"
-    both = "" if shares is None else f" Of the participants {shares[0]:.0%} and {shares[1]:.0%} are in the two groups."
+    both = "" if shares is None else f" The two groups contain {shares[0]:.0%} and {shares[1]:.0%} of the participants."
     yield from ("", f"## Contrast: {contrast.described()}", "")
     at = f"at α = {strictest:.2g}{corrected}, {sides}"
     within = (

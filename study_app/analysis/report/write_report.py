@@ -425,7 +425,7 @@ def _marks(study: Study) -> list[tuple[str, str]]:
     """Return the marks at the top of the page: CSS class and text."""
     marks = [("mark", "SIMULATED participants, not people")] if study.simulated else []
     marks += [("mark", "PILOT")] if study.pilot else []
-    return marks if study.revealed else [*marks, ("sealed", "Blinded: by code")]
+    return marks if study.revealed else [*marks, ("sealed", "Blinded: conditions as codes")]
 
 
 def _again(study: Study, results: Results) -> Iterator[str]:

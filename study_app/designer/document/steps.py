@@ -360,7 +360,7 @@ class MoveElement(Request):
             raise Refused(f"{title} is not part of an ordered list, so it cannot be moved")
         to = index_of(entry) + (by if by < 0 else 1 + by)
         if not 0 <= to <= len(value_at(document, entry[:-1])):
-            raise Refused(f"{title} is the {'first' if by < 0 else 'last'} already")
+            raise Refused(f"{title} is already the {'first' if by < 0 else 'last'}")
         return _move_step(at.study, self.path, entry, to, f"Move {title} {'up' if by < 0 else 'down'}")
 
 

@@ -182,8 +182,8 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
         )
     if scene.link.acts and len(model.forces_n) == 0:
         raise StudyError(
-            "the scene delays its force, but the model was packed without room for delayed forces: pack it with a "
-            "capacity"
+            "the scene delays its force, but the model was packed without room for delayed forces: specify a capacity "
+            "when you pack it"
         )
     rows = _rows_needed(scene)
     for kind in KINDS:

@@ -308,7 +308,7 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
         yield f"{people} participants are {'a full round' if rounds == 1 else f'{rounds} full rounds'} of {rows} rows."
     elif people % rows == 0:
         yield (
-            f"A full round is the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on, but these IDs are "
+            f"A full round consists of the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on, but these IDs are "
             "incomplete."
         )
     else:
@@ -317,7 +317,7 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
         if block.order == "williams" and has_even_borders(codes, block.repetitions):
             follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
             then += f" and follows each other code {_times_text(follows)}"
-        yield f"A full round is {rows} participants. The next complete number is {enough}: {then}."
+        yield f"A full round consists of {rows} participants. The next complete number is {enough}: {then}."
 
 
 def _times_text(number: int) -> str:

@@ -191,10 +191,10 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
     if first and line.get("format", 1) > FORMAT:
         return f"has format {line['format']}, but this version reads {FORMAT}: use a newer version of liquid-study"
     if first and "format" not in line and "measures_sealed" in line:  # not of a version with format 1
-        return "lacks format: it was changed; restore it from a copy"
+        return "does not contain the key format: it was changed; restore it from a copy"
     if hash_before is None:
         needed = chained or (first and line.get("format", 1) > 1)
-        return "lacks previous: it was changed; restore it from a copy" if needed else None
+        return "does not contain the key previous: it was changed; restore it from a copy" if needed else None
     if hash_before != before:
         return "does not continue the previous line, which was changed: restore it from a copy"
     if not (chained or first or line["event"] == "session_resumed"):

@@ -242,7 +242,7 @@ def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterato
     ended = isinstance(lines[-1], events.SessionEnded)
     held = receipt.read(folder.receipt) if is_there(folder.receipt) else {}
     if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
-        yield folder.receipt, f"its status is {status!r}, the journal's {receipt.UNFINISHED!r}"
+        yield folder.receipt, f"its status is {status!r}, but the journal's is {receipt.UNFINISHED!r}"
     if len(held.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
         yield folder.receipt, "states more resumptions of the session than the journal"
     if ended:

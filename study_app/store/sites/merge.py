@@ -130,7 +130,7 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
             raise StoreError(f"site {name!r} {fault}, so it cannot be the name of a folder: use another name")
         if (other := used.get(name.lower())) is not None:
             held = "is merged already" if merged is not None and other in merged.names else "is given twice"
-            raise StoreError(f"site {name!r} {held} (capitals are ignored): use another name")
+            raise StoreError(f"site {name!r} {held} (case is ignored): use another name")
         used[name.lower()] = name
 
 

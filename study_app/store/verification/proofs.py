@@ -146,5 +146,5 @@ def _check_signature(path: Path, lines: str, public: str, signature: str) -> str
         raise StoreError(f"{path} was changed after it was signed") from error
     own = _signing_key(draws=False)
     if own is not None and own.public_key().public_bytes_raw() != key.public_bytes_raw():
-        raise StoreError(f"{path} is signed with another key ({public}) than this computer's: it was replaced")
+        raise StoreError(f"{path} is signed with a different key ({public}) from this computer's: it was replaced")
     return f"is signed with {'the key of this computer' if own is not None else f'{public}: compare it with your key'}"

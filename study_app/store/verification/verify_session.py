@@ -291,7 +291,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
         findings.error(
-            path, (f"its status is {held.get('status')!r}, the journal's {last.status!r}; rebuild corrects it")
+            path, (f"its status is {held.get('status')!r}, but the journal's is {last.status!r}; rebuild corrects it")
         )
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
     steps = sequence if isinstance(sequence, list) else []
@@ -580,7 +580,7 @@ def _check_facts(
         facts: dict[str, Any] = recordings.read_facts(path, key.nonce if key else None)
         for fact, value in expected.items():
             if facts.get(fact) != value:
-                findings.error(path, f"holds {fact} {facts.get(fact)!r}, the journal says {value!r}")
+                findings.error(path, f"contains {fact} {facts.get(fact)!r}, but the journal says {value!r}")
 
 
 @dataclass(frozen=True, slots=True)

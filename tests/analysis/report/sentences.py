@@ -559,7 +559,9 @@ def corrected(text: str, told: Told) -> bool:
     question = "answers follow the delay" if told.block["kind"] == "delays" else "settings differ"
     rows = told.asked(question)
     found = {(row["correction"], int(row["members"])) for row in rows}
-    return {(how, count(n)) for how, n in re.findall(rf"by (Holm|Benjamini-Hochberg) over {N}", text)} == found
+    return {
+        (how, count(n)) for how, n in re.findall(rf"by the (Holm|Benjamini-Hochberg) method across {N}", text)
+    } == found
 
 
 def trends_tested(match: re.Match[str], told: Told) -> bool:
@@ -623,9 +625,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"Over delays of {R} to {R} ms participants already tend to rate longer delays (.*)\.", trend_is_shown),
     (r"Participants may also notice shorter delays\.", always),
     (r"A trend does not imply that mean ratings change\.", always),
-    (r"Agreement increases with the delay, but it is not shown that any single delay is noticed\.",
+    (r"Agreement increases with the delay, but no single delay is shown to be noticed\.",
      when(lambda told: told.block["threshold"]["effect"] is not None)),
-    (r"It is not shown that any delay is noticed\.", nothing_noticed),
+    (r"No delay is shown to be noticed\.", nothing_noticed),
     (r"This does not show that there is no difference\.", always),
     (r"No answer: [a-z].*\.", when(lambda told: not told.against)),
     (rf"We could not show for any delay that the mean answers to all statements stay within ±{R} points? of those at "
@@ -656,8 +658,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"The data are ([\d.]+) times as likely (with|without) a difference as (with|without) one \(JZS Bayes factor, "
      r"Cauchy prior with scale 0\.707\)\.", bayes_factor),
     (r"Standardised effects weight participants equally: d_z is .*\.", when(lambda told: bool(told.contrasts))),
-    (r"Bayes factors are two-sided JZS factors \(Rouder et al\., 2009\) of a difference against none, with a Cauchy "
-     r"prior of scale 0\.707\.", when(lambda told: bool(told.contrasts))),
+    (r"Bayes factors are two-sided JZS factors \(Rouder et al\., 2009\) for a difference against no difference, with "
+     r"a Cauchy prior of scale 0\.707\.", when(lambda told: bool(told.contrasts))),
     (r"Cliff's delta is the probability of a larger answer minus the probability of a smaller one; within participants "
      r"it is .*\.", when(lambda told: bool(told.contrasts))),
     (r"The mean lies within the bound \(equivalent\); the data do not exclude that up to (\d+) % of (people differ by "
@@ -741,9 +743,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"A bootstrap that adds a participant like the most extreme one \(Gaffke 2005\) had to agree: p is the larger of "
      r"both(?:, Holm-adjusted across (\d+) hypotheses)?\.",
      lambda match, told: int(match[1] or 1) == len(told.contrasts)),
-    (r"Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree(?:, adjusted by Holm "
-     r"over (\d+) bounds)?, and requires that the sample is large enough to contain a member of a minority that shifts "
-     r"the mean by the bound\.",
+    (r"Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree(?:, "
+     r"Holm-adjusted across (\d+) bounds)?, and requires that the sample is large enough to contain a member of a "
+     r"minority that shifts the mean by the bound\.",
      lambda match, told: int(match[1] or 1)
      == sum(one["contrast"]["bound"] is not None for one in told.contrasts)),
     (r"Some participants were excluded from a hypothesis because a number is missing \(.*\)\.",
@@ -794,7 +796,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"The detection threshold is the delay at which a logistic function, fitted to agreement \(5 to 7\) in single "
      r"answers pooled over participants, lies halfway between the guess rate and one minus the lapse rate \(posterior "
      r"median\)\.", when(lambda told: told.block["threshold"] is not None)),
-    (r"Its 95 % interval is widened by how far participants differ\.", always),
+    (r"Its 95 % interval is widened to allow for differences between participants\.", always),
     (r"It is reported only if the statement shows a trend and if the threshold lies within the presented delays\.",
      when(lambda told: told.block["threshold"] is not None)),
     (r"An adjusted p value of a statement is at least the p value of the test over all statements of its block\.",

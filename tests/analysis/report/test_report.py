@@ -45,7 +45,7 @@ def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_pa
         small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 2)
     report(small.folder, tmp_path / "report")
     told = read(tmp_path / "report")
-    assert "Blinded: by code" in told
+    assert "Blinded: conditions as codes" in told
     assert "after unblinding" in told
     assert re.search(r" all +sealed +sealed +sealed +sealed +28 +28 of 28 ", " ".join(told.split()))
     assert "Delay error and force held back are sealed, and not checked, until unblinding." in told

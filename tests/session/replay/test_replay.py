@@ -196,7 +196,9 @@ def test_each_part_of_a_session_is_replayed_by_the_force_rules_that_its_receipt_
     assert all(line.startswith("trial 1, attempt 2:") for line in differences)
     lighter["force_rules"] = FORCE_RULES + 1
     (place / "receipt.json").write_text(json.dumps(receipt), encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError, match=f"force rules {FORCE_RULES + 1}, this version knows 1 to {FORCE_RULES}"):
+    with pytest.raises(
+        StoreError, match=f"force rules {FORCE_RULES + 1}, but this version knows only 1 to {FORCE_RULES}"
+    ):
         replay(place)
 
 

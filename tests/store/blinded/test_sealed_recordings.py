@@ -111,7 +111,7 @@ def in_line(event: str, **changes: Any) -> Any:
 
 def test_what_differs_from_the_sealed_value_is_found_before_the_study_is_opened(study: Path) -> None:
     change(study / SESSION, in_line("recorded", samples_recorded=2_499))
-    assert f"{RECORDING}: holds rows 2500, the journal says 2499" in map(str, verify_study(study).errors)
+    assert f"{RECORDING}: contains rows 2500, but the journal says 2499" in map(str, verify_study(study).errors)
     forge(study / SESSION / "journal.jsonl", in_line("recorded", sealed="00" * 1040))
     assert "cannot be decrypted with the study's key" in "".join(map(str, verify_study(study).errors))
 

@@ -133,7 +133,7 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
     kept.write_text(whole, encoding="utf-8", newline="\n")
     assert "compare it with your key" in "\n".join(read_proof(kept).told)
     proof_text(StudyFolder(study), sign=True)
-    with pytest.raises(StoreError, match=r"signed with another key .* than this computer's: it was replaced"):
+    with pytest.raises(StoreError, match=r"signed with a different key .* from this computer's: it was replaced"):
         verify_study(study, kept)
 
 

@@ -107,7 +107,7 @@ def test_an_open_interval_says_which_end_is_open() -> None:
     assert result.interval is None
     assert result.lower is not None
     assert result.upper is None
-    assert result.no_interval == "no interval: the answers do not bound it above"
+    assert result.no_interval == "no interval: the answers leave it open above"
     far = noticed(pooled([0, 0, 0, 0, 1, 2, 8], 20), DELAYS)
     assert far.upper is not None
     assert far.upper > 300
