@@ -376,7 +376,7 @@ class Contrast(Table):
     @model_validator(mode="after")
     def _compares_two(self) -> Self:
         if len(self.blocks) == 2 and self.conditions is not None:
-            raise invalid("give two blocks, or two conditions of one block", "conditions")
+            raise invalid("specify two blocks, or two conditions of one block", "conditions")
         if self.form is not None and (self.conditions is not None or self.measure in OF_LEVELS):
             raise invalid("compare a question or score of the form, after blocks or between groups", "form")
         if self.groups is None and self.within is None:
