@@ -13,7 +13,7 @@ from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import BlockAnswers, block_answers, summarize_block, untested
-from study_app.analysis.findings.statement_tests import gated
+from study_app.analysis.findings.statement_tests import with_gates
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.questions import question_results, score_results
 from study_app.analysis.results import (
@@ -26,7 +26,7 @@ from study_app.analysis.results import (
     NotTested,
     Progress,
     Results,
-    silent,
+    report_no_progress,
 )
 from study_app.protocol.orders.balance import Evenness, evenness
 
@@ -34,7 +34,7 @@ SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""
 
 
-def evaluate(study: Study, *, recordings: bool = True, progress: Progress = silent) -> Results:
+def evaluate(study: Study, *, recordings: bool = True, progress: Progress = report_no_progress) -> Results:
     """Run all tests on the answers and, with ``recordings``, the recordings of a study.
 
     While the key is sealed there are only counts and comparisons of codes; ``BlockResult.absent`` lists what awaits the
@@ -73,7 +73,7 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
         failures.attempt("all tests", partial(block_answers, study, block, SEED, failures), block=block.id)
         for block in study.blocks
     ]
-    asked = gated([one for one in collected if not isinstance(one, Failure)])
+    asked = with_gates([one for one in collected if not isinstance(one, Failure)])
 
     def tested(number: int, block: Block) -> BlockResult:
         def tell(what: str) -> None:

@@ -8,7 +8,7 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.export import psychds_dataset
 from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_bytes, table_files
 from study_app.analysis.export.tables import deliver, wide
-from study_app.analysis.results import Failure, Progress, silent
+from study_app.analysis.results import Failure, Progress, report_no_progress
 from study_app.store.output_files import FileCopy, write_output
 
 
@@ -17,7 +17,7 @@ def export(
     to: Path,
     *,
     extras: Collection[Extra] = NOTHING_ELSE,
-    progress: Progress = silent,
+    progress: Progress = report_no_progress,
     warn: Callable[[str], object] | None = None,
     failed: Callable[[str], object] | None = None,
 ) -> tuple[Path, ...]:

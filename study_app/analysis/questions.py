@@ -32,14 +32,14 @@ class Measure:
     cells: Callable[[PlacedQuestion, Numbers], Mapping[str, str]] | None
 
 
-def given(answers: pd.DataFrame) -> pd.DataFrame:
+def given_answers(answers: pd.DataFrame) -> pd.DataFrame:
     """Return the answers without missing ones and those off the scale."""
     return answers[answers["response"].notna()]
 
 
 def counts_of_missing(answers: pd.DataFrame) -> dict[str, Any]:
     """Return the numbers of answers, participants, missing answers, and answers off the scale."""
-    valid = given(answers)
+    valid = given_answers(answers)
     cannot_judge = int(answers["cannot_judge"].sum())
     return {
         "n": len(valid),
@@ -59,7 +59,7 @@ def _quartile_cells(numbers: Numbers) -> dict[str, str]:
 
 
 def _distribution(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
-    values = given(answers)["value"].to_numpy(dtype=float)
+    values = given_answers(answers)["value"].to_numpy(dtype=float)
     return {
         **counts_of_missing(answers),
         **quartiles_or_none(values)._asdict(),
@@ -83,7 +83,7 @@ _DISTRIBUTION: Final = Measure("distribution", _distribution, _distribution_cell
 
 
 def _option_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
-    chosen = [asked.question.counted(str(response)) for response in given(answers)["response"]]
+    chosen = [asked.question.counted(str(response)) for response in given_answers(answers)["response"]]
     return {
         **counts_of_missing(answers),
         "counts": {option: sum(option in one for one in chosen) for option in asked.levels},
@@ -106,11 +106,11 @@ _OPTION_COUNTS: Final = Measure("counts", _option_counts, _option_cells)
 
 
 def _point_counts(asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
-    chosen = given(answers)["response"].value_counts()
+    chosen = given_answers(answers)["response"].value_counts()
     return {
         **counts_of_missing(answers),
         "counts": {point: int(chosen.get(point, 0)) for point in asked.levels},
-        **quartiles_or_none(given(answers)["value"].to_numpy(dtype=float))._asdict(),
+        **quartiles_or_none(given_answers(answers)["value"].to_numpy(dtype=float))._asdict(),
     }
 
 
@@ -127,7 +127,7 @@ _POINT_COUNTS: Final = Measure("rating", _point_counts, _point_cells)
 
 
 def _texts(_asked: PlacedQuestion, answers: pd.DataFrame) -> Numbers:
-    texts = given(answers).sort_values(["participant", "session"], kind="stable")
+    texts = given_answers(answers).sort_values(["participant", "session"], kind="stable")
     pairs = zip(texts["participant"], texts["response"], strict=True)
     return {**counts_of_missing(answers), "texts": [f"{person}: {text}" for person, text in pairs]}
 

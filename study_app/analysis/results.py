@@ -54,7 +54,7 @@ Progress: TypeAlias = Callable[[str, float], object]
 """Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
 
 
-def silent(_what: str, _share: float) -> None:
+def report_no_progress(_what: str, _share: float) -> None:
     """Report nothing; the default progress function."""
 
 
@@ -331,7 +331,7 @@ VERDICTS_MEAN: Final = (
 )
 
 
-def beyond(tested: Equivalence) -> str:
+def beyond_phrase(tested: Equivalence) -> str:
     """Return the number of participants who differ by more than the bound, with the interval of their share."""
     if tested.beyond is None:
         return "–"
@@ -344,7 +344,7 @@ def settings_noun(found: BlockResult | Block) -> str:
     return found.kind.removesuffix("s") if found.revealed else "setting"
 
 
-def short(result: BlockResult, item: str) -> str:
+def short_text(result: BlockResult, item: str) -> str:
     """Return the short text of a statement."""
     return next(one.short for one in result.items if one.id == item)
 
@@ -357,7 +357,7 @@ def name(result: BlockResult, code: str) -> str:
     raise KeyError(code)
 
 
-def lead(result: BlockResult) -> str:
+def lead_phrase(result: BlockResult) -> str:
     """Return the introductory phrase of sentences about a block."""
     return f"{result.title} ({settings_noun(result)}s)" if result.revealed else result.title
 
@@ -392,16 +392,16 @@ def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def least(alpha: float, bound: float) -> str:
+def min_sample(alpha: float, bound: float) -> str:
     """Return the minimum number of participants for equivalence of statements."""
     return f"at least {fewest(alpha, bound)} participants"
 
 
-def enough(alpha: float, bound: float) -> str:
+def min_sample_reason(alpha: float, bound: float) -> str:
     """Return a sentence on the minimum number of participants for equivalence of statements, and its reason."""
     share = minority(bound, STEPS)
     return (
-        f"{least(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
+        f"{min_sample(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
         f"nobody from a minority ({percent(share)} of all people) whose answers differ by "
         f"{significant(bound / share)} points, enough to shift the mean by the bound"
     )
@@ -422,7 +422,7 @@ def incomplete_words(result: BlockResult) -> str:
     statements: dict[str, list[str]] = {}
     for item, people in result.incomplete.items():
         for person in people:
-            statements.setdefault(person, []).append(f"“{short(result, item)}”")
+            statements.setdefault(person, []).append(f"“{short_text(result, item)}”")
     every = len(result.items)
     who = [
         f"{person} ({'all statements' if len(items) == every else listed(items)})"
@@ -431,7 +431,7 @@ def incomplete_words(result: BlockResult) -> str:
     return f"Excluded from tests over all {settings_noun(result)}s, because an answer is missing: {listed(who)}."
 
 
-def missing(result: BlockResult) -> tuple[str, ...]:
+def missing_sentences(result: BlockResult) -> tuple[str, ...]:
     """Return what was not computed, one sentence per reason."""
     reasons: dict[str, list[str]] = {}
     for not_tested in result.absent:

@@ -205,7 +205,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     """
     from study_app.evidence.cfd import fits, law_fit
     from study_app.evidence.cfd.solver import solve as solve_all
-    from study_app.evidence.cfd.stored_flows import held_out, steady, stored, training
+    from study_app.evidence.cfd.stored_flows import held_out, load_steady, load_tables, training
 
     exclude_each_other(refit=refit, materials=materials, score=score)
     exclude_each_other(solve=solve, score=score)
@@ -226,7 +226,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
             with executor_for(workers) as executor:
                 solved = solve_all(to, executor, show)
         source = to if solve else None
-        tables, drag = stored(source), steady(source)
+        tables, drag = load_tables(source), load_steady(source)
         if refit:
             result = law_fit.evidence(law_fit.refit((*tables, *training(source)), held_out(source), show))
         else:
@@ -292,7 +292,7 @@ def stability(
     with its emulator. Ends with exit code 3 if a case is unstable with the safety layer on.
     """
     from study_app.evidence.stability import stability_report
-    from study_app.evidence.stability.case_groups import groups, some, sweep
+    from study_app.evidence.stability.case_groups import evenly_chosen, groups, sweep
     from study_app.evidence.stability.stability_cases import parse
 
     parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
@@ -332,7 +332,7 @@ def stability(
         raise StudyError(f"none of the groups has {only!r} in its name; known groups: {names}")
     with progress() as show, executor_for(workers) as executor:
         swept = stability_report.run_sweep(
-            some(sweep(seed), cases) if only is None else (),
+            evenly_chosen(sweep(seed), cases) if only is None else (),
             chosen,
             executor,
             lambda done, of: show(f"{done} of {of} verdicts", done / of),

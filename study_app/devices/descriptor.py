@@ -191,7 +191,7 @@ def opened(device: Opened) -> Opened:
     return device
 
 
-def later(function: str) -> Callable[..., Any]:
+def loaded_on_call(function: str) -> Callable[..., Any]:
     """Return a function that loads ``module:name`` when it is called."""
 
     def call(*values: Any, **request: Any) -> Any:
@@ -221,6 +221,8 @@ def framed(name: str, title: str, driver: str, failures: str, **more: Any) -> De
         open=partial(_open_by_driver, driver),
         motion_shows_force=False,
         driver=driver,
-        doctor=Doctor(findings=later(f"{failures}.findings"), examine=later("study_app.devices.driver:examine")),
+        doctor=Doctor(
+            findings=loaded_on_call(f"{failures}.findings"), examine=loaded_on_call("study_app.devices.driver:examine")
+        ),
         **more,
     )

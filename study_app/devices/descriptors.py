@@ -7,7 +7,7 @@ from pkgutil import resolve_name
 from typing import Final
 
 from study_app.devices import WITHOUT_FORCE
-from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, framed, later, opened
+from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, DeviceOption, framed, loaded_on_call, opened
 
 _FIRMWARE: Final = DeviceOption(
     name="firmware",
@@ -152,7 +152,7 @@ DEVICES: Final = (
         open=lambda request: opened(
             resolve_name("study_app.devices.spacemouse.device:SpaceMouseDevice")(**request.limits)
         ),
-        probe=later("study_app.devices.spacemouse.hid:probe"),
+        probe=loaded_on_call("study_app.devices.spacemouse.hid:probe"),
         stop_button="buttons 1 and 2",
     ),
 )

@@ -61,7 +61,7 @@ def report(scene: Scene, *, batches: int = _BATCHES) -> str:
     )
 
 
-def hand(ticks: int = _WARM_UP) -> Floats:
+def hand_motion(ticks: int = _WARM_UP) -> Floats:
     """Return hand positions (ticks, 3) [m] at 1 kHz: circles of 30 mm that slow down, reverse and stop."""
     t_s = np.arange(ticks) / 1000
     angle = 4 * np.sin(2 * np.pi * np.minimum(t_s % 10, 8.0) / 4)
@@ -74,7 +74,7 @@ class TickTimer:
     def __init__(self, scene: Scene, dynamics: Dynamics = UNKNOWN) -> None:
         self._model, self._sample = pack(scene, dynamics=dynamics), records(SAMPLE, 1)
         self._safety = new_safety(delay_ticks=dynamics.delay_ticks(scene.rate_hz))
-        self._positions_m = hand()
+        self._positions_m = hand_motion()
         self._ticks = 0
         self.costs_ns: list[float] = []
         self.run(_WARM_UP)
@@ -85,12 +85,12 @@ class TickTimer:
         self.costs_ns.append((time.perf_counter_ns() - began) / _BATCH)
 
     def run(self, ticks: int) -> None:
-        _take(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)
+        _run_ticks(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)
         self._ticks += ticks
 
 
 @kernel
-def _take(model: Any, safety: Record, sample: Record, positions_m: Any, start: int, ticks: int) -> None:
+def _run_ticks(model: Any, safety: Record, sample: Record, positions_m: Any, start: int, ticks: int) -> None:
     """Process ``ticks`` samples, one per millisecond."""
     row = start % len(positions_m)
     for k in range(start, start + ticks):

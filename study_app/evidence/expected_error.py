@@ -14,8 +14,8 @@ import numpy as np
 from study_app.evidence import reference_solutions
 from study_app.evidence.cost import measure
 from study_app.evidence.reference_model import (
+    compress_speed,
     local_wakes,
-    lowered,
     non_newtonian_n,
     resistance_nspm,
     respond,
@@ -187,7 +187,7 @@ def _defined_n(scene: Scene, motion: Motion) -> Floats:
     if local is None or "local_wake" not in liquid.effects:
         return respond(scene, motion).force_n
     velocity_mps = motion.velocity_mps if motion.velocity_mps is not None else np.zeros_like(motion.position_m)
-    v = np.array([lowered(row, scene.knee) for row in velocity_mps])
+    v = np.array([compress_speed(row, scene.knee) for row in velocity_mps])
     w = v - _local_wake(scene, local, v, motion)
     speeds = np.linalg.norm(w, axis=1)
     return -np.array([resistance_nspm(scene, speed) for speed in speeds.tolist()])[:, np.newaxis] * w

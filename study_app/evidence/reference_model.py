@@ -38,7 +38,9 @@ def respond(scene: Scene, motion: Motion) -> Response:
     interval_s = np.clip(np.diff(motion.t_s, prepend=motion.t_s[0] - 1 / scene.rate_hz), 0.2e-3, 20e-3)
     interval_s[0] = 1 / scene.rate_hz
     given = motion.velocity_mps if motion.velocity_mps is not None else _filtered(scene, motion, interval_s)
-    velocity_mps = given if liquid.drag.law == "linear" else np.array([lowered(row, scene.knee) for row in given])
+    velocity_mps = (
+        given if liquid.drag.law == "linear" else np.array([compress_speed(row, scene.knee) for row in given])
+    )
     wake_mps: Floats = np.zeros_like(velocity_mps)
     size_mps: Floats = np.zeros(len(velocity_mps))
     if liquid.wake is not None and "wake" in liquid.effects:
@@ -83,7 +85,7 @@ def _filtered(scene: Scene, motion: Motion, interval_s: Floats) -> Floats:
     return velocity_mps
 
 
-def lowered(velocity_mps: Floats, knee: Knee) -> Floats:
+def compress_speed(velocity_mps: Floats, knee: Knee) -> Floats:
     """Return one velocity (3,) after applying the speed knee."""
     speed = float(np.linalg.norm(velocity_mps))
     excess = speed - knee.threshold_mps

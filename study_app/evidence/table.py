@@ -147,7 +147,7 @@ def take_turns(
     return rows
 
 
-def paced(
+def paced_steps(
     seconds: float, every_s: float, *, ending: threading.Event, progress: Callable[[str], object]
 ) -> Iterator[int]:
     """Yield 0, 1, 2 … for ``seconds``, with a pause after each, and report progress once per percent."""

@@ -15,7 +15,7 @@ from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import answers, block
 from study_app.analysis.report.study_figures import pictures
-from study_app.analysis.report.write_report import plain, tests_csv
+from study_app.analysis.report.write_report import as_json_types, tests_csv
 from study_app.analysis.results import Failures, Results
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
 from tests.analysis.report.read_report import FORBIDDEN, seen
@@ -51,7 +51,7 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
     """
     results = evaluate(made)
     assert results.failures == ()
-    json.dumps(plain(results), allow_nan=False)
+    json.dumps(as_json_types(results), allow_nan=False)
     failures = Failures()
     figures = list(pictures(made, results, forms, failures)) if forms else []
     texts = [methods(made, results), *sections.limits(made, results)]

@@ -18,7 +18,7 @@ from study_app.analysis.levels.thresholds import Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.planning.power_curves import Powers, detectable, power_markdown, powers, shown_equal
 from study_app.analysis.planning.preregistration import preregistration
-from study_app.analysis.planning.simulated_studies import count, people, plan, together
+from study_app.analysis.planning.simulated_studies import count_findings, draw_opinions, plan, stacked_answers
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
 from study_app.analysis.report.first_page import first_page
@@ -317,7 +317,7 @@ def test_power_tells_the_smallest_interaction() -> None:
     place = [block.id for block in planned.blocks].index("delays")
     block = planned.blocks[place]
     item = [one.id for one in block.items].index("different")
-    given = people(planned, 4000, 1, 0)[place].answers(1.0, kind)[:, :, item]
+    given = draw_opinions(planned, 4000, 1, 0)[place].answers(1.0, kind)[:, :, item]
     rows = [[one.condition for one in block.settings].index(condition) for condition in (first, second)]
     spread = float((given[:, rows[0]] - given[:, rows[1]]).std(ddof=1))
     row = next(line for line in told.splitlines() if line.startswith("| different"))
@@ -439,11 +439,11 @@ def test_power_counts_studies_of_statements_that_show_equality() -> None:
     )
     protocol = parse(text.replace("[analysis]\n", f"[analysis]\n{contrast}\n").encode(), "rek2024.toml")
     planned = plan(protocol, felt_in(protocol))
-    counts = count(planned, (12, 24), 1, 0, 20)
-    held = [people(planned, 24, 1, study) for study in range(20)]
+    counts = count_findings(planned, (12, 24), 1, 0, 20)
+    held = [draw_opinions(planned, 24, 1, study) for study in range(20)]
     (at,) = (place for place, block in enumerate(planned.blocks) if block.id == "delays")
     item = [it.id for it in planned.blocks[at].items].index("different")
-    answers = together(held, at, (0.0,), PUBLISHED[TYPICAL])[0, :, :, :2, item]
+    answers = stacked_answers(held, at, (0.0,), PUBLISHED[TYPICAL])[0, :, :, :2, item]
     away = answers[..., 1] - answers[..., 0]
     shown = sum(tost(one, 1.0).verdict == "equivalent" for one in away - away.mean())
     assert 0 < shown < 20

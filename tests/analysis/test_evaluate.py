@@ -17,7 +17,7 @@ from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.finding import MANY, judged, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
-from study_app.analysis.report.write_report import plain
+from study_app.analysis.report.write_report import as_json_types
 from study_app.analysis.results import BlockResult, Results
 from study_app.analysis.statistics.outcome import DRAWS, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
@@ -138,7 +138,7 @@ def test_equal_answers_are_no_variation_and_no_evidence(rek: Folder, level: int)
         rek.add(f"P{number:03d}", lambda _condition, _item: level)
     rek.open()
     results = found(rek)
-    json.dumps(plain(results), allow_nan=False)
+    json.dumps(as_json_types(results), allow_nan=False)
     liquids, delays = results.blocks
     assert {one.verdict for one in (*SettingsDiffer.of(liquids), *DelayTrend.of(delays))} == {"not tested"}
     assert {one.found.verdict for one in ContrastsWithControl.of(delays)} == {"equivalent"}  # none of seventeen moved

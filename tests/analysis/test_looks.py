@@ -14,7 +14,7 @@ from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests
 from study_app.analysis.planning.power_curves import power_markdown, powers
 from study_app.analysis.planning.preregistration import preregistration
-from study_app.analysis.planning.simulated_studies import FULL, count, people, plan
+from study_app.analysis.planning.simulated_studies import FULL, count_findings, draw_opinions, plan
 from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
 from study_app.analysis.statistics.outcome import alpha_of_looks, error_of_every_report, holm
@@ -97,16 +97,16 @@ def test_looks_that_make_no_sense_are_refused(looks: str, said: str) -> None:
 def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
     protocol = parse(LOOKED.encode(), "looked.toml")
     planned, (first, last) = plan(protocol, felt_in(protocol)), alpha_of_looks((6, 12), 0.05, "obrien-fleming")
-    counts = count(planned, (6, 12), 1, 0, 10)[TYPICAL]
+    counts = count_findings(planned, (6, 12), 1, 0, 10)[TYPICAL]
     for place, level in enumerate((first, last)):
         alone = replace(planned, decided=replace(planned.decided, looks=(), alpha=level))
-        once = count(alone, (6, 12), 1, 0, 10)[TYPICAL]
+        once = count_findings(alone, (6, 12), 1, 0, 10)[TYPICAL]
         for what, found in counts.items():
             if what[1] != "means":
                 assert (found[place] == once[what][place]).all() if place == 0 else (found[1] >= once[what][1]).all()
                 assert (found[1] >= found[0]).all()
     (contrast,) = planned.contrasts
-    here = [people(planned, 12, 1, study)[1].answers(1.0, PUBLISHED[TYPICAL])[:6] for study in range(10)]
+    here = [draw_opinions(planned, 12, 1, study)[1].answers(1.0, PUBLISHED[TYPICAL])[:6] for study in range(10)]
     names, items = [it.condition for it in planned.blocks[1].settings], [it.id for it in planned.blocks[1].items]
     late, prompt, item = names.index("delay_150"), names.index("delay_0"), items.index("different")
     ps = [ttest_rel(one[:, late, item], one[:, prompt, item], alternative="greater").pvalue for one in here]
@@ -120,11 +120,11 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
 def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     protocol = parse(LOOKED.replace("looks = [6, 12]", 'trends = "slopes"').encode(), "looked.toml")
     planned = plan(protocol, felt_in(protocol))
-    counts = count(planned, (10,), 1, 0, 10)[TYPICAL]["delays", "found"]
+    counts = count_findings(planned, (10,), 1, 0, 10)[TYPICAL]["delays", "found"]
     items, x = planned.blocks[1].items, np.array(planned.blocks[1].delays_ms)[:, None] / 100
     shown = 0
     for number in range(10):
-        given = people(planned, 10, 1, number)[1].answers(1.0, PUBLISHED[TYPICAL])
+        given = draw_opinions(planned, 10, 1, number)[1].answers(1.0, PUBLISHED[TYPICAL])
         ps = [
             slope_test(given[:, :, at], x, planned.decided.direction(one.id)).p or 1.0 for at, one in enumerate(items)
         ]
@@ -132,7 +132,7 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     assert counts[0, FULL, 0] == shown > 0
     told = "Student's t test on the slopes of each participant's own regression of answers on delays"
     assert told in preregistration(protocol, "0" * 64)
-    assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count(planned, (10,), 1, 0, 10)))
+    assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count_findings(planned, (10,), 1, 0, 10)))
     settings = delays((0, 50, 100))
     made = study(settings, list(everybody(settings, 12, lambda person, _s, code, _i: int(code[1]) + person % 3)))
     made = replace(made, decided=replace(made.decided, trends="slopes"))

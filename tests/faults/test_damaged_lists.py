@@ -86,7 +86,11 @@ KINDS: dict[str, tuple[Callable[[Path], Path], str, Callable[[Path], object]]] =
         "k3vq-7m2p-xw4d  data/sub-P007/ses-01\n",
         lambda f: (read_list(f / "fingerprints.txt"), unreadable_lines(f / "fingerprints.txt")),
     ),
-    "preregistration": (lambda f: f / preregistration.FILE, preregistration.written(COMMITMENT), use_commitment),
+    "preregistration": (
+        lambda f: f / preregistration.FILE,
+        preregistration.commitment_lines(COMMITMENT),
+        use_commitment,
+    ),
     "settings": (
         lambda _: settings_file(),
         workstation.DEFAULTS.model_dump_json(),

@@ -217,7 +217,7 @@ def test_a_groups_interval_is_students_over_errors_and_people(participants, tria
     assert 100 * one.of_group(participants, trials) == pytest.approx(percent, abs=1.5)
 
 
-def test_the_fewest_participants_and_trials_for_a_precision():
+def test_the_min_sample_and_trials_for_a_precision():
     one = Expected(spacing="log", trials=20, standards=1, halves={}, spreads={"": 0.2}, threshold=0.2)
     people = one.participants_for(0.15)
     assert one.of_group(people) <= 0.15 < one.of_group(people - 1)

@@ -154,7 +154,7 @@ def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ..
     """Return the main blocks with questions, in session order, from the protocol in a receipt."""
     asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
     return tuple(
-        _block(protocol, block, spoken(protocol), key)
+        _block(protocol, block, display_language(protocol), key)
         for block in asked
         if block["phase"] == "main" and block["questionnaire"] is not None and _statements(protocol, block)
     )
@@ -165,7 +165,7 @@ def _statements(protocol: Mapping[str, Any], block: Mapping[str, Any]) -> list[M
     return [item for item in protocol["questionnaires"][block["questionnaire"]]["items"] if "kind" not in item]
 
 
-def spoken(protocol: Mapping[str, Any]) -> str:
+def display_language(protocol: Mapping[str, Any]) -> str:
     """Return the language of figures and tables: English if the study has it, otherwise its first language."""
     languages = list(protocol["study"]["languages"])
     return "en" if "en" in languages else str(languages[0])
@@ -337,7 +337,7 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
         design = DESIGN_KINDS[written["kind"]].model_validate(written)
     else:
         design = default_design(table["design"])
-    title = text_in(table["title"], spoken(protocol))
+    title = text_in(table["title"], display_language(protocol))
     return LevelBlock(
         step, title, table["phase"], design, stimulus, _settings_in(protocol, step, key), method, published,
         (table.get("catch") or {}).get("wrong_most"),
@@ -576,7 +576,7 @@ def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuesti
     scores: list[PlacedScore] = []
     scales = {name: Scale.model_validate(table) for name, table in protocol["scales"].items()}
     for where, table in _questionnaires(protocol, key):
-        context = Context(scales, table.get("scale"), spoken(protocol))
+        context = Context(scales, table.get("scale"), display_language(protocol))
         placed = tuple(PlacedQuestion(where, _question(item, where), context) for item in table["items"])
         questions += [question for question in placed if where.is_form or not isinstance(question.question, Statement)]
         scores += [
@@ -587,7 +587,7 @@ def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuesti
 
 
 def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tuple[QuestionPlace, Mapping[str, Any]]]:
-    language = spoken(protocol)
+    language = display_language(protocol)
     for step in every_step_of(protocol):
         if step in protocol["blocks"]:
             block = protocol["blocks"][step]

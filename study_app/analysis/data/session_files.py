@@ -16,10 +16,10 @@ from study_app.analysis.data.blocks import (
     LevelBlock,
     OtherQuestions,
     OwnDynamics,
+    display_language,
     level_blocks,
     main_blocks,
     other_questions,
-    spoken,
 )
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.table import text_in
@@ -68,7 +68,7 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
     try:
         names, *rows = read_cells(read_regular(path))
     except OSError as error:
-        raise unreadable(path, error, _again(path)) from error
+        raise unreadable_error(path, error, _again(path)) from error
     except ValueError as error:
         raise AnalysisError(f"{path} {error}: it was cut off or changed; {_again(path)}") from error
     held = tuple(column for column in columns if column.name in names or not (column.later or column.sealed))
@@ -101,7 +101,7 @@ def document(path: Path) -> dict[str, Any]:
     try:
         parsed = parse_json(read_regular(path))
     except OSError as error:
-        raise unreadable(path, error) from error
+        raise unreadable_error(path, error) from error
     except ValueError as error:
         raise AnalysisError(f"{path} is damaged ({error}): restore it from a copy") from error
     if not isinstance(parsed, dict):
@@ -109,7 +109,7 @@ def document(path: Path) -> dict[str, Any]:
     return parsed
 
 
-def unreadable(path: Path, error: OSError, remedy: str = "restore it from a copy") -> AnalysisError:
+def unreadable_error(path: Path, error: OSError, remedy: str = "restore it from a copy") -> AnalysisError:
     """Return the error for a file that cannot be read."""
     return AnalysisError(
         f"{path} cannot be read ({error.strerror or type(error).__name__}): {remedy}, or correct its permissions"
@@ -172,7 +172,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         head = protocol["study"]
         study, title, version = (
             check_study_name(head["name"]),
-            text_in(head["title"], spoken(protocol)),
+            text_in(head["title"], display_language(protocol)),
             str(head["version"]),
         )
         visit = {
@@ -184,7 +184,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
             "protocol_version": version,
             "key_hash": receipt["key_hash"],
             **{name: receipt.get(name) for name in ("seed", "protocol_hash", "version", "group")},
-            "missing": _missing(folder) if has_intervals(protocol) else None,
+            "missing": _missing_trials(folder) if has_intervals(protocol) else None,
         }
         own_dynamics = _own_dynamics(receipt["device"].get("bench"))
         device_velocity = receipt["device"].get("estimator") == "device"
@@ -212,7 +212,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
     )
 
 
-def _missing(folder: SessionFolder) -> MissingTrials | None:
+def _missing_trials(folder: SessionFolder) -> MissingTrials | None:
     """Return the undelivered trials of a session with interval trials; None if its journal is damaged.
 
     The tables may be valid although the journal is damaged; `doubts` reports it.

@@ -73,22 +73,24 @@ Settings: TypeAlias = Mapping[tuple[str, str], Setting]
 AnyBlock = TypeVar("AnyBlock", Block, LevelBlock)
 
 
-def renamed(site: str, setting: Setting) -> Setting:
+def with_merged_code(site: str, setting: Setting) -> Setting:
     """Return a site's setting with its code in the merged study."""
     code = f"{site}{DASH}{setting.code}" if setting.condition is None else setting.condition
     return replace(setting, code=code)
 
 
-def _all(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
+def _unique_settings(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
     """Return the settings of all sites without duplicates, in order of first occurrence."""
-    return tuple(dict.fromkeys(renamed(site, setting) for site, settings in each.items() for setting in settings))
+    return tuple(
+        dict.fromkeys(with_merged_code(site, setting) for site, settings in each.items() for setting in settings)
+    )
 
 
 def _pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
     """Return the blocks, which are common to all sites, with the settings of all sites."""
     first = next(iter(sites.values()))
     return tuple(
-        replace(block, settings=_all({site: blocks[place].settings for site, blocks in sites.items()}))
+        replace(block, settings=_unique_settings({site: blocks[place].settings for site, blocks in sites.items()}))
         for place, block in enumerate(first)
     )
 
@@ -97,7 +99,7 @@ def _pooled_questions(sites: Mapping[str, OtherQuestions]) -> OtherQuestions:
     """Return the other questions, which are common to all sites, with the settings of all sites."""
 
     def where(wheres: Mapping[str, QuestionPlace]) -> QuestionPlace:
-        settings = _all({site: where.settings for site, where in wheres.items()})
+        settings = _unique_settings({site: where.settings for site, where in wheres.items()})
         return replace(next(iter(wheres.values())), settings=settings)
 
     def questions(asked: Mapping[str, Sequence[PlacedQuestion]]) -> tuple[PlacedQuestion, ...]:
@@ -125,7 +127,7 @@ def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame
     if "code" not in table:
         return table
     codes = [
-        None if pd.isna(code) else renamed(site, settings.get((block, code), Setting(code=code))).code
+        None if pd.isna(code) else with_merged_code(site, settings.get((block, code), Setting(code=code))).code
         for block, code in zip(table["block"], table["code"], strict=True)
     ]
     return table.assign(code=pd.array(codes, dtype="string"))
@@ -353,10 +355,10 @@ def _load_sites(merged: Merged, *, planned: bool) -> Study:
     sites = {name: read(place.path) for name, place in places.items() if place.sessions()}
     if not sites:
         raise AnalysisError(f"{merged.path} does not contain sessions: all participants of its sites withdrew")
-    return pooled(merged.path, sites, sum(len(tombstones(place)) for place in places.values()))
+    return pool_sites(merged.path, sites, sum(len(tombstones(place)) for place in places.values()))
 
 
-def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
+def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
     """Return a merged study from the studies of its sites by name; either all or none are unblinded."""
     studies = list(sites.values())
     estimators = [study.estimator.split(" or ") for study in studies if study.estimator is not None]
@@ -380,7 +382,7 @@ def pooled(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
             (block, own.code): own
             for site, study in sites.items()
             for (block, _), setting in study.settings.items()
-            for own in [renamed(site, setting)]
+            for own in [with_merged_code(site, setting)]
         },
         responses=table("responses"),
         trials=table("trials"),
@@ -415,7 +417,7 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
         _check_alike(records[0], session)
     responses, trials = read_tables(records, "responses"), read_tables(records, "trials")
     if key is None:  # tables of earlier versions have these columns
-        trials = _without(trials, SEALED)
+        trials = _without_columns(trials, SEALED)
     check_there(place, trials, listed)
     after_trials = responses[responses["trial"].notna()]
     both = pd.concat([after_trials, trials])[[*_TRIAL, "attempt"]]
@@ -479,11 +481,11 @@ def _intervals(
     if not has_intervals(records[0].protocol):
         return pd.DataFrame()
     table = read_tables(records, "intervals")
-    table = table if opened else _without(table, {column.name for column in INTERVALS if column.sealed})
+    table = table if opened else _without_columns(table, {column.name for column in INTERVALS if column.sealed})
     return _with_counted(with_excluded(table, listed), last)
 
 
-def _without(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
+def _without_columns(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataFrame:
     return table.assign(**{name: table[name].mask(table[name].notna()) for name in columns & {*table.columns}})
 
 

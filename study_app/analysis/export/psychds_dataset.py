@@ -8,7 +8,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final, NamedTuple
 
 from study_app import __version__
-from study_app.analysis.data.blocks import spoken
+from study_app.analysis.data.blocks import display_language
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, stated_credits
 from study_app.errors import ProtocolError
@@ -205,7 +205,7 @@ def _description(study: Study, columns: Mapping[str, tuple[Column, ...]]) -> dic
         "@type": "Dataset",
         "name": study.name,
         "alternateName": study.title,
-        "description": text_in(description, spoken(study.protocol))
+        "description": text_in(description, display_language(study.protocol))
         if isinstance(description, Mapping)
         else str(description).strip(),
         "version": study.version,

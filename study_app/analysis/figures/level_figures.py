@@ -543,7 +543,7 @@ def _weber_fractions(result: LevelsResult, participant: str | None) -> list[Poin
     return points
 
 
-def _at(result: LevelsResult) -> str:
+def _percentage_phrase(result: LevelsResult) -> str:
     """Return the phrase for the percentage correct at which Weber fractions are shown."""
     percent = percent_compared(result)
     if percent is None and result.guess_rate is not None:
@@ -556,7 +556,7 @@ def _weber_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
     listed = "; ".join(published_words(published) for published in result.published)
     published = f" Open circles and dotted lines: published values, {listed}." if _published_fractions(result) else ""
     caption = (
-        f"{result.title}: Weber fraction of {result.quantity}{_at(result)}, against the standard. Thin: "
+        f"{result.title}: Weber fraction of {result.quantity}{_percentage_phrase(result)}, against the standard. Thin: "
         f"participants; thick: random-effects mean with its 95 % interval.{published} "
         f"{sample_words(study, len(people(result)))}"
     )
@@ -575,7 +575,7 @@ def _weber_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
 @style.own_settings()
 def _draw_fractions(result: LevelsResult, look: Look) -> Sheet:
     sheet = look.sheet(_HEIGHT_PT, style.PAGE_WIDTH_PT / 2)
-    sheet.text(MARGIN_PT, 28, f"Weber fraction{_at(result)}", size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, f"Weber fraction{_percentage_phrase(result)}", size=SMALL, colour=style.TEXT_SOFT)
     axes = sheet.axes(
         _WEBER_LEFT_PT, _TOP_PT, sheet.width_pt - _WEBER_LEFT_PT - _RIGHT_PT, sheet.height_pt - _TOP_PT - _WEBER_FOOT_PT
     )
@@ -583,7 +583,7 @@ def _draw_fractions(result: LevelsResult, look: Look) -> Sheet:
     own = [_weber_fractions(result, person) for person in people(result)]
     published = _published_fractions(result)
     _fractions_frame(axes, group, own, published)
-    _published(axes, published, sheet)
+    _draw_published(axes, published, sheet)
     for points in own:
         axes.plot(
             [point[0] for point in points],
@@ -615,7 +615,7 @@ def _published_fractions(result: LevelsResult) -> list[tuple[float | None, float
     return points
 
 
-def _published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: Sheet) -> None:
+def _draw_published(axes: Axes, points: Sequence[tuple[float | None, float]], sheet: Sheet) -> None:
     """Draw published values: a circle at its standard, or a labelled dotted line across all."""
     over_all = [f"{fraction:g}" for standard, fraction in points if standard is None]
     if over_all:

@@ -25,7 +25,16 @@ from study_app.analysis.findings.finding import (
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
 from study_app.analysis.html_page import heading, paragraph, table, table_of
 from study_app.analysis.page_layout import Drawing, Picture
-from study_app.analysis.results import BlockResult, NotTested, Results, beyond, enough, lead, least, short
+from study_app.analysis.results import (
+    BlockResult,
+    NotTested,
+    Results,
+    beyond_phrase,
+    lead_phrase,
+    min_sample,
+    min_sample_reason,
+    short_text,
+)
 from study_app.analysis.statistics.equivalence import Equivalence, fewest, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, noticed
@@ -71,8 +80,9 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     yield (
         f"Two one-sided t tests with an equivalence bound of {_points(first.bound)}, and "
         f"{percent(1 - 2 * first.alpha)} intervals. Equivalent: both the t tests and the bootstrap show that the mean "
-        f"difference lies within the bound, with {enough(first.alpha, first.bound)}. Not equivalent: the whole "
-        "interval lies beyond the bound; this is not corrected for the number of comparisons. Inconclusive: neither, "
+        f"difference lies within the bound, with {min_sample_reason(first.alpha, first.bound)}. "
+        "Not equivalent: the whole interval lies beyond the bound; this is not corrected for the number of "
+        "comparisons. Inconclusive: neither, "
         "which does not show a difference. Out of reach: too few participants to show equivalence with any answers."
     )
     disagree = sum(tested.found.checks_agree is False for tested in against)
@@ -92,7 +102,7 @@ def by_delay(result: BlockResult) -> list[list[str]]:
     for delay_ms in dict.fromkeys(tested.delay_ms for tested in ContrastsWithControl.of(result)):
         here = [tested for tested in ContrastsWithControl.of(result) if tested.delay_ms == delay_ms]
         cells = [
-            ", ".join(short(result, tested.item) for tested in here if tested.verdict == verdict) or "–"
+            ", ".join(short_text(result, tested.item) for tested in here if tested.verdict == verdict) or "–"
             for verdict in _VERDICTS
         ]
         rows.append([ms(delay_ms), *cells, _said_of(result, delay_ms, here)])
@@ -117,7 +127,7 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
     """
     exploratory = {trend.item for trend in DelayTrend.of(result) if not trend.primary}
     trends = (
-        f"agreement with “{short(result, lowest.item)}” shows a trend over delays up to {ms(shown_ms)}"
+        f"agreement with “{short_text(result, lowest.item)}” shows a trend over delays up to {ms(shown_ms)}"
         + (" (exploratory)" if lowest.item in exploratory else "")
         for lowest in LowestDelay.of(result)
         if (shown_ms := lowest.over_all_ms) is not None and shown_ms <= delay_ms
@@ -125,7 +135,7 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
     beyond: dict[float, list[str]] = {}
     for tested in ContrastsWithControl.of(result):
         if tested.verdict == "not equivalent" and tested.delay_ms <= delay_ms:
-            beyond.setdefault(tested.delay_ms, []).append(f"“{short(result, tested.item)}”")
+            beyond.setdefault(tested.delay_ms, []).append(f"“{short_text(result, tested.item)}”")
     differing = (
         f"at {ms(at)} {listed(items)} differ{'s' * (len(items) == 1)} by more than the bound"
         for at, items in beyond.items()
@@ -197,12 +207,12 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         yield heading(3, f"Each delay against {control}")
         yield table_of(
             self.value,
-            ("Statement", lambda tested: short(self.found, tested.item)),
+            ("Statement", lambda tested: short_text(self.found, tested.item)),
             ("Delay", lambda tested: ms(tested.delay_ms)),
             ("n", lambda tested: str(tested.found.n)),
             ("difference", lambda tested: number(tested.found.effect)),
             ("interval", lambda tested: interval(tested.found.interval)),
-            ("people beyond the bound", lambda tested: beyond(tested.found)),
+            ("people beyond the bound", lambda tested: beyond_phrase(tested.found)),
             ("p equivalent", lambda tested: p_value(tested.found.p)),
             ("p, bootstrap", lambda tested: p_value(tested.found.p_bootstrap)),
             ("Verdict", lambda tested: tested.verdict + (" *" if tested.found.checks_agree is False else "")),
@@ -217,13 +227,13 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         against, result = self.value, self.found
         if against and result.n < fewest((first := against[0].found).alpha, first.bound):
             yield (
-                f"{lead(result)}: a comparison can count as equivalent only with {enough(first.alpha, first.bound)}. "
-                f"This study has {result.n}."
+                f"{lead_phrase(result)}: a comparison can count as equivalent only with "
+                f"{min_sample_reason(first.alpha, first.bound)}. This study has {result.n}."
             )
         undecided = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
         if undecided:
             yield (
-                f"{lead(result)}: {len(undecided)} of {number_text.counted(len(against), 'comparison')} with "
+                f"{lead_phrase(result)}: {len(undecided)} of {number_text.counted(len(against), 'comparison')} with "
                 f"{ms(undecided[0].control_ms)} {'is' if len(undecided) == 1 else 'are'} undecided: the mean "
                 "difference is not shown to lie within the equivalence bound, nor beyond it."
             )
@@ -237,7 +247,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                 f"differences, with an equivalence bound of {_points(first.bound)}{beforehand}, and "
                 f"{percent(1 - 2 * first.alpha)} intervals. A delay was called equivalent only if a bootstrap that "
                 "adds a participant like the most extreme one (Gaffke 2005) agreed, and only with "
-                f"{least(first.alpha, first.bound)}; not equivalent if its whole interval was beyond the bound."
+                f"{min_sample(first.alpha, first.bound)}; not equivalent if its whole interval was beyond the bound."
             )
 
 
@@ -306,7 +316,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         yield heading(3, "The lowest delay with a trend")
         yield table_of(
             self.value,
-            ("Statement", lambda lowest: short(self.found, lowest.item)),
+            ("Statement", lambda lowest: short_text(self.found, lowest.item)),
             ("lowest", lambda row: "–" if row.over_all_ms is None else f"≤ {ms(row.over_all_ms)}"),
             ("uncorrected", lambda row: "–" if row.steps.lowest_ms is None else f"≤ {ms(row.steps.lowest_ms)}"),
             (
@@ -467,7 +477,7 @@ class NoticedFrom(Finding[None]):
             return ""
         at = min(one.over_all_ms or 0.0 for one in lowest)
         rated = [
-            f"{'higher' if correlation > 0 else 'lower'} in “{short(self.found, one.item)}” "
+            f"{'higher' if correlation > 0 else 'lower'} in “{short_text(self.found, one.item)}” "
             f"(mean rank correlation {number(correlation)})"
             for one in lowest
             if one.over_all_ms == at and (correlation := self._correlation(one, at))
@@ -483,7 +493,7 @@ class NoticedFrom(Finding[None]):
         threshold = DetectionThreshold.of(self.found)
         if threshold is None or threshold.effect is None:
             return ""
-        item = short(self.found, self.results.decided.noticed or "")
+        item = short_text(self.found, self.results.decided.noticed or "")
         return (
             f"The detection threshold is {number(threshold.effect, 0)} ms ({_threshold_interval(threshold)}, "
             f"n = {threshold.n}), where {percent(threshold.half_way or 0.0)} of answers agree with “{item}”. "
@@ -535,7 +545,7 @@ def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) 
         return ""
     most = max(known, key=lambda one: abs(one.found.effect or 0.0))
     return (
-        f"The largest mean difference is {number(most.found.effect)} points (“{short(result, most.item)}” at "
+        f"The largest mean difference is {number(most.found.effect)} points (“{short_text(result, most.item)}” at "
         f"{ms(most.delay_ms)}, {percent(1 - 2 * most.found.alpha)} interval {interval(most.found.interval)}, "
         f"n = {most.found.n}). "
     )

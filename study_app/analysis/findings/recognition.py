@@ -23,7 +23,7 @@ from study_app.analysis.findings.finding import (
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
 from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture
-from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short
+from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short_text
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named, recognition
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value
@@ -218,7 +218,7 @@ class Distinguished(Finding[None]):
             for (first, second), test in pairs
             if test.verdict == verdict
         ]
-        items = [f"“{short(result, one.item)}”" for one in differing if one.verdict == verdict]
+        items = [f"“{short_text(result, one.item)}”" for one in differing if one.verdict == verdict]
         if apart:
             text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
         elif items:

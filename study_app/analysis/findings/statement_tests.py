@@ -36,7 +36,7 @@ from study_app.analysis.results import (
     Tested,
     name,
     settings_noun,
-    short,
+    short_text,
     statistic,
     test_name,
 )
@@ -69,7 +69,7 @@ def table_of_tests(
     yield heading(3, title)
     yield table_of(
         tests,
-        ("Statement", lambda test: short(result, test.item)),
+        ("Statement", lambda test: short_text(result, test.item)),
         ("n", lambda test: f"{test.outcome.n}" + (f" (−{test.outcome.dropped})" if test.outcome.dropped else "")),
         ("Statistic", lambda test: statistic(test.outcome)),
         ("p", lambda test: p_value(test.outcome.p)),
@@ -262,7 +262,7 @@ class _SessionsDiffer(StatementTests):
         return tested, ()
 
 
-def gated(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[BlockAnswers, ...]:
+def with_gates(blocks: Sequence[BlockAnswers], draws: int | None = None) -> tuple[BlockAnswers, ...]:
     """Return the answers of a study's blocks, each with its global test over all statements and the resulting gate.
 
     ``draws`` overrides the usual number of random permutations. If the test fails, the gate is closed.
@@ -489,7 +489,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
         yield heading(3, f"Which {settings_noun(self.found)}s differ?")
         yield table_of(
             pairs,
-            ("Statement", lambda pair: short(self.found, pair.tested.item)),
+            ("Statement", lambda pair: short_text(self.found, pair.tested.item)),
             ("Pair", lambda pair: f"{name(self.found, pair.first)} – {name(self.found, pair.second)}"),
             ("n", lambda pair: f"{pair.tested.outcome.n} ({_differing(pair)} differ)"),
             ("V", lambda pair: number(pair.tested.outcome.statistic, 1)),
@@ -556,7 +556,7 @@ class MeanTests(StatementTests):
     def section(self) -> Iterator[str]:
         yield from super().section()
         effects = [
-            f"{short(self.found, test.item)}: "
+            f"{short_text(self.found, test.item)}: "
             + listed(
                 [
                     f"{number(slope)} {interval(ends)} (SD {number(sd)})"

@@ -21,11 +21,11 @@ from study_app.analysis.levels.statistic import (
     LevelStatistic,
     Shown,
     analysed,
-    between,
+    cell_text,
     digits,
+    interval_text,
     level_words,
     mean_over,
-    plain,
     signed,
     standards_of,
     unit,
@@ -355,15 +355,18 @@ class Answers(LevelStatistic[LevelAnswers]):
         alone = result.level_kind == "value" and not standards
         return table_of(
             rows,
-            (f"Standard{unit(result)}", lambda answers: plain(answers.standard)) if standards else None,
+            (f"Standard{unit(result)}", lambda answers: cell_text(answers.standard)) if standards else None,
             None
             if result.level_kind in {None, "value"}
-            else (level_words(result), lambda answers: plain(answers.level)),
-            (level_words(result) if alone else f"Comparison{unit(result)}", lambda answers: plain(answers.comparison)),
+            else (level_words(result), lambda answers: cell_text(answers.level)),
+            (
+                level_words(result) if alone else f"Comparison{unit(result)}",
+                lambda answers: cell_text(answers.comparison),
+            ),
             ("participants", lambda answers: str(answers.participants)),
             ("n", lambda answers: str(answers.n)),
             (summary_words(result), lambda answers: self._value(answers.value)),
-            ("95 % interval", lambda answers: between(answers.low, answers.high, self._value)),
+            ("95 % interval", lambda answers: interval_text(answers.low, answers.high, self._value)),
             words=1 if result.vary is None else 0,
         )
 
@@ -386,7 +389,7 @@ class Answers(LevelStatistic[LevelAnswers]):
                 else f"{answers.count}/{answers.n}"
             )
 
-        names = [plain(answers.comparison if answers.level is None else answers.level) for answers in shown]
+        names = [cell_text(answers.comparison if answers.level is None else answers.level) for answers in shown]
         return table(
             ("Participant" if standard is None else f"Standard {with_unit(self.found, standard)}", *names),
             [[person, *(cell(person, answers) for answers in shown)] for person in people(self.found)],

@@ -10,7 +10,7 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
-from study_app.analysis.levels.statistic import LevelStatistic, Shown, between, digits, unit
+from study_app.analysis.levels.statistic import LevelStatistic, Shown, digits, interval_text, unit
 from study_app.analysis.wording import counted, listed, number
 from study_app.protocol.trials.stimuli import OF_LINK
 from study_app.protocol.warnings.delayed_force import WITHHELD_PERCENT
@@ -23,7 +23,7 @@ _MOST_LEVELS: Final = 8
 
 def _levels(row: _Row) -> str:
     low, high = row["low"], row["high"]
-    return digits(low) if low == high else between(low, high)
+    return digits(low) if low == high else interval_text(low, high)
 
 
 class _Range(NamedTuple):

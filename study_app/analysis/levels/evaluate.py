@@ -11,7 +11,7 @@ from study_app.analysis.data.measures import quartiles_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.levels.answers import SUMMARIES, Answers, Settings, chooses_units
-from study_app.analysis.levels.statistic import between, statistics
+from study_app.analysis.levels.statistic import interval_text, statistics
 from study_app.analysis.levels.tracks import answers_timed, tracks
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import GroupAnswers, LevelsResult
@@ -94,7 +94,7 @@ def level_section(result: LevelsResult, pictures: Sequence[Picture], estimator: 
         ("Setting" if result.revealed else "Code", lambda answers: answers.name),
         ("n", lambda answers: str(answers.numbers["n"])),
         ("median [s]", lambda answers: number(answers.numbers["median"])),
-        ("quartiles [s]", lambda answers: between(answers.numbers["q1"], answers.numbers["q3"], number)),
+        ("quartiles [s]", lambda answers: interval_text(answers.numbers["q1"], answers.numbers["q3"], number)),
     )
     at_each = "Answers at each level" if result.vary is not None or not result.revealed else "Answers"
     if not Settings.of(result):

@@ -18,8 +18,8 @@ from study_app.analysis.levels.statistic import (
     LevelStatistic,
     Shown,
     analysed,
+    cell_text,
     mean_over,
-    plain,
     unit,
 )
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
@@ -179,7 +179,7 @@ def _measured(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> Sensit
 
 
 def _where(estimate: SensitivityEstimate) -> str:
-    return plain(estimate.comparison or (estimate.level if estimate.standard is None else estimate.standard))
+    return cell_text(estimate.comparison or (estimate.level if estimate.standard is None else estimate.standard))
 
 
 class Sensitivities(LevelStatistic[SensitivityEstimate]):

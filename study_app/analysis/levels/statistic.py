@@ -169,12 +169,12 @@ def signed(value: float | None) -> str:
     return "–" if value is None else f"{value:+.3g}".replace("-", "−")
 
 
-def plain(value: float | str | None) -> str:
+def cell_text(value: float | str | None) -> str:
     """Return a level, a standard or a condition as a cell."""
     return value.replace("_", " ") if isinstance(value, str) else digits(value, 4)
 
 
-def between(low: float | None, high: float | None, written: Callable[[float], str] = digits) -> str:
+def interval_text(low: float | None, high: float | None, written: Callable[[float], str] = digits) -> str:
     """Return an interval as text; a dash for None."""
     return "–" if low is None or high is None else f"{written(low)} – {written(high)}"
 
@@ -189,8 +189,8 @@ OF_WHOM: Final[tuple[tuple[str, Callable[[Any], str]], ...]] = (
     ("n", lambda row: "–" if row.participant is None else str(row.n)),
 )
 """The columns that say of whom a row is."""
-INTERVAL: Final[Shown] = ("95 % interval", lambda row: between(row.low, row.high))
-INTERVAL_2: Final[Shown] = ("95 % interval", lambda row: between(row.low, row.high, number))
+INTERVAL: Final[Shown] = ("95 % interval", lambda row: interval_text(row.low, row.high))
+INTERVAL_2: Final[Shown] = ("95 % interval", lambda row: interval_text(row.low, row.high, number))
 """With two decimals."""
 
 KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}

@@ -34,9 +34,9 @@ from study_app.analysis.planning.simulated_studies import (
     Plan,
     Planned,
     contrast_sides,
-    people,
+    draw_opinions,
 )
-from study_app.analysis.results import enough
+from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest
 from study_app.protocol.model import Contrast
 from study_app.protocol.raters import CONSISTENT, NOISY, STATED
@@ -467,7 +467,7 @@ def _summary(power: Powers) -> Iterator[str]:
 def _between(power: Powers) -> Iterator[str]:
     """Yield a table for each contrast of a statement between groups, for which the answer model has no effect."""
     plan = power.plan
-    given = people(plan, _MANY, power.seed, 0) if plan.between else ()
+    given = draw_opinions(plan, _MANY, power.seed, 0) if plan.between else ()
     for contrast, shares in plan.between:
         spreads = {}
         for name, kind in plan.kinds.items():
@@ -613,8 +613,8 @@ def _explained(question: Question, found: Powers) -> list[str]:
             bound = found.plan.decided.equivalence_bound or STEPS
             return [
                 f"Two one-sided t tests within ±{bound} points, with which the bootstrap must agree, and with "
-                f"{enough(found.plan.decided.alphas[-1], bound)}. If the model's difference is near the bound "
-                "or beyond it, a finding of equivalence is wrong, so few studies should find it."
+                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the model's difference is near the "
+                "bound or beyond it, a finding of equivalence is wrong, so few studies should find it."
             ]
         case "contrast":
             return [

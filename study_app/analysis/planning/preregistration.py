@@ -11,12 +11,12 @@ from pydantic import TypeAdapter
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import LEFT_OUT, RATIOS, equality_limits
-from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions, spoken
+from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions, display_language
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planning.simulated_studies import compares_statements
-from study_app.analysis.results import least
+from study_app.analysis.results import min_sample
 from study_app.analysis.statistics.equivalence import fewest
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
@@ -71,7 +71,7 @@ def commitment(protocol: Protocol, protocol_hash: str) -> Commitment:
     )
 
 
-def written(one: Commitment) -> str:
+def commitment_lines(one: Commitment) -> str:
     """Return the commitments as the last lines of a preregistration."""
     return f"```json\n{json.dumps(asdict(one), indent=1)}\n```\n"
 
@@ -269,7 +269,7 @@ def _equivalence_words(decided: Decided) -> str:
         return ""
     return (
         "We test equivalence to the shortest delay by two one-sided tests with which the bootstrap must agree; it "
-        f"requires {least(decided.alphas[-1], bound)}. "
+        f"requires {min_sample(decided.alphas[-1], bound)}. "
     )
 
 
@@ -280,7 +280,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
     """
     one = commitment(protocol, protocol_hash)
     study = protocol.study
-    language = spoken({"study": {"languages": study.languages}})
+    language = display_language({"study": {"languages": study.languages}})
     lines = [
         f"# Preregistration: {text_in(study.title, language)}",
         "",
@@ -315,7 +315,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         "",
         "## Values that the report compares with",
         "",
-        written(one),
+        commitment_lines(one),
     ]
     return "\n".join(lines)
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import ttest_1samp
 
 from study_app.analysis.data.blocks import Block as StatementBlock
-from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided, spoken
+from study_app.analysis.data.blocks import Decided, Item, Setting, display_language, read_decided
 from study_app.analysis.data.measures import Array
 from study_app.analysis.statistics.equivalence import STEPS, p_equivalent
 from study_app.analysis.statistics.equivalence import equivalent as shows_equivalence
@@ -92,7 +92,7 @@ class Plan:
 
 def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     """Return the plan for a protocol; raise AnalysisError if no block compares settings by questions."""
-    language = spoken({"study": {"languages": protocol.study.languages}})
+    language = display_language({"study": {"languages": protocol.study.languages}})
     asked = _compared(protocol)
     if not asked:
         raise AnalysisError(
@@ -210,7 +210,7 @@ _OF_SLOPES: Final = 1
 """The stream of random numbers of slopes, which are drawn apart from everything else."""
 
 
-def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinions, ...]:
+def draw_opinions(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinions, ...]:
     """Return the opinions of the participants of simulated study number ``study`` in each block of the plan."""
     rng = np.random.default_rng([seed, study])
     slopes = np.random.default_rng([seed, study, _OF_SLOPES]).standard_normal(participants)
@@ -229,7 +229,7 @@ def people(plan: Plan, participants: int, seed: int, study: int) -> tuple[Opinio
     )
 
 
-def together(
+def stacked_answers(
     studies: Sequence[tuple[Opinions, ...]], place: int, effects: Sequence[float], kind: SimulatedParticipants
 ) -> Array:
     """Return one block's answers (effects, studies, participants, settings, items) by participants of a kind."""
@@ -307,7 +307,7 @@ def signed(answers: Array, rng: np.random.Generator) -> Array:
     differences = answers[:, :, 0] - answers[:, :, 1]
     studies, n, items = differences.shape
     flat = differences.transpose(0, 2, 1).reshape(-1, n)
-    ranked = sizes(flat).astype(np.float32)
+    ranked = difference_ranks(flat).astype(np.float32)
     whole = ranked.sum(axis=1)
     up = (rng.random((PLANNED_DRAWS, n)) < 0.5).astype(np.float32) @ ranked.T
     seen = np.where(flat > 0, ranked, 0).sum(axis=1)
@@ -315,7 +315,7 @@ def signed(answers: Array, rng: np.random.Generator) -> Array:
     return p.reshape(studies, items)
 
 
-def sizes(differences: Array) -> Array:
+def difference_ranks(differences: Array) -> Array:
     """Return the (doubled) ranks of the non-zero differences (rows, n); those of zero differences are 0."""
     if not len(differences):
         return differences
@@ -358,15 +358,19 @@ are planned the sizes are theirs, and what counts is shown at one of them or an 
 """
 
 
-def count(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> dict[str, Counts]:
+def count_findings(plan: Plan, sizes: Sequence[int], seed: int, batch: int, studies: int) -> dict[str, Counts]:
     """Simulate ``studies`` studies of a batch (from 0, of `BATCH`) and count their findings at every size.
 
     They are counted for each of the plan's kinds of participants.
     """
-    held = [people(plan, max(sizes), seed, batch * BATCH + number) for number in range(studies)]
+    held = [draw_opinions(plan, max(sizes), seed, batch * BATCH + number) for number in range(studies)]
     return {
         name: _counted_in(
-            plan, sizes, [together(held, place, EFFECTS, kind) for place, _ in enumerate(plan.blocks)], seed, batch
+            plan,
+            sizes,
+            [stacked_answers(held, place, EFFECTS, kind) for place, _ in enumerate(plan.blocks)],
+            seed,
+            batch,
         )
         for name, kind in plan.kinds.items()
     }
@@ -388,7 +392,7 @@ def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: 
             found = judge(block, decided, given[place][:, :, :n], ps[place][0], shown, rngs[place])
             for what, of_studies in found.items():
                 of_sizes.setdefault((block.id, what), []).append(of_studies)
-        for name, shown in contrasts(plan, [one[:, :, :n] for one in given], decided.alpha).items():
+        for name, shown in shown_contrasts(plan, [one[:, :, :n] for one in given], decided.alpha).items():
             of_sizes.setdefault((name, "contrast"), []).append(shown)
     for numbers in of_sizes.values() if plan.decided.looks else ():
         numbers[:] = np.logical_or.accumulate(numbers)  # a study that shows it at a look is stopped
@@ -400,7 +404,7 @@ def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: 
 IF_EQUAL: Final = "if truly equal"
 
 
-def contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
+def shown_contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
     """Return which studies (studies, effects) show each contrast of statements, by its text, as in the report.
 
     For a contrast with a bound, equivalence within it is included as `IF_EQUAL`. Both are corrected by Holm. ``given``
@@ -546,7 +550,7 @@ def sweep(
     """
     starts = range(0, studies, BATCH)
     sizes_of_batches = [min(BATCH, studies - first) for first in starts]
-    counted = executor.map(partial(count, plan, tuple(sizes), seed), range(len(starts)), sizes_of_batches)
+    counted = executor.map(partial(count_findings, plan, tuple(sizes), seed), range(len(starts)), sizes_of_batches)
     done, total = 0, dict[str, Counts]()
     for many, numbers in zip(sizes_of_batches, counted, strict=True):
         done += many

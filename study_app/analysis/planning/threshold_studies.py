@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from study_app import __version__
-from study_app.analysis.data.blocks import decisions, spoken
+from study_app.analysis.data.blocks import decisions, display_language
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.power_curves import OF_BLOCK, OF_STUDIES, interval, smallest_differences
 from study_app.analysis.planning.simulated_studies import group_shares
@@ -299,7 +299,7 @@ def _rows(all_of_it: Precisions) -> Iterator[dict[str, Any]]:
 def threshold_markdown(precisions: Precisions) -> str:
     """Return a table for each block, with its assumptions."""
     study, precision = precisions.protocol.study, precisions.precision
-    language = spoken({"study": {"languages": study.languages}})
+    language = display_language({"study": {"languages": study.languages}})
     lines = [
         f"# Expected precision of {text_in(study.title, language)} ({study.name} {study.version})",
         "",

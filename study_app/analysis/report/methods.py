@@ -13,7 +13,7 @@ from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.statement_tests import DelayTrend, Effects, MeanTests, OverAll
 from study_app.analysis.levels.evaluate import level_methods
-from study_app.analysis.results import BlockResult, Results, lead, said_of_presentations
+from study_app.analysis.results import BlockResult, Results, lead_phrase, said_of_presentations
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.store.unblinding import RULES
 
@@ -296,7 +296,7 @@ def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) ->
     for block in blocks:
         of_findings = [sentence for finding in all_findings() for sentence in finding(block, results).methods()]
         if of_findings and len(blocks) > 1:
-            yield f"{lead(block)}:"
+            yield f"{lead_phrase(block)}:"
         yield from of_findings
     yield from _common(results, blocks)
 

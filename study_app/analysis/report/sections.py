@@ -36,12 +36,12 @@ from study_app.analysis.results import (
     Results,
     ScoreResult,
     incomplete_words,
-    lead,
-    missing,
+    lead_phrase,
+    missing_sentences,
     name,
     said_of_presentations,
     settings_noun,
-    short,
+    short_text,
 )
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.wording import counted, listed, ms, number, significant
@@ -73,21 +73,24 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
     lines = list(_in_general(study, results))
     for result in results.blocks:
         if not result.n:
-            lines.append(f"{lead(result)}: no answers are included yet.")
+            lines.append(f"{lead_phrase(result)}: no answers are included yet.")
             continue
-        lines += [f"{lead(result)}: {sentence}" for sentence in missing(result)]
+        lines += [f"{lead_phrase(result)}: {sentence}" for sentence in missing_sentences(result)]
         decisive = [one for finding in all_findings() if finding.statements for one in finding.of(result)]
-        out = [f"“{short(result, one.item)}”" for one in decisive if one.verdict == "out of reach"]
+        out = [f"“{short_text(result, one.item)}”" for one in decisive if one.verdict == "out of reach"]
         if out:
             lines.append(
-                f"{lead(result)}: the tests of {listed(out)} could not have been significant with so few participants: "
-                "no rearrangement of the answers within participants gives an adjusted p that is small enough."
+                f"{lead_phrase(result)}: the tests of {listed(out)} could not have been significant with so few "
+                "participants: no rearrangement of the answers within participants gives an adjusted p that is small "
+                "enough."
             )
         untested: dict[str, list[str]] = {}
         for one in decisive:
             if one.verdict == "not tested":
-                untested.setdefault(one.outcome.note, []).append(f"“{short(result, one.item)}”")
-        lines += [f"{lead(result)}: {listed(items)} could not be tested ({why})." for why, items in untested.items()]
+                untested.setdefault(one.outcome.note, []).append(f"“{short_text(result, one.item)}”")
+        lines += [
+            f"{lead_phrase(result)}: {listed(items)} could not be tested ({why})." for why, items in untested.items()
+        ]
         lines += _mixed_up(result, results)
         lines += [sentence for finding in all_findings() for sentence in finding(result, results).limits()]
     lines += [sentence for level in results.levels for sentence in level_limits(level)]
@@ -163,8 +166,8 @@ def _mixed_up(result: BlockResult, results: Results) -> Iterator[str]:
         for code, count in zip(counts.codes, line, strict=True):
             if count == counts.orders:
                 yield (
-                    f"{lead(result)}: {name(result, code)} was in position {place} for all participants, so its effect "
-                    "cannot be distinguished from the effect of that position."
+                    f"{lead_phrase(result)}: {name(result, code)} was in position {place} for all participants, so its "
+                    "effect cannot be distinguished from the effect of that position."
                 )
 
 
@@ -256,11 +259,11 @@ def block(
     result: BlockResult, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
 ) -> Iterator[str]:
     """Return the section of one block; a part that fails is replaced by its reason and added to ``failures``."""
-    yield heading(2, lead(result))
+    yield heading(2, lead_phrase(result))
     if not result.n:
         untested = any(failure.block == result.id for failure in results.failures)
         none = paragraph("No answers are included yet.")
-        yield bullets(missing(result)) if untested else none
+        yield bullets(missing_sentences(result)) if untested else none
         return
     held = Failures() if failures is None else failures
     pictures = {picture.name.split("-")[0]: picture for picture in drawn if picture.block == result.id}
@@ -282,7 +285,7 @@ def _parts(
     for finding in others:
         yield finding.what or finding.figure_title, finding(result, results, pictures).section
     if result.absent:
-        lines = [f"{line[:1].upper()}{line[1:]}" for line in missing(result)]
+        lines = [f"{line[:1].upper()}{line[1:]}" for line in missing_sentences(result)]
         yield "missing parts", lambda: (heading(3, "What could not be computed, and why"), bullets(lines))
 
 
@@ -301,7 +304,7 @@ def counts_of_answers(results: Results) -> Iterator[str]:
     yield heading(2, "Counts of answers")
     for result in results.blocks:
         if result.measures:
-            yield heading(3, lead(result))
+            yield heading(3, lead_phrase(result))
             yield _measures(result)
 
 
@@ -309,7 +312,7 @@ def _measures(result: BlockResult) -> str:
     order = [item.id for item in result.items]
     return table_of(
         sorted(result.measures, key=lambda row: order.index(str(row["item"]))),
-        ("Statement", lambda row: short(result, str(row["item"]))),
+        ("Statement", lambda row: short_text(result, str(row["item"]))),
         (settings_noun(result).capitalize(), lambda row: name(result, str(row["code"]))),
         *((str(level), lambda row, level=level: str(row[f"count_{level}"])) for level in range(1, 8)),
         ("n", lambda row: str(row["n"])),
@@ -459,7 +462,7 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
 def _means(result: BlockResult, rows: Sequence[Any], by: By) -> str:
     return table_of(
         rows,
-        ("Statement", lambda row: short(result, row.item)),
+        ("Statement", lambda row: short_text(result, row.item)),
         (settings_noun(result).capitalize(), lambda row: name(result, row.code)),
         (by.capitalize(), lambda row: row.group),
         ("n", lambda row: str(row.n)),
@@ -567,13 +570,13 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         "and the trial with the largest mean error. Times are from the program's clock and do not include display "
         "latency. "
         + (f"Timing limits: {'; '.join(_limit(what, limit) for what, limit in limits.items())}. " if limits else "")
-        + f"{_beyond(study, limits)}Trials beyond a limit are included, unless they are excluded above."
+        + f"{_violated_limits(study, limits)}Trials beyond a limit are included, unless they are excluded above."
         + ("" if study.revealed else " Delay error and force held back are sealed, and not checked, until unblinding."),
         "soft",
     )
 
 
-def _beyond(study: Study, limits: Mapping[str, float]) -> str:
+def _violated_limits(study: Study, limits: Mapping[str, float]) -> str:
     """Return a sentence on the timing limits that trials violated; "" if there are none."""
     rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
     broken = [
@@ -635,7 +638,7 @@ def motion(results: Results) -> Iterator[str]:
         yield paragraph("Shown after unblinding, because force and motion reveal liquids and delays.")
         return
     for result in results.blocks:
-        measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_of(measured, result, measure=one))]
+        measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_movement_measures(measured, result, measure=one))]
         rows = _motion_rows(result, measured, measures, results.delivered)
         if rows:
             yield heading(3, result.title)
@@ -663,7 +666,7 @@ def motion(results: Results) -> Iterator[str]:
     )
 
 
-def _of(measured: Performance, result: BlockResult, **wanted: str) -> Iterator[Moved]:
+def _movement_measures(measured: Performance, result: BlockResult, **wanted: str) -> Iterator[Moved]:
     """Yield the measures of a block, by code or by name."""
     for moved in measured.moved:
         if moved.block == result.id and all(getattr(moved, field) == value for field, value in wanted.items()):
@@ -676,7 +679,7 @@ def _motion_rows(
     kept = {one.code: _within(one) for one in delivered if one.block == result.id}
     rows = []
     for setting in result.settings:
-        here = {moved.measure: moved for moved in _of(measured, result, code=setting.code) if moved.n}
+        here = {moved.measure: moved for moved in _movement_measures(measured, result, code=setting.code) if moved.n}
         if here:
             n = max(moved.n for moved in here.values())
             cells = [_quartiles(here[measure]) if measure in here else "–" for measure in measures]

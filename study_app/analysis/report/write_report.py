@@ -38,7 +38,16 @@ from study_app.analysis.report.first_page import cards, figures_shown, first_pag
 from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.questions_in_full import appendix
 from study_app.analysis.report.study_figures import pictures
-from study_app.analysis.results import BlockResult, Failure, Failures, LevelsResult, Progress, Results, name, silent
+from study_app.analysis.results import (
+    BlockResult,
+    Failure,
+    Failures,
+    LevelsResult,
+    Progress,
+    Results,
+    name,
+    report_no_progress,
+)
 from study_app.analysis.wording import counted, listed
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Contrast, Published
@@ -59,27 +68,27 @@ _OF_FORMAT_2: Final = {
 """Results that reports of earlier versions do not have; omitted where there are none."""
 
 
-def plain(value: Any) -> Any:
+def as_json_types(value: Any) -> Any:
     """Return a result as JSON types."""
     if isinstance(value, BlockResult):
-        return {name: plain(entry) for name, entry in _entries(value)}
+        return {name: as_json_types(entry) for name, entry in _entries(value)}
     if isinstance(value, LevelsResult):
         entries = {field.name: getattr(value, field.name) for field in fields(value) if field.name != "statistics"}
-        return plain(entries | level_entries(value))
+        return as_json_types(entries | level_entries(value))
     if is_dataclass(value) and not isinstance(value, type):
         held = {field.name: getattr(value, field.name) for field in fields(value)}
         omitted = _OF_FORMAT_2.get(type(value), frozenset())
-        return {name: plain(entry) for name, entry in held.items() if entry or name not in omitted}
+        return {name: as_json_types(entry) for name, entry in held.items() if entry or name not in omitted}
     if isinstance(value, Contrast):
         return value.model_dump()
     if isinstance(value, Published):
         return value.model_dump(exclude={"block"})
     if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
+        return {str(key): as_json_types(entry) for key, entry in value.items()}
     if isinstance(value, tuple | list):
-        return [plain(entry) for entry in value]
+        return [as_json_types(entry) for entry in value]
     if hasattr(value, "item"):
-        return plain(value.item())
+        return as_json_types(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         raise AnalysisError(f"a result is {value}: this is a fault of the program, please report it")
     return value
@@ -136,7 +145,7 @@ def motion_csv(results: Results) -> bytes:
         _MOTION,
         [
             {
-                **plain(one),
+                **as_json_types(one),
                 "setting": name(blocks[one.block], one.code),
                 **{field: getattr(kept[one.block, one.code], field) for field in ("trials", "judged", "valid")},
             }
@@ -161,11 +170,11 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
         ],
         "doubts": lambda: [{"file": _path_in_study(study, doubt.path), "what": doubt.what} for doubt in study.doubts],
         "files": lambda: files(study),
-        **{what: partial(plain, text) for what, text in texts.items()},
-        "results": lambda: plain(results),
+        **{what: partial(as_json_types, text) for what, text in texts.items()},
+        "results": lambda: as_json_types(results),
     }
     if any((place / PREREGISTRATION).exists() for place in folders_of(study.folder).values()):
-        parts["preregistration"] = lambda: plain(deviations(study))
+        parts["preregistration"] = lambda: as_json_types(deviations(study))
     held = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
     content = {
         "format": _FORMAT,
@@ -199,7 +208,7 @@ def sessions(study: Study) -> list[dict[str, Any]]:
     """Return the provenance of every session: seed, protocol hash, and program version."""
     columns = ["participant", "session", "status", "counted", "seed", "protocol_hash", "key_hash", "version", "device"]
     rows = study.participants[columns].astype(object).where(study.participants[columns].notna(), None)
-    found = [{str(key): plain(value) for key, value in row.items()} for row in rows.to_dict("records")]
+    found = [{str(key): as_json_types(value) for key, value in row.items()} for row in rows.to_dict("records")]
     if not study.levels:
         return found
     missing = [None if one is None else one.count for one in study.participants["missing"]]
@@ -236,7 +245,7 @@ def report(
     folder: Path,
     to: Path,
     *,
-    progress: Progress = silent,
+    progress: Progress = report_no_progress,
     warn: Callable[[str], object] | None = None,
     failed: Callable[[str], object] | None = None,
 ) -> tuple[Path, ...]:
@@ -282,7 +291,7 @@ def has_questions(study: Study) -> bool:
     return bool(study.blocks or study.others.questions)
 
 
-def report_files(study: Study, progress: Progress = silent) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
+def report_files(study: Study, progress: Progress = report_no_progress) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
     """Return the files of a study's report by name, ``report.html`` first, and the sections that failed.
 
     report.json is made last, since it lists the failures of the others.
@@ -379,7 +388,7 @@ def _page(
             "Methods (text to paste)",
             lambda: (heading(2, "Methods (text to paste)"), box([paragraph(str(texts["methods"]))])),
         ),
-        ("Reproducing this report", lambda: _again(study, results)),
+        ("Reproducing this report", lambda: _reproduction_sentences(study, results)),
         ("Licence and citation", lambda: (heading(2, "Licence and citation"), bullets(credit_lines(study)))),
         ("Counts of answers", lambda: sections.counts_of_answers(results)),
         ("Questions in full", lambda: appendix(recorded_contents(study.folder))),
@@ -428,7 +437,7 @@ def _marks(study: Study) -> list[tuple[str, str]]:
     return marks if study.revealed else [*marks, ("sealed", "Blinded: conditions as codes")]
 
 
-def _again(study: Study, results: Results) -> Iterator[str]:
+def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     """Yield the requirements for reproducing the numbers."""
     yield heading(2, "Reproducing this report")
     decided = results.decided

@@ -224,7 +224,7 @@ def load(loader: Any, bridge: Any, faults: Any, value: int, divisor: int, at_ns:
         if divisor == constants.BAUD_142857:
             echoed = value ^ 0x10 if is_struck(faults, ECHO) else value
             answer(bridge, echoed, at_ns + _ECHO_NS, divisor)
-            _take(loader, value)
+            _process_byte(loader, value)
         else:
             loader.state = STUCK
 
@@ -252,7 +252,7 @@ def _hear_ping(loader: Any, bridge: Any, faults: Any, value: int, at_ns: int) ->
 
 
 @kernel
-def _take(loader: Any, value: int) -> None:
+def _process_byte(loader: Any, value: int) -> None:
     """Process a byte of the stream; the last one starts the program."""
     loader.loaded += 1
     if loader.loaded % 2 == 1:
@@ -332,7 +332,7 @@ def receive_byte(e: Any, value: int, divisor: int, at_ns: int) -> None:
     if is_struck(e.faults, STALL):
         run.stalled_ns = at_ns + e.faults.stall_ns
         return
-    _obey(e, at_ns)
+    _execute_packet(e, at_ns)
     _reply(e, at_ns)
 
 
@@ -356,7 +356,7 @@ def _well_formed(heard: Any) -> bool:
 
 
 @kernel
-def _obey(e: Any, at_ns: int) -> None:
+def _execute_packet(e: Any, at_ns: int) -> None:
     """Advance to the arrival of the packet, then execute it."""
     run = e.run
     move_until(e, at_ns, LONGEST_NS)

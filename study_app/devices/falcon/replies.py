@@ -111,7 +111,7 @@ def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
     """
     before = parser.packets
     for i in range(length):
-        _take(parser, data[i])
+        _append_byte(parser, data[i])
         if parser.held == constants.PACKET:
             _read(parser.tail, status)
             parser.packets += 1
@@ -120,7 +120,7 @@ def feed(parser: Any, data: Any, length: int, status: Any) -> Any:
 
 
 @kernel
-def _take(parser: Any, byte: Any) -> None:
+def _append_byte(parser: Any, byte: Any) -> None:
     """Append ``byte`` to the tail, after dropping the part of the tail that cannot be the start of a packet."""
     while not _fits(parser.held, byte):
         if parser.held == 0:

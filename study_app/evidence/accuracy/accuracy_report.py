@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app import figure_style as style
-from study_app.evidence.accuracy.comparison import Accuracy, Kind, Row, front, worst
+from study_app.evidence.accuracy.comparison import Accuracy, Kind, Row, pareto_front, worst_rows
 from study_app.evidence.reference_solutions import PERCEPTIBLE_N, RELATIVE, ROUNDING
 from study_app.evidence.table import Evidence, Table, duration, plot_files
 
@@ -94,9 +94,9 @@ class _Panel:
 
     def __init__(self, accuracy: Accuracy, kind: Kind) -> None:
         rows = accuracy.of(kind)
-        self._points = worst(rows)
+        self._points = worst_rows(rows)
         self._rows = rows
-        self._front = [self._points[candidate] for candidate in front(self._points)]
+        self._front = [self._points[candidate] for candidate in pareto_front(self._points)]
         self._solved = [it.computing_s * 1e6 for it in accuracy.truths if it.computing_s]
         self._numerical = kind == "numerical"
         self._strip = [row for row in self._points.values() if row.error.rms < _ROUNDED]

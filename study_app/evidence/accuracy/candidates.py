@@ -251,7 +251,7 @@ def _packed(scene: Scene) -> Model:
     return pack(scene, limits=_UNLIMITED)
 
 
-def given(scene: Scene) -> Scene:
+def with_given_velocity(scene: Scene) -> Scene:
     """Return the scene with the velocity taken from the motion instead of an estimator."""
     return scene.model_copy(update={"velocity": Given()})
 
@@ -322,7 +322,7 @@ def _with_wake(scene: Scene, **changes: Any) -> Scene:
     return scene.model_copy(update={"liquids": (scene.liquids[0].model_copy(update={"wake": wake}),)})
 
 
-def _only(scene: Scene, liquid: Any) -> Scene:
+def _with_only(scene: Scene, liquid: Any) -> Scene:
     alone = liquid.model_copy(update={"region": Everywhere(), "current": None})
     return scene.model_copy(update={"liquids": (alone,)})
 
@@ -331,7 +331,7 @@ def drag_and_wake(scene: Scene) -> Scene:
     """Return the scene with its first liquid everywhere, and only its drag law and, if selected, its wake."""
     liquid = resolve(scene).liquids[0]
     effects = ("drag", "wake") if "wake" in liquid.effects else ("drag",)
-    return _only(scene, liquid.model_copy(update={"effects": effects}))
+    return _with_only(scene, liquid.model_copy(update={"effects": effects}))
 
 
 def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
@@ -339,7 +339,7 @@ def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
 
     ``scene`` has one liquid, as returned by `drag_and_wake`. Without a wake, the candidates for the wake are omitted.
     """
-    exact = given(scene)
+    exact = with_given_velocity(scene)
     name = "O(1) wake" if _has_wake(scene) else "drag"
     program = Candidate(name, name, "tick", exact)
     candidates: list[Candidate] = [program]
@@ -379,7 +379,7 @@ def _lists(exact: Scene) -> list[Candidate]:
 
 def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     """Return models of a viscous liquid in order of accuracy, and the one that the program would select."""
-    exact = given(_only(scene, scene.liquids[0]))
+    exact = with_given_velocity(_with_only(scene, scene.liquids[0]))
     candidates: list[Candidate] = [_LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]
     candidates += [
         Candidate(name, f"{name} ({short})" if len(short) == 2 else short, "law", with_effects(exact, "drag", law=law))
@@ -390,7 +390,7 @@ def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
         carried = (*carried, effect)
         candidates.append(_carrying(exact, REFERENCE, carried))
     candidates.append(_UnsteadyDrag("unsteady drag", "unsteady drag", "effects", with_effects(exact, "unsteady_drag")))
-    gated = resolve(_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
+    gated = resolve(_with_only(scene, scene.liquids[0].model_copy(update={"effects": "auto"}))).liquids[0]
     carried = tuple(it for it in _WORDS if it in gated.effects)
     if "unsteady_drag" in gated.effects:
         return tuple(candidates), candidates[-1]

@@ -12,7 +12,7 @@ import numpy as np
 from study_app.errors import StudyError
 from study_app.evidence import reference_solutions as truths
 from study_app.evidence.accuracy import candidates as models
-from study_app.evidence.accuracy.candidates import Candidate, given
+from study_app.evidence.accuracy.candidates import Candidate, with_given_velocity
 from study_app.evidence.cfd.stored_flows import solver_truths
 from study_app.evidence.computer import machine
 from study_app.evidence.reference_solutions import ROUNDING, Error, Truth, error_of, with_velocity
@@ -115,7 +115,7 @@ def accuracy(
     if numerical is not None:
         scene = models.drag_and_wake(numerical)
         candidates, choice = models.numerical(scene)
-        truth = truths.definition(given(scene), motion)
+        truth = truths.definition(with_given_velocity(scene), motion)
         if not truth.cases[0].force_n.any():
             raise StudyError(
                 f"along {named} {scene.liquids[0].id} exerts no force: there is no share of it to be wrong by"
@@ -131,7 +131,7 @@ def accuracy(
     times = _race(tuple(dict.fromkeys(row.candidate for row in measured)), motion, repeats, batches, allowance_s)
     measured = [replace(row, time=times[row.candidate]) for row in measured]
     by_kind = [[row for row in measured if row.kind == kind] for kind in ("numerical", "physical")]
-    fronts = {candidate for rows in by_kind for candidate in front(worst(rows))}
+    fronts = {candidate for rows in by_kind for candidate in pareto_front(worst_rows(rows))}
     rows = tuple(replace(row, on_front=row.candidate in fronts) for row in measured)
     return Accuracy(rows, tuple(found), tuple(said), machine(), named)
 
@@ -231,7 +231,7 @@ def _race(
     }
 
 
-def worst(rows: Sequence[Row]) -> dict[Candidate, Row]:
+def worst_rows(rows: Sequence[Row]) -> dict[Candidate, Row]:
     """Return, for each candidate, the row of the reference with the greatest error."""
     largest: dict[Candidate, Row] = {}
     for row in rows:
@@ -240,7 +240,7 @@ def worst(rows: Sequence[Row]) -> dict[Candidate, Row]:
     return largest
 
 
-def front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
+def pareto_front(points: dict[Candidate, Row]) -> tuple[Candidate, ...]:
     """Return the candidates that are Pareto-optimal in time and error, cheapest first.
 
     Differences within rounding error, or within the resolution of the timing, count as equal.

@@ -9,7 +9,7 @@ import numpy as np
 
 from study_app.evidence import reference_solutions as truths
 from study_app.evidence.accuracy import candidates
-from study_app.evidence.cfd.stored_flows import held_out, solver_truths, stored, training
+from study_app.evidence.cfd.stored_flows import held_out, load_tables, solver_truths, training
 from study_app.evidence.expected_error import Expected, expected
 from study_app.evidence.reference_solutions import error_of, measured_drag_n
 from study_app.evidence.table import Evidence, Table
@@ -122,7 +122,7 @@ def spread(reynolds: float) -> float:
 
 def evidence(found: tuple[Surveyed, ...]) -> Evidence:
     """Return tables of the liquids and of drag laws as a function of the Reynolds number, as Markdown."""
-    highest = max(it.case.reynolds for it in (*stored(), *training(), *held_out()))
+    highest = max(it.case.reynolds for it in (*load_tables(), *training(), *held_out()))
     liquids = []
     for it in found:
         least, greatest = it.solver_reynolds

@@ -98,7 +98,7 @@ def fit_all(tables: Sequence[SolvedTable], progress: Callable[[str], None] = lam
         others = [it for it in tables if it.case.liquid_id == table.case.liquid_id and it is not table]
         for model in MODELS:
             values, warnings = fit_one(model, table)
-            fits.append(judge(model, table, values, others, warnings))
+            fits.append(evaluate_fit(model, table, values, others, warnings))
     return tuple(fits)
 
 
@@ -111,7 +111,7 @@ def fit_one(model: Model, table: SolvedTable) -> tuple[dict[str, float], tuple[s
     return {it.name: found.values[it.name] for it in found.parameters}, found.warnings
 
 
-def judge(
+def evaluate_fit(
     model: Model,
     table: SolvedTable,
     values: Mapping[str, float],

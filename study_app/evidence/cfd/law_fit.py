@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from study_app.errors import StudyError
-from study_app.evidence.cfd.fits import MODELS, judge
+from study_app.evidence.cfd.fits import MODELS, evaluate_fit
 from study_app.evidence.cfd.stored_flows import LEFT_OUT, LEFT_OUT_FILE
 from study_app.evidence.cfd.stored_flows import Table as SolvedTable
 from study_app.evidence.reference_model import CONSTANTS, Constants, late_mps
@@ -130,7 +130,7 @@ def refit(
 def _as_run(table: SolvedTable) -> tuple[float, float]:
     """Return the errors of the program's tick."""
     (program,) = [it for it in MODELS if it.effects == ("unsteady_drag",)]
-    judged = judge(program, table, {})
+    judged = evaluate_fit(program, table, {})
     return judged.share, judged.worst_n / float(np.abs(table.columns["force_n"]).max())
 
 

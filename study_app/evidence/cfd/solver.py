@@ -23,8 +23,8 @@ from study_app.evidence.cfd.stored_flows import (
     STEADY,
     STEADY_FILE,
     TRAINING_FOLDER,
+    file_bytes,
     notes_of,
-    text,
 )
 from study_app.evidence.computer import machine
 from study_app.haptics.model.motion import Floats
@@ -107,7 +107,7 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> b
         **notes_of(case),
         "motion": profile.description,
         "reynolds": f"{case.reynolds:.6g}",
-        **made(),
+        **provenance_notes(),
         "method": f"axisymmetric, order {ORDER}, {flow.unknowns} unknowns, {flow.grid}, steps {steps}",
         "from_coarse": f"{checks['from_coarse']} ({coarse.unknowns} unknowns, steps twice as long)",
         "from_exact": f"{checks['from_exact']} (convection off; Stokes, added mass and Basset)",
@@ -116,7 +116,7 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> b
     }
     columns = (times * case.unit_s, case.speed_mps * profile.speed(times), 0.0 - drag * case.unit_n)
     every = max(1, round(_STEP / step))
-    return text(notes, dict(zip(MOTION, (it[::every] for it in columns), strict=True)))
+    return file_bytes(notes, dict(zip(MOTION, (it[::every] for it in columns), strict=True)))
 
 
 def steady_table() -> bytes:
@@ -126,8 +126,12 @@ def steady_table() -> bytes:
     method = "; ".join(
         f"{flow.unknowns} unknowns, {it}" for flow, it in zip(solved, (_WIDE, _WIDE_COARSE, GRID), strict=True)
     )
-    notes = {"title": "steady drag of a sphere", **made(), "method": f"axisymmetric, order {ORDER}: {method}"}
-    return text(notes, dict(zip(STEADY, (_REYNOLDS, *columns), strict=True)))
+    notes = {
+        "title": "steady drag of a sphere",
+        **provenance_notes(),
+        "method": f"axisymmetric, order {ORDER}: {method}",
+    }
+    return file_bytes(notes, dict(zip(STEADY, (_REYNOLDS, *columns), strict=True)))
 
 
 def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floats) -> str:
@@ -145,7 +149,7 @@ def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floa
     )
 
 
-def made(command: str = COMMAND) -> dict[str, str]:
+def provenance_notes(command: str = COMMAND) -> dict[str, str]:
     """Return the notes that say which command and versions produced a table."""
     return {
         "command": command,

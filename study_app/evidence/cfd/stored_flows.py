@@ -58,7 +58,7 @@ class Table:
         )
 
 
-def text(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats]) -> bytes:
+def file_bytes(notes: Mapping[str, str], columns: Mapping[str, Sequence[float] | Floats]) -> bytes:
     """Return a table as file content."""
     head = "".join(f"# {name}: {value}\n" for name, value in notes.items())
     rows = ([f"{value:.7g}" for value in row] for row in zip(*columns.values(), strict=True))
@@ -75,7 +75,7 @@ def notes_of(case: SolvedCase) -> dict[str, str]:
     }
 
 
-def stored(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]:
+def load_tables(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]:
     """Return the `MOTION` tables of the package or of a folder, or those in its subfolder ``of``, by liquid and speed.
 
     Raises
@@ -89,16 +89,16 @@ def stored(folder: Traversable | None = None, of: str = "") -> tuple[Table, ...]
     files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
     if not files:
         raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
-    return tuple(read(it, MOTION, _OF_THE_MODEL) for it in files)
+    return tuple(read_table(it, MOTION, _OF_THE_MODEL) for it in files)
 
 
-training: Final = partial(stored, of=TRAINING_FOLDER)
-"""Motions that constants are fitted to in addition to those of `stored`."""
-held_out: Final = partial(stored, of=HELD_OUT_FOLDER)
+training: Final = partial(load_tables, of=TRAINING_FOLDER)
+"""Motions that constants are fitted to in addition to those of `load_tables`."""
+held_out: Final = partial(load_tables, of=HELD_OUT_FOLDER)
 """Motions that no fit uses."""
 
 
-def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
+def load_left_out(folder: Traversable | None = None) -> dict[str, Constants]:
     """Return the constants of unsteady drag that were fitted without one motion, by case name; may be empty."""
     file = (folder or package()) / LEFT_OUT_FILE
     if not file.is_file():
@@ -114,9 +114,9 @@ def left_out(folder: Traversable | None = None) -> dict[str, Constants]:
         ) from error
 
 
-def steady(folder: Traversable | None = None) -> Table:
-    """Return the table of `STEADY`; it raises the errors of `read`."""
-    return read((folder or package()) / STEADY_FILE, STEADY)
+def load_steady(folder: Traversable | None = None) -> Table:
+    """Return the table of `STEADY`; it raises the errors of `read_table`."""
+    return read_table((folder or package()) / STEADY_FILE, STEADY)
 
 
 def package() -> Traversable:
@@ -124,7 +124,7 @@ def package() -> Traversable:
     return resources.files("study_app.evidence.cfd")
 
 
-def read(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
+def read_table(file: Traversable, names: Sequence[str], noted: Sequence[str] = ()) -> Table:
     """Return a table with these columns, whose notes ``noted`` are numbers.
 
     Raises
@@ -155,8 +155,8 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
     liquid = scene.liquids[0]
     ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
     more = (*training(), *held_out()) if folder is None else ()
-    tables = (*stored(folder), *more)
-    without = left_out() if folder is None else {}
+    tables = (*load_tables(folder), *more)
+    without = load_left_out() if folder is None else {}
     truths = []
     for table in tables:
         notes = table.notes

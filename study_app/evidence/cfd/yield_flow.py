@@ -20,8 +20,8 @@ import numpy as np
 
 from study_app.errors import StudyError
 from study_app.evidence.cfd.flow import ORDER, Flow, Grid, library
-from study_app.evidence.cfd.solver import made
-from study_app.evidence.cfd.stored_flows import package, read, text
+from study_app.evidence.cfd.solver import provenance_notes
+from study_app.evidence.cfd.stored_flows import file_bytes, package, read_table
 from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.laws import HerschelBulkley, creeping_n
 from study_app.haptics.model.motion import Floats
@@ -115,10 +115,10 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
         progress(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
     notes = {
         "title": "creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n",
-        **made(COMMAND),
+        **provenance_notes(COMMAND),
         "method": f"axisymmetric, order {ORDER}, ε/√(1 + Bi) {SMOOTHING[-1]:g} and {SMOOTHING[-2]:g}: {GRID}; {COARSE}",
     }
-    write_file(to / FILE, text(notes, dict(zip(COLUMNS, np.array(rows).T, strict=True))))
+    write_file(to / FILE, file_bytes(notes, dict(zip(COLUMNS, np.array(rows).T, strict=True))))
     return to / FILE
 
 
@@ -131,8 +131,8 @@ def _solved(flow_index: float) -> list[tuple[float, ...]]:
 
 
 def stored_materials(folder: Traversable | None = None) -> dict[str, Floats]:
-    """Return the columns of the stored table; it raises the errors of `stored_flows.read`."""
-    return read((folder or package()) / FILE, COLUMNS).columns
+    """Return the columns of the stored table; it raises the errors of `stored_flows.read_table`."""
+    return read_table((folder or package()) / FILE, COLUMNS).columns
 
 
 def errors(columns: dict[str, Floats]) -> Floats:

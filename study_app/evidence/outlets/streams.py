@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import WorkerError
-from study_app.evidence.table import TURN_S, Evidence, paced, take_turns
+from study_app.evidence.table import TURN_S, Evidence, paced_steps, take_turns
 from study_app.evidence.timing.measurement import FULL, PERIOD_NS, PlayedHand, ServoLoop, granted
 from study_app.haptics.runtime.servo import Servo
 from study_app.outlets.markers import Marker, SinkThread, marker_of
@@ -132,7 +132,7 @@ def stream(
             servo.start()
             try:
                 servo.load(FULL)
-                for number in paced(seconds, _MARKER_EVERY_S, ending=ending, progress=progress):
+                for number in paced_steps(seconds, _MARKER_EVERY_S, ending=ending, progress=progress):
                     servo.check()
                     sent.append(_numbered(number, servo.now_ns(), origin_ns))
                     sink.mark(sent[-1])

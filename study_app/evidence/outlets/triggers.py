@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from study_app.errors import OutletError, StudyError
 from study_app.evidence.outlets.streams import Listener
-from study_app.evidence.table import Evidence, paced
+from study_app.evidence.table import Evidence, paced_steps
 from study_app.haptics.runtime.clocks.clock import SystemClock
 from study_app.outlets.markers import CODES, HIGH_S, SinkThread, TriggerSink, marker_of
 from study_app.outlets.session_outlets import open_sink
@@ -118,7 +118,7 @@ def _send(
     thread = SinkThread(sink)
     sent: list[tuple[int, int]] = []
     events = list(CODES)
-    for number in paced(seconds, _EVERY_S, ending=ending, progress=progress):
+    for number in paced_steps(seconds, _EVERY_S, ending=ending, progress=progress):
         if thread.lost:
             break
         marker = marker_of(events[number % len(events)], 1e-9 * now_ns(), 0, {})

@@ -25,9 +25,16 @@ from study_app.analysis.evaluate import evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
 from study_app.analysis.findings.finding import FOUND, BlockAnswers, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
-from study_app.analysis.findings.statement_tests import DelayTrend, MeanTests, OverAll, Pairs, SettingsDiffer, gated
+from study_app.analysis.findings.statement_tests import (
+    DelayTrend,
+    MeanTests,
+    OverAll,
+    Pairs,
+    SettingsDiffer,
+    with_gates,
+)
 from study_app.analysis.planning.power_curves import interval
-from study_app.analysis.planning.simulated_studies import Opinions, Plan, people
+from study_app.analysis.planning.simulated_studies import Opinions, Plan, draw_opinions
 from study_app.analysis.report.sections import answers as answered
 from study_app.analysis.results import BlockResult, Failures, Results
 from study_app.analysis.statistics.equivalence import tost
@@ -71,7 +78,7 @@ def answers(
 ) -> tuple[Array, ...]:
     """Return the answers (participants, settings, items) of one simulated study, block by block."""
     if generator == "answer model":
-        thought = people(simulation, participants, seed, study)
+        thought = draw_opinions(simulation, participants, seed, study)
         rng = np.random.default_rng([seed, study, participants])
         return tuple(
             _opined(block, opinions, extent, rng) for block, opinions in zip(simulation.blocks, thought, strict=True)
@@ -345,7 +352,7 @@ def report(
         )
         for block, values in zip(simulation.blocks, given, strict=True)
     ]
-    asked = [replace(answers, seed=1) for answers in gated(tables, _DRAWS)]
+    asked = [replace(answers, seed=1) for answers in with_gates(tables, _DRAWS)]
     return asked, tuple(evaluate_block(None, answers) for answers in asked)
 
 

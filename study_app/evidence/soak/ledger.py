@@ -76,13 +76,13 @@ class Ledger:
         records_here = self._ledger[0], self._wake[0], self._elements
         last = _last_accepted(samples)
         if last < 0:
-            write_down(*records_here, samples, 0, len(samples))
+            record_samples(*records_here, samples, 0, len(samples))
             return None
-        write_down(*records_here, samples, 0, last)
+        record_samples(*records_here, samples, 0, last)
         defined, size_mps = np.zeros(3), 0.0
         if self._ledger[0].tracking and not _begins_anew(self._ledger[0], samples[last]):
             size_mps = sum_elements(self._wake[0], self._elements, defined)
-        write_down(*records_here, samples, last, len(samples))
+        record_samples(*records_here, samples, last, len(samples))
         error_mps = float(np.linalg.norm(samples.wake_mps[last] - defined))
         if size_mps == 0.0:
             return None if error_mps == 0.0 else math.inf
@@ -110,7 +110,7 @@ def _begins_anew(ledger: Any, sample: Any) -> bool:
 
 
 @kernel
-def write_down(ledger: Any, wake: Any, elements: Any, samples: Any, first: int, end: int) -> None:
+def record_samples(ledger: Any, wake: Any, elements: Any, samples: Any, first: int, end: int) -> None:
     """Record samples ``first`` to ``end`` in the list according to the definition."""
     for i in range(first, end):
         sample = samples[i]
@@ -143,7 +143,7 @@ def prepare() -> None:
     wake, elements = new_wake_list(Wake(length=1, scaling=1), 1000.0)
     _last_accepted(records(SAMPLE, 0))
     sum_elements(wake[0], elements, np.zeros(3))
-    write_down(records(_LEDGER, 1)[0], wake[0], elements, records(SAMPLE, 0), 0, 0)
+    record_samples(records(_LEDGER, 1)[0], wake[0], elements, records(SAMPLE, 0), 0, 0)
 
 
 @dataclass(slots=True, kw_only=True)

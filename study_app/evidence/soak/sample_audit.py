@@ -87,16 +87,16 @@ class Audit:
 
     def take(self, samples: Any) -> None:
         """Check the next ``samples`` (recarray of ``SAMPLE``)."""
-        look(self.counts, samples, self._displaced_m)
+        check_samples(self.counts, samples, self._displaced_m)
 
 
 def prepare() -> None:
     """Compile the checks, or load them from the cache."""
-    look(records(_COUNTS, 1)[0], records(SAMPLE, 0), 1.0)
+    check_samples(records(_COUNTS, 1)[0], records(SAMPLE, 0), 1.0)
 
 
 @kernel
-def look(counts: Any, samples: Any, displaced_m: float) -> None:
+def check_samples(counts: Any, samples: Any, displaced_m: float) -> None:
     """Check and count each of ``samples``."""
     for i in range(samples.shape[0]):
         sample = samples[i]

@@ -128,14 +128,16 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
 
     def changed(name: str, change: Callable[[Case], Case | None], cases: Iterable[Case]) -> Group:
         listed = tuple(case for case in map(change, cases) if case is not None)
-        return Group(name, tuple(_drawn(f"{seed} {name}", some(listed, min(_CASES, count or _CASES)), light)))
+        return Group(name, tuple(_drawn(f"{seed} {name}", evenly_chosen(listed, min(_CASES, count or _CASES)), light)))
 
     listed = [
         Group(
             name,
             tuple(
                 _drawn(
-                    f"{seed} {name}", [dataclasses.replace(case, plant=SECOND) for case in some(cases, count)], light
+                    f"{seed} {name}",
+                    [dataclasses.replace(case, plant=SECOND) for case in evenly_chosen(cases, count)],
+                    light,
                 )
             ),
         )
@@ -144,24 +146,26 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     for name, change in _CHANGES.items():
         listed.append(changed(name, change, both))
     listed += [
-        Group(name, tuple(map(change, _drawn(f"{seed} {name}", some(both, min(_CASES, count or _CASES)), light))))
+        Group(
+            name, tuple(map(change, _drawn(f"{seed} {name}", evenly_chosen(both, min(_CASES, count or _CASES)), light)))
+        )
         for name, change in _MASSES.items()
     ]
     for name, own in _DISTURBED.items():
-        cases = some(both, min(_CASES, count or _CASES))
+        cases = evenly_chosen(both, min(_CASES, count or _CASES))
         listed.append(Group(name, tuple(_drawn(f"{seed} {name}", cases, {**light, **own}))))
-    listed.append(Group("let go in mid-stroke", some(releases, count)))
+    listed.append(Group("let go in mid-stroke", evenly_chosen(releases, count)))
     in_gap = tuple(_in_gap(f"{seed} let go in a gap", releases))
-    listed.append(Group("let go in a gap of samples", some(in_gap, min(_CASES, count or _CASES))))
+    listed.append(Group("let go in a gap of samples", evenly_chosen(in_gap, min(_CASES, count or _CASES))))
     for name in (*_MISJUDGED, *_MASSES):
         cases = tuple(case for case in map({**_CHANGES, **_MASSES}[name], releases) if case is not None)
-        listed.append(Group(f"let go in mid-stroke, {name}", some(cases, min(_CASES, count or _CASES))))
+        listed.append(Group(f"let go in mid-stroke, {name}", evenly_chosen(cases, min(_CASES, count or _CASES))))
     driven = "through the Falcon's driver"
-    driven_held = some(tuple(_grid(("light", "middle", "firm"), (FALCON,), _FALCONS_HZ, (1,))), count)
+    driven_held = evenly_chosen(tuple(_grid(("light", "middle", "firm"), (FALCON,), _FALCONS_HZ, (1,))), count)
     driven_held = tuple(_drawn(f"{seed} {driven}", driven_held, _FALCONS))
     listed.append(Group(f"{driven}, held", driven_held))
     driven_free = (dataclasses.replace(case, delay=1) for case in _releases(f"{seed} {driven}", (FALCON,), _FALCONS_KG))
-    listed.append(Group(f"{driven}, let go in mid-stroke", some(tuple(driven_free), count)))
+    listed.append(Group(f"{driven}, let go in mid-stroke", evenly_chosen(tuple(driven_free), count)))
     listed += _of_liquids("non-Newtonian liquids", materials, seed, light, count)
     listed += _of_liquids("liquids of physical2", of_physical2, seed, light, count)
     listed.append(_half_damper("late forces", min(_LATE_CASES, count or _LATE_CASES), seed, {**light, **_LINKS}))
@@ -170,7 +174,10 @@ def groups(seed: str = "stability", count: int | None = None) -> tuple[Group, ..
     fewer = min(_KALMAN_CASES, count or _KALMAN_CASES)
     again = (Group("first plant", sweep(seed)), *listed)
     by_kalman = [
-        Group(f"kalman: {name}", tuple(dataclasses.replace(case, estimator="kalman") for case in some(cases, fewer)))
+        Group(
+            f"kalman: {name}",
+            tuple(dataclasses.replace(case, estimator="kalman") for case in evenly_chosen(cases, fewer)),
+        )
         for name, cases in again
     ]
     return (*listed, by_device, *by_kalman)
@@ -181,22 +188,22 @@ def _of_liquids(
 ) -> Iterator[Group]:
     """Yield groups for liquids outside the sweep: plain cases, misjudged delays, and releases."""
     whole = tuple(_grid(GRIPS, names=names))
-    yield Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
+    yield Group(name, tuple(_drawn(f"{seed} {name}", evenly_chosen(whole, count), choices)))
     for change in _MISJUDGED:
         cases = [case for case in map(_CHANGES[change], whole) if case is not None]
-        few = some(cases, min(_CASES, count or _CASES))
+        few = evenly_chosen(cases, min(_CASES, count or _CASES))
         yield Group(f"{name}, {change}", tuple(_drawn(f"{seed} {name} {change}", few, choices)))
     free = tuple(_releases(f"{seed} {name}", PLANTS, _HANDLES_KG, names))
-    yield Group(f"{name}, let go in mid-stroke", some(free, count))
+    yield Group(f"{name}, let go in mid-stroke", evenly_chosen(free, count))
 
 
 def _half_damper(name: str, count: int, seed: str, choices: Mapping[str, tuple[Any, ...]]) -> Group:
     """Return loops that are held, thrown and released; half of them present the strongest damper."""
     whole = tuple(_grid(GRIPS, PLANTS, names=lambda: (*liquids(), *[DAMPER] * len(liquids()))))
-    return Group(name, tuple(_drawn(f"{seed} {name}", some(whole, count), choices)))
+    return Group(name, tuple(_drawn(f"{seed} {name}", evenly_chosen(whole, count), choices)))
 
 
-def some(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
+def evenly_chosen(cases: Sequence[Case], count: int | None) -> tuple[Case, ...]:
     """Return ``count`` cases, evenly spread over all of them."""
     if count is None or count >= len(cases):
         return tuple(cases)

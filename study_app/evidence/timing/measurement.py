@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.evidence.computer import LoadName, Windows, machine, under_load
-from study_app.evidence.cost import hand
+from study_app.evidence.cost import hand_motion
 from study_app.evidence.table import TURN_S, check_seconds, take_turns
 from study_app.haptics.kernels.c_functions import READ, READ_NEW, SLEEP, WRITE, Driver, c_function, call_at, record_at
 from study_app.haptics.kernels.compiled import kernel
@@ -69,7 +69,7 @@ class PlayedHand:
     failure = None
 
     def __init__(self) -> None:
-        self._places_m = np.ascontiguousarray(hand(), np.float64)
+        self._places_m = np.ascontiguousarray(hand_motion(), np.float64)
         self._memory = records(_PLAYED, 1)
         self._memory[0].places = self._places_m.ctypes.data
         self._memory[0].count = len(self._places_m)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.analysis.data.study_tables import Study, load_study, pooled
+from study_app.analysis.data.study_tables import Study, load_study, pool_sites
 from study_app.analysis.findings import all_findings
 from study_app.analysis.report.sections import answers
 from study_app.analysis.report.write_report import report
@@ -46,7 +46,7 @@ SHAPES = {
     "two liquids": made(2, 8, kind="liquids"),
     "one setting": made(1, 8),
     "sessions and repetitions": made(4, 10, sessions=2, repetitions=2),
-    "sites": pooled(Path("nowhere"), {"A": made(3, 6), "B": made(3, 6)}, 0),
+    "sites": pool_sites(Path("nowhere"), {"A": made(3, 6), "B": made(3, 6)}, 0),
     "five people": made(4, 5),
     "one person": made(3, 1, kind="liquids"),
     "nobody": made(3, 0),

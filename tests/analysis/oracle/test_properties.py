@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from study_app.analysis.levels.thresholds import thresholds_of
-from study_app.analysis.report.write_report import plain
+from study_app.analysis.report.write_report import as_json_types
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.mean_tests import means_of, p_differs
 from study_app.analysis.statistics.rank_tests import global_permutation
@@ -125,7 +125,7 @@ def test_the_detection_threshold_is_that_of_the_people() -> None:
 
 
 def numbers_of(found: Any) -> list[float]:
-    return [number for _, number in leaves(plain(found))]
+    return [number for _, number in leaves(as_json_types(found))]
 
 
 TRUE = {"P001": 0.08, "P002": 0.15, "P003": 0.3, "P004": 0.2}

@@ -13,7 +13,15 @@ from hypothesis import strategies as st
 from scipy.stats import PermutationMethod, binom, rankdata, wilcoxon
 
 from study_app.analysis.planning.power_curves import power_csv, power_markdown, powers
-from study_app.analysis.planning.simulated_studies import BATCH, EFFECTS, Counts, Plan, count, plan, total_counts
+from study_app.analysis.planning.simulated_studies import (
+    BATCH,
+    EFFECTS,
+    Counts,
+    Plan,
+    count_findings,
+    plan,
+    total_counts,
+)
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
@@ -46,7 +54,7 @@ def planned(text: str = TEXT) -> Plan:
 def counted(study: Plan, studies: int, seed: int) -> dict[str, Counts]:
     counts: dict[str, Counts] = {}
     for batch in range(studies // BATCH):
-        counts = total_counts(counts, count(study, (PARTICIPANTS,), seed, batch, BATCH))
+        counts = total_counts(counts, count_findings(study, (PARTICIPANTS,), seed, batch, BATCH))
     return counts
 
 

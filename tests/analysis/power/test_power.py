@@ -9,7 +9,16 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.planning.power_curves import interval, power_markdown, powers
-from study_app.analysis.planning.simulated_studies import BATCH, FULL, Counts, Plan, count, people, plan, sweep
+from study_app.analysis.planning.simulated_studies import (
+    BATCH,
+    FULL,
+    Counts,
+    Plan,
+    count_findings,
+    draw_opinions,
+    plan,
+    sweep,
+)
 from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
@@ -138,12 +147,12 @@ def test_power_grows_with_participants_and_effects_and_is_alpha_without_any(
 def test_the_answers_are_those_of_the_answer_model() -> None:
     """Without spread over draws, the mean answer over many people is the model's opinion, rounded now and then."""
     study_plan = planned()
-    answers = people(study_plan, 400, 1, 0)[1].answers(1.0, REHEARSED)
+    answers = draw_opinions(study_plan, 400, 1, 0)[1].answers(1.0, REHEARSED)
     assert set(np.unique(answers)) <= set(range(1, 8))
     different = answers[:, :, [item.id for item in study_plan.blocks[1].items].index("different")]
     assert different[:, 0].mean() == pytest.approx(1.9, abs=0.2)
     assert different[:, -1].mean() == pytest.approx(6.1, abs=0.2)
-    none = people(study_plan, 400, 1, 0)[1].answers(0.0, REHEARSED).mean(axis=0)
+    none = draw_opinions(study_plan, 400, 1, 0)[1].answers(0.0, REHEARSED).mean(axis=0)
     assert np.ptp(none, axis=0).max() < 0.25
     assert (np.diff(different.mean(axis=0)) > -0.2).all()
 
@@ -153,11 +162,11 @@ def test_the_lowest_delay_is_the_step_downs_of_the_report() -> None:
     study_plan = planned()
     delays = study_plan.blocks[1]
     assert delays.delays_ms is not None
-    counts = count(study_plan, (9,), 1, 0, BATCH)[CONSISTENT]
+    counts = count_findings(study_plan, (9,), 1, 0, BATCH)[CONSISTENT]
     place = [item.id for item in delays.items].index("harder")
     lowest = []
     for study in range(BATCH):
-        answers = people(study_plan, 9, 1, study)[1].answers(1.0, PUBLISHED[CONSISTENT])
+        answers = draw_opinions(study_plan, 9, 1, study)[1].answers(1.0, PUBLISHED[CONSISTENT])
         found = step_down(answers[:, :, place], delays.delays_ms).lowest_ms
         lowest.append(np.inf if found is None else found)
     expected = [sum(one <= delay for one in lowest) for delay in delays.delays_ms]

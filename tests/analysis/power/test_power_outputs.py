@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from scipy.stats import binomtest
 
 from study_app.analysis.planning.power_curves import powers, write_power
-from study_app.analysis.planning.simulated_studies import count, plan
+from study_app.analysis.planning.simulated_studies import count_findings, plan
 from study_app.analysis.planning.threshold_studies import threshold_csv, threshold_markdown
 from study_app.protocol.load import load, parse
 from tests.analysis.conftest import SMALL
@@ -31,7 +31,7 @@ def test_power_of_small_plans(
     text = PLANS[name]
     protocol = load(name) if text is None else parse(text.encode(), "small.toml")
     planned = plan(protocol, felt_in(protocol))
-    counts = count(planned, (3, 7), 1, 0, 3)
+    counts = count_findings(planned, (3, 7), 1, 0, 3)
     lines = list[str]()
     rng = np.random.default_rng(5)
     drawn = {

@@ -11,9 +11,9 @@ from study_app.analysis.planning.preregistration import (
     FILE,
     Commitment,
     Deviations,
+    commitment_lines,
     deviations,
     deviations_section,
-    written,
 )
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
@@ -44,7 +44,7 @@ def committed(results: Results, participants: int | None = 3, **changes: object)
         study="small", version="2", protocol_hash=HASH, participants=participants, precision=None, rules=(CATCH,)
     )
     path = results.folder / FILE
-    path.write_text(f"# Preregistration\n\n{written(one)}", encoding="utf-8", newline="\n")
+    path.write_text(f"# Preregistration\n\n{commitment_lines(one)}", encoding="utf-8", newline="\n")
     return path
 
 

@@ -20,7 +20,7 @@ from scipy.stats import binom
 from study_app import __version__
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.report.sections import CLAIMS
-from study_app.analysis.report.write_report import plain, tests_csv
+from study_app.analysis.report.write_report import as_json_types, tests_csv
 from study_app.analysis.results import Results
 
 WORDS: Final = ["no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"]
@@ -47,7 +47,7 @@ class Told:
     @cached_property
     def results(self) -> dict[str, Any]:
         """The results in report.json."""
-        return json.loads(json.dumps(plain(self.found)))  # type: ignore[no-any-return]
+        return json.loads(json.dumps(as_json_types(self.found)))  # type: ignore[no-any-return]
 
     @cached_property
     def rows(self) -> list[dict[str, str]]:

@@ -13,7 +13,7 @@ from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
-from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, gated
+from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, with_gates
 from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
 from study_app.analysis.results import Results
@@ -148,8 +148,8 @@ def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() 
     single[ITEMS[0]] = np.clip(np.arange(1, 5)[:, None] + rng.integers(0, 3, (14, 4, 1)), 1, 7).astype(float)
     decided = replace(DECIDED, primary=ITEMS[:1])
     asked = of_tables(block, decided, tuple(map(str, range(14))), single)
-    (one,) = gated([asked])
-    two = gated([replace(asked, values={ITEMS[1]: asked.values[ITEMS[1]]}), asked])[1]
+    (one,) = with_gates([asked])
+    two = with_gates([replace(asked, values={ITEMS[1]: asked.values[ITEMS[1]]}), asked])[1]
     assert one.over_all is not None
     assert one.gate == one.over_all.p
     assert two.gate > one.gate  # Holm, over both blocks

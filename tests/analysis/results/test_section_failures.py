@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.statement_tests import OverAll
-from study_app.analysis.report.write_report import plain
+from study_app.analysis.report.write_report import as_json_types
 from study_app.cli import commands
 from study_app.protocol.load import load
 from tests.analysis.conftest import Results, make_results, twelve
@@ -62,7 +62,7 @@ def test_a_test_that_fails_takes_no_other_with_it(opened: Results, monkeypatch: 
         found = next(one for one in results.blocks if one.id == block)
         (absent,) = (one for one in found.absent if one.what == what)
         assert "ValueError: f(a) and f(b) must have different signs" in absent.why
-        json.dumps(plain(results), allow_nan=False)
+        json.dumps(as_json_types(results), allow_nan=False)
         assert OverAll.of(found) is not None or "over all" in what
         assert results.performance is not None
 

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export_study import export
-from study_app.analysis.planning.preregistration import FILE, Commitment, deviations, written
+from study_app.analysis.planning.preregistration import FILE, Commitment, commitment_lines, deviations
 from study_app.analysis.report.write_report import report
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
@@ -104,7 +104,7 @@ def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tm
 
     def said(**others: Commitment) -> tuple[str, ...]:
         for site, own in others.items():
-            (tmp_path / "pooled/sites" / site / FILE).write_text(written(own), encoding="utf-8", newline="\n")
+            (tmp_path / "pooled/sites" / site / FILE).write_text(commitment_lines(own), encoding="utf-8", newline="\n")
         compared = deviations(found)
         assert compared is not None
         return compared.found

@@ -127,7 +127,7 @@ def of_equivalence() -> Iterator[str]:
     yield from results(equivalence.fewest, limits)
     yield from results(mean_tests.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
     rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
-    yield from results(simulated_studies.sizes, rows)
+    yield from results(simulated_studies.difference_ranks, rows)
     yield from results(equivalence.equivalent, rows, 1.0, 0.05)
 
 

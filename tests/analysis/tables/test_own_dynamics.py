@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from study_app.analysis.data import blocks
 from study_app.analysis.data.blocks import OwnDynamics
 from study_app.analysis.data.motion import Targets, performance, reaches, submovements
-from study_app.analysis.data.study_tables import load_study, pooled
+from study_app.analysis.data.study_tables import load_study, pool_sites
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_events, read_key
@@ -65,7 +65,7 @@ def test_those_of_sites_are_weighted_by_their_sessions() -> None:
         for own in (OwnDynamics(damping_nspm=1, friction_n=2, mass_kg=3, sessions=1, of=2), None)
     )
     third = replace(one, own_dynamics=OwnDynamics(damping_nspm=4, friction_n=5, mass_kg=9, sessions=2, of=2))
-    assert pooled(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(
+    assert pool_sites(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(
         damping_nspm=3, friction_n=4, mass_kg=7, sessions=3, of=0
     )
 

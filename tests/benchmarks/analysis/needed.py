@@ -15,7 +15,7 @@ import numpy as np
 from study_app.analysis.findings.finding import FOUND
 from study_app.analysis.findings.statement_tests import DelayTrend, SettingsDiffer
 from study_app.analysis.planning.power_curves import WANTED, interval, powers
-from study_app.analysis.planning.simulated_studies import people, plan, sweep
+from study_app.analysis.planning.simulated_studies import draw_opinions, plan, sweep
 from study_app.analysis.results import Failures
 from study_app.evidence.report_rates.simulation import report
 from study_app.protocol.load import load
@@ -47,7 +47,9 @@ def main(studies: str = "200", *sizes: str) -> int:
     found: Counter[tuple[int, str, str | None]] = Counter()
     for n in sorted({n for n, _ in wanted.values()}):
         for study in range(asked):
-            given = [np.asarray(one.answers(1.0, PUBLISHED[TYPICAL])) for one in people(planned, n, OTHER, study)]
+            given = [
+                np.asarray(one.answers(1.0, PUBLISHED[TYPICAL])) for one in draw_opinions(planned, n, OTHER, study)
+            ]
             _, results = report(planned, planned.decided, given, study, Failures())
             for block, result in zip(planned.blocks, results, strict=True):
                 tests = (*SettingsDiffer.of(result), *DelayTrend.of(result))

@@ -6,7 +6,7 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from study_app.evidence.accuracy.comparison import Row, Time, front
+from study_app.evidence.accuracy.comparison import Row, Time, pareto_front
 from study_app.evidence.reference_solutions import Case, Error, Truth, error_of
 from study_app.haptics.model.motion import Motion
 
@@ -57,6 +57,6 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
         )
 
     points = dict([row("quick", 10, 0.5), row("dear", 20, 0.6), row("sums", 30, 1e-13), row("list", 900, 1e-16)])
-    assert [candidate.name for candidate in front(points)] == ["quick", "sums"]
+    assert [candidate.name for candidate in pareto_front(points)] == ["quick", "sums"]
     alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
-    assert [candidate.name for candidate in front(alike)] == ["truer", "truest"]
+    assert [candidate.name for candidate in pareto_front(alike)] == ["truer", "truest"]

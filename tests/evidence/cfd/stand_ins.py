@@ -3,14 +3,14 @@
 from typing import Any
 
 from study_app.evidence.cfd.solved_cases import Case
-from study_app.evidence.cfd.stored_flows import MOTION, text
+from study_app.evidence.cfd.stored_flows import MOTION, file_bytes
 
 
 def linear_table(case: Case, grid: Any, coarse: Any) -> bytes:
     """Return a table of the exact force without convection, at some times."""
     times = case.profile.moments(0.5)
     columns = (times * case.unit_s, case.profile.speed(times), case.profile.linear_drags(times, case.reynolds))
-    return text({"grids": f"{grid} {coarse}"}, dict(zip(MOTION, columns, strict=True)))
+    return file_bytes({"grids": f"{grid} {coarse}"}, dict(zip(MOTION, columns, strict=True)))
 
 
 def steady() -> bytes:

@@ -32,7 +32,7 @@ COARSE = replace(solver.COARSE, ahead=15, behind=30, aside=15, ball=0.2, near=0.
 
 @pytest.fixture(scope="module")
 def stored():
-    tables = (*stored_flows.stored(), *stored_flows.training(), *stored_flows.held_out())
+    tables = (*stored_flows.load_tables(), *stored_flows.training(), *stored_flows.held_out())
     return {it.case.name: it for it in tables}
 
 
@@ -49,7 +49,7 @@ def fits(stored):
             for it in (stored[name] for name in NAMES)
             if it.case.liquid_id == table.case.liquid_id and it is not table
         ]
-        found.append(fitted.judge(models[row["model"]], table, values, others))
+        found.append(fitted.evaluate_fit(models[row["model"]], table, values, others))
     return tuple(found)
 
 
@@ -121,7 +121,7 @@ def test_a_table_is_of_the_shipped_liquid_and_says_what_made_it(stored, expected
 
 
 def test_steady_drag_is_what_was_published_and_independent_of_the_grid():
-    reynolds, drag, coarse, narrow = stored_flows.steady().columns.values()
+    reynolds, drag, coarse, narrow = stored_flows.load_steady().columns.values()
     np.testing.assert_allclose(coarse, drag, rtol=4e-3)
     np.testing.assert_allclose(narrow, drag, rtol=2e-3)
     np.testing.assert_allclose([fitted.clift(it) for it in reynolds.tolist()], drag, rtol=0.016)
@@ -163,12 +163,12 @@ def test_a_stored_table_is_taken_for_its_own_liquid_alone(tmp_path):
 
 def test_a_table_that_was_damaged_is_named(tmp_path):
     with pytest.raises(StudyError, match="holds no tables"):
-        stored_flows.stored(tmp_path)
+        stored_flows.load_tables(tmp_path)
     shutil.copy(str(PACKAGE / f"{NAMES[0]}.csv"), tmp_path)
     file = tmp_path / f"{NAMES[0]}.csv"
     file.write_text(file.read_text("utf-8").replace("velocity_mps,", "v,"), "utf-8")
     with pytest.raises(StudyError, match=rf"{NAMES[0]}.*cfd --solve"):
-        stored_flows.stored(tmp_path)
+        stored_flows.load_tables(tmp_path)
 
 
 # --- The fits ---

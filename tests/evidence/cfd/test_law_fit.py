@@ -23,7 +23,7 @@ def test_the_programs_constants_are_those_of_the_letter():
 
 @pytest.mark.nightly
 def test_a_fit_to_the_stored_motions_gives_the_programs_constants_within_half_a_percent():
-    fitted = law_fit.fit_constants((*stored_flows.stored(), *stored_flows.training()))
+    fitted = law_fit.fit_constants((*stored_flows.load_tables(), *stored_flows.training()))
     assert tuple(fitted) == pytest.approx(tuple(CONSTANTS), rel=5e-3)
 
 
@@ -56,8 +56,8 @@ def test_planted_constants_are_found_and_a_motion_left_out_is_met():
 
 def test_the_program_meets_motions_that_no_fit_used():
     (model,) = [it for it in fits.MODELS if it.effects == ("unsteady_drag",)]
-    shares = {it.case.name: fits.judge(model, it, {}).share for it in stored_flows.held_out()}
-    assert not set(shares) & {it.case.name for it in (*stored_flows.stored(), *stored_flows.training())}
+    shares = {it.case.name: fits.evaluate_fit(model, it, {}).share for it in stored_flows.held_out()}
+    assert not set(shares) & {it.case.name for it in (*stored_flows.load_tables(), *stored_flows.training())}
     assert sum(shares.values()) <= 0.04 * len(shares)
     assert shares.pop("reversal-gear_oil-578mmps") <= 0.082  # through its own wake the law is least true
     assert shares.pop("reversal-gear_oil-347mmps") <= 0.062
@@ -71,7 +71,7 @@ def test_each_motion_left_out_of_the_fit_is_met():
     done = CliRunner().invoke(commands, ["cfd", "--refit"])
     assert done.exit_code == 0, done.output
     rows = [line.split(" | ") for line in done.stdout.splitlines() if "m/s |" in line]
-    assert len(rows) == sum(map(len, (stored_flows.training(), stored_flows.stored(), stored_flows.held_out())))
+    assert len(rows) == sum(map(len, (stored_flows.training(), stored_flows.load_tables(), stored_flows.held_out())))
     assert sum(row[3] == "held out" for row in rows) == len(stored_flows.held_out())
     held_out = {row[0].strip("| "): float(row[4].split("%")[0]) for row in rows if row[3] == "held out"}
     assert all(float(row[4].split("%")[0]) <= 5.1 for row in rows if row[3] != "held out")

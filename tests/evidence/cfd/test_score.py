@@ -73,8 +73,10 @@ def test_the_scorer_needs_numpy_alone() -> None:
 def test_a_law_alone_has_the_error_that_its_fit_reports(name: str, held_out: bool) -> None:
     (motion,) = [it for it in score.motions(only=name) if it.name == name]
     found = score.score(partial(fits.Tick, "unsteady drag", sent=False), motion)
-    (table,) = [it for it in (stored_flows.held_out() if held_out else stored_flows.stored()) if it.case.name == name]
-    judged = fits.judge(fits.MODELS[-1], table, {})
+    (table,) = [
+        it for it in (stored_flows.held_out() if held_out else stored_flows.load_tables()) if it.case.name == name
+    ]
+    judged = fits.evaluate_fit(fits.MODELS[-1], table, {})
     assert motion.fitted is not held_out
     assert found.rms == pytest.approx(judged.share, rel=1e-6)
     assert found.greatest == pytest.approx(judged.worst_n / np.abs(table.columns["force_n"]).max(), rel=1e-3)

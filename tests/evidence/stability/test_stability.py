@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from study_app import cli
 from study_app.errors import StudyError
 from study_app.evidence.stability import stability_report as stability
-from study_app.evidence.stability.case_groups import Group, groups, some, sweep
+from study_app.evidence.stability.case_groups import Group, evenly_chosen, groups, sweep
 from study_app.evidence.stability.stability_cases import Case, liquids, parse, scene_of
 from study_app.evidence.stability.verdict import judge
 from study_app.haptics.model.slope_limits import slope_limit_table
@@ -31,7 +31,9 @@ PRESETS = [name for name in liquids() if name not in LIMITED]
 @pytest.fixture(scope="module")
 def swept():
     with ThreadPoolExecutor(2) as executor:
-        return stability.run_sweep(some(sweep(), 120), [Group("gentle", (Case(), Case(plant="arm")))], executor)
+        return stability.run_sweep(
+            evenly_chosen(sweep(), 120), [Group("gentle", (Case(), Case(plant="arm")))], executor
+        )
 
 
 @compiled
@@ -44,7 +46,7 @@ def test_many_are_unstable_without_safety_and_none_with_it(swept):
 
 @compiled
 def test_the_strongest_linear_damper_is_unstable_without_safety_and_stable_with_it():
-    damped = [dataclasses.replace(case, liquid="damper") for case in some(sweep(), 60)]
+    damped = [dataclasses.replace(case, liquid="damper") for case in evenly_chosen(sweep(), 60)]
     assert sum(not judge(case, safe=False).stable for case in damped) > 25
     assert [str(case) for case in damped if not judge(case, safe=True).stable] == []
     assert parse(str(damped[0])) == damped[0]
@@ -56,7 +58,7 @@ def test_verdicts_do_not_depend_on_the_executor(all_workers):
     found = []
     for workers in all_workers:
         with open_executor(workers) as executor:
-            judged = stability.run_sweep(some(sweep(), 6), [Group("gentle", (Case(plant="arm"),))], executor)
+            judged = stability.run_sweep(evenly_chosen(sweep(), 6), [Group("gentle", (Case(plant="arm"),))], executor)
         found.append(repr(dataclasses.replace(judged, took_s=0.0)))
     assert len(judged.on) == 6
     assert all(verdicts == found[0] for verdicts in found)
@@ -75,7 +77,7 @@ def test_a_handle_without_any_friction_comes_to_rest_in_tar(speed_mps, quantum_u
         assert verdict.swing_mps < 0.03
 
 
-@pytest.mark.parametrize("case", some(sweep(), 20))
+@pytest.mark.parametrize("case", evenly_chosen(sweep(), 20))
 def test_a_case_is_a_line_that_reproduces_it(case):
     assert parse(str(case)) == case
     assert scene_of(case).scale == case.scale

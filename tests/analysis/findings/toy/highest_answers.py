@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 from study_app.analysis.findings.finding import ALONE, Absent, Answer, BlockAnswers, Finding, in_family, judged_row
 from study_app.analysis.findings.statement_tests import table_of_tests
 from study_app.analysis.page_layout import Drawing, Look, Picture, Sheet
-from study_app.analysis.results import BlockResult, NotTested, Tested, short
+from study_app.analysis.results import BlockResult, NotTested, Tested, short_text
 from study_app.analysis.statistics.outcome import Outcome, clopper_pearson
 
 HIGHEST: Final = 7
@@ -69,5 +69,5 @@ class HighestAnswers(Finding[tuple[Tested, ...]]):
 
     def answer(self) -> Answer:
         most = max(self.value, key=lambda one: one.outcome.effect or 0.0)
-        text = f"Most highest answers: {short(self.found, most.item)}."
+        text = f"Most highest answers: {short_text(self.found, most.item)}."
         return self.answered("shown", text)

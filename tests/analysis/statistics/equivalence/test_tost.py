@@ -33,7 +33,7 @@ def test_the_bootstrap_counts_a_further_participant_like_the_most_extreme() -> N
 
 
 @pytest.mark.parametrize(("bound", "n"), [(0.5, 35), (1.0, 17), (1.5, 14), (3.0, 14)])
-def test_the_fewest_participants_depend_on_the_bound(bound: float, n: int) -> None:
+def test_the_min_sample_depend_on_the_bound(bound: float, n: int) -> None:
     """A share bound / 6 of people who differ by six points shifts the mean by the bound; 5 % of samples have none."""
     assert (1 - min(1 / 5, bound / 6)) ** n <= 0.05 < (1 - min(1 / 5, bound / 6)) ** (n - 1)
     calm = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, bound / 4] * 6

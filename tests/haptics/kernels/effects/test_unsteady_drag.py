@@ -30,7 +30,7 @@ def test_the_exponentials_are_the_kernel_within_1_5_percent_from_1_ms_to_30_s():
 
 def test_steady_drag_is_stokes_at_rest_and_that_of_the_solver_to_re_200():
     assert finite_reynolds(0.0) == 1
-    solved = stored_flows.steady().columns
+    solved = stored_flows.load_steady().columns
     for reynolds, coefficient in zip(solved["reynolds"], solved["drag_coefficient"], strict=True):
         within = 0.017 if reynolds >= 1 else 0.03
         assert finite_reynolds(reynolds) * 24 / reynolds == pytest.approx(coefficient, rel=within)
@@ -51,10 +51,10 @@ def test_as_re_vanishes_it_is_stokes_added_mass_and_basset_within_a_percent(name
 
 
 @compiled
-@pytest.mark.parametrize("table", stored_flows.stored(), ids=lambda it: it.case.name)
+@pytest.mark.parametrize("table", stored_flows.load_tables(), ids=lambda it: it.case.name)
 def test_it_is_the_fluid_solver_within_4_percent_and_6_of_the_peak(table):
     (model,) = [it for it in fits.MODELS if it.effects == ("unsteady_drag",)]
-    judged = fits.judge(model, table, {})
+    judged = fits.evaluate_fit(model, table, {})
     _, solved_n = fits.even(table)
     assert judged.share <= 0.04
     assert judged.worst_n <= 0.06 * abs(solved_n).max()

@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import StudyError
-from study_app.evidence.reference_model import lowered
+from study_app.evidence.reference_model import compress_speed
 from study_app.haptics.model.estimators import Ewma, Given
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Knee
@@ -63,7 +63,7 @@ def test_the_knee_lowers_speeds_above_its_threshold(law, speed, expected):
     knee = Knee(law=law)
     out = vectors(simulate(scene(knee=knee), moving([v])), "velocity")[0]
     assert out == pytest.approx(v * expected / speed)
-    assert lowered(v, knee) == pytest.approx(v * expected / speed)
+    assert compress_speed(v, knee) == pytest.approx(v * expected / speed)
 
 
 @pytest.mark.slow
