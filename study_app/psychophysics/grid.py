@@ -21,6 +21,7 @@ Values = tuple[float, ...]
 
 Z_95: Final = 1.959964
 """Half the 95 % interval of a normal distribution [standard deviations]."""
+_Z_99: Final = 2.575829
 
 FREE_GUESSES: Final[Values] = (0.01, 0.02, 0.05, 0.1, 0.2, 0.3)
 """Guess rates if the answers to noise trials determine it."""
@@ -276,7 +277,7 @@ class GroupPriors(NamedTuple):
     below, above : float
         How far the 95 % interval of this error extends below and above [u].
     if_many_lapses : float or None
-        This error if the mean lapse rate is `MANY_LAPSES`; None if the likelihood ratio excludes that (p < .05).
+        This error if the mean lapse rate is `MANY_LAPSES`; None if the likelihood ratio excludes that (p < .01).
     """
 
     factors: NDArray[np.float64]
@@ -332,7 +333,7 @@ def group_priors(flat: Sequence[Posterior], width_prior: tuple[float, float]) ->
     low, high = np.interp((0.025, 0.975), places, errors[order])
     of_lapses = shared.reshape(len(widths), -1)  # (centres, means of lapses)
     likelihoods, many = of_lapses.sum(axis=0) / group_lapse_weights(), GROUP_LAPSES.index(MANY_LAPSES)
-    excluded = math.log(likelihoods.max() / max(likelihoods[many], 1e-300)) > Z_95**2 / 2
+    excluded = math.log(likelihoods.max() / max(likelihoods[many], 1e-300)) > _Z_99**2 / 2
     return GroupPriors(
         factors=np.asarray(factors, float),
         variance=float(shared @ errors**2),
