@@ -10,7 +10,7 @@ from study_app.haptics.kernels.c_functions import external, record_at
 from study_app.haptics.model.layout import records
 from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, Grant
 
-_SPIN_US = 0.0  # by default the timer is trusted
+SPIN_US = 0.0  # by default the timer is trusted
 
 TIMEBASE = np.dtype(
     [("numerator", np.int64), ("denominator", np.int64), ("spin_ns", np.int64), ("spun_ns", np.int64)], align=True
@@ -26,7 +26,7 @@ _CONSTRAINT_NS = 500_000
 _PERIOD_NS = 1_000_000
 
 _RIGHTS = "this system grants real-time priority to any program: close other audio and video programs"
-_MEMORY = "to lock it raise the limit: ulimit -l unlimited"
+MEMORY = "to lock it raise the limit: ulimit -l unlimited"
 
 
 class _TimebaseInfo(ctypes.Structure):
@@ -42,7 +42,7 @@ class _TimeConstraint(ctypes.Structure):
     )
 
 
-def _open_clock(spin_ns: int) -> Any:
+def open_clock(spin_ns: int) -> Any:
     """Return the memory of a clock: nanoseconds = ticks · numerator / denominator."""
     info = _TimebaseInfo()
     ctypes.CDLL(None).mach_timebase_info(ctypes.byref(info))
@@ -74,11 +74,11 @@ def sleep(context: int, deadline_ns: int) -> Any:
     return time * base.numerator // base.denominator
 
 
-def _raise_priority(*, real_time: bool = True) -> Grant:
+def raise_priority(*, real_time: bool = True) -> Grant:
     """Declare short ticks to the scheduler (time-constraint policy), so that they start on time."""
     if not real_time:
         return NOT_ASKED
-    base = _open_clock(0)[0]
+    base = open_clock(0)[0]
 
     def ticks(nanoseconds: int) -> int:
         return int(nanoseconds * base.denominator // base.numerator)
@@ -92,7 +92,7 @@ def _raise_priority(*, real_time: bool = True) -> Grant:
     return Grant("normal", REFUSED, advice=(_RIGHTS,)) if refused else Grant("real-time", "time constraint")
 
 
-def _lock_memory(blocks: Blocks) -> bool:
+def lock_memory(blocks: Blocks) -> bool:
     """Lock ``blocks`` in memory; return whether they are locked."""
     library = ctypes.CDLL(None)
     return all(library.mlock(ctypes.c_void_p(address), ctypes.c_size_t(size)) == 0 for address, size in blocks)

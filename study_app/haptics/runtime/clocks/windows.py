@@ -17,7 +17,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import records
 from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, Grant
 
-_SPIN_US = 500.0  # greatest lateness of the timer; the rest is waited by polling the counter
+SPIN_US = 500.0  # greatest lateness of the timer; the rest is waited by polling the counter
 
 COUNTER = np.dtype(
     [("frequency_hz", np.int64), ("timer", np.intp), ("spin_ns", np.int64), ("spun_ns", np.int64)], align=True
@@ -41,10 +41,10 @@ _MMCSS_CRITICAL = 2
 _TIMER_PERIOD_MS = 1
 
 _RIGHTS = "for real-time priority start the service Multimedia Class Scheduler (services.msc: MMCSS)"
-_MEMORY = "to lock it close other programs: the working set is too small"
+MEMORY = "to lock it close other programs: the working set is too small"
 
 
-def _open_clock(spin_ns: int) -> Any:
+def open_clock(spin_ns: int) -> Any:
     """Return the memory of a clock: the counter's frequency and a timer, closed with the memory."""
     memory = records(COUNTER, 1)
     memory[0].spin_ns = spin_ns
@@ -100,7 +100,7 @@ def sleep(context: int, deadline_ns: int) -> Any:
     return time_ns
 
 
-def _raise_priority(*, real_time: bool = True) -> Grant:
+def raise_priority(*, real_time: bool = True) -> Grant:
     """Make the calling thread one of the multimedia scheduler's, or time-critical within its process."""
     if not real_time:
         return NOT_ASKED
@@ -110,7 +110,7 @@ def _raise_priority(*, real_time: bool = True) -> Grant:
 
 
 def request_priority(avrt: Any, kernel32: Any) -> Grant:
-    """Raise the priority as `_raise_priority` specifies, by these libraries of Windows."""
+    """Raise the priority as `raise_priority` specifies, by these libraries of Windows."""
     avrt.AvSetMmThreadCharacteristicsW.restype = ctypes.c_void_p
     avrt.AvSetMmThreadPriority.argtypes = [ctypes.c_void_p, ctypes.c_int]
     task = avrt.AvSetMmThreadCharacteristicsW(ctypes.c_wchar_p("Pro Audio"), ctypes.byref(ctypes.c_uint32(0)))
@@ -124,7 +124,7 @@ def request_priority(avrt: Any, kernel32: Any) -> Grant:
     return Grant("normal", REFUSED, advice=(_RIGHTS,))
 
 
-def _lock_memory(blocks: Blocks) -> bool:
+def lock_memory(blocks: Blocks) -> bool:
     """Lock ``blocks`` in memory; return whether they are locked."""
     if sys.platform == "win32":
         kernel32 = ctypes.WinDLL("kernel32")

@@ -1,4 +1,6 @@
+import ast
 import ctypes
+import inspect
 import os
 import signal
 import sys
@@ -15,8 +17,8 @@ from llvmlite import binding
 
 from study_app.haptics.kernels.c_functions import NOW, SLEEP, c_function
 from study_app.haptics.model.layout import records
+from study_app.haptics.runtime.clocks import clock, macos
 from study_app.haptics.runtime.clocks import linux as clock_linux
-from study_app.haptics.runtime.clocks import macos
 from study_app.haptics.runtime.clocks import windows as clock_windows
 from study_app.haptics.runtime.clocks.clock import SystemClock, raise_priority
 from study_app.haptics.runtime.clocks.grants import Grant
@@ -295,3 +297,16 @@ def test_a_machine_that_runs_is_not_suspended_meanwhile() -> None:
         pass
     assert before_ns >= 0
     assert abs(clock.suspended_ns() - before_ns) < wait_ns / 2
+
+
+@pytest.mark.parametrize("module", [clock_linux, clock_windows, macos], ids=["linux", "windows", "macos"])
+def test_each_system_has_the_parts_of_a_clock(module):
+    """Only one of them is loaded on this system, so no session here would notice."""
+    tree = ast.parse(inspect.getsource(clock))
+    used = {
+        node.attr
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id == "platform"
+    }
+    assert used >= {"SPIN_US", "open_clock", "now", "sleep", "raise_priority", "lock_memory"}
+    assert [name for name in sorted(used) if not hasattr(module, name)] == []
