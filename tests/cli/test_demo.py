@@ -22,6 +22,8 @@ from tests.studies import made_up
 REPORT = Path("demo-simulated-report", "report.html")
 STUDY = Path("results", "demo-simulated")
 
+SIGKILL = getattr(signal, "SIGKILL", signal.SIGTERM)  # Windows has one way to end a process
+
 
 @pytest.fixture
 def workspace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -137,12 +139,7 @@ def is_opened(workspace: Path) -> bool:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("moment", "sent"),
-    [
-        (begun("P001"), signal.SIGKILL),
-        (begun("P001"), signal.SIGINT),
-        (begun("P002"), signal.SIGKILL),
-        (is_opened, signal.SIGKILL),
-    ],
+    [(begun("P001"), SIGKILL), (begun("P001"), signal.SIGINT), (begun("P002"), SIGKILL), (is_opened, SIGKILL)],
     ids=["first session killed", "first session interrupted", "second session killed", "unblinding killed"],
 )
 def test_an_interrupted_demo_is_finished_by_the_next_call(

@@ -51,6 +51,7 @@ from study_app.store.verification.verify_study import verify_study
 from study_app.workspace import Workspace
 from tests import studies
 from tests.journal_lines import event_of
+from tests.platforms import needs_posix
 from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
 from tests.store.conftest import SOURCE, attended, begun, made_samples, study_tables, ticking_clock
 from tests.store.recorded_disk import Call, Disk, Fault, KilledError
@@ -412,6 +413,7 @@ def test_an_output_that_cannot_be_listed_is_mentioned(studied: Path, tmp_path: P
     assert "so withdraw will not list it" in warnings[0]
 
 
+@needs_posix
 @pytest.mark.usefixtures("user")
 def test_the_interface_names_what_unblinding_left(studied: Path, tmp_path: Path) -> None:
     shutil.copytree(studied, tmp_path / "copy")

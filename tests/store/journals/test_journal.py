@@ -18,7 +18,7 @@ from study_app.store.journals import journal_events
 from study_app.store.journals.journal import Journal, SessionClock, read, scan
 from study_app.store.journals.journal_events import journal_schema, line_problem, unknown_events
 from tests.journal_lines import event_of, raw
-from tests.platforms import needs_posix
+from tests.platforms import needs_links, needs_posix
 from tests.store.conftest import AWKWARD, Start
 
 
@@ -150,6 +150,7 @@ def test_a_journal_that_is_no_longer_under_its_name_takes_no_line_until_it_is_ba
     assert [line.others["value"] for line in read(path)] == [1, 2]
 
 
+@needs_links
 def test_a_journal_whose_folder_was_replaced_by_a_link_takes_no_line(tmp_path: Path) -> None:
     folder, away = tmp_path / "ses-01", tmp_path / "away"
     folder.mkdir()

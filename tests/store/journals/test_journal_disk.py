@@ -22,6 +22,7 @@ from tests.store.conftest import AWKWARD
 def test_after_a_full_disk_it_goes_on_where_it_was(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, mended: bool
 ) -> None:
+    pytest.importorskip("resource", reason="sizes of files are limited through the resource module")
     path = tmp_path / "journal.jsonl"
     journal = Journal.create(path)
     first = journal.append(event_of("counted", value=1))

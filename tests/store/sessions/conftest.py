@@ -37,4 +37,4 @@ def again(tmp_path: Path, protocol: Protocol) -> Again:
 def every_byte(folder: Path) -> dict[str, bytes | None]:
     """Everything under ``folder``: files with their bytes, folders with None."""
     paths = sorted(folder.rglob("*"))
-    return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None for path in paths}
+    return {path.relative_to(folder).as_posix(): path.read_bytes() if path.is_file() else None for path in paths}
