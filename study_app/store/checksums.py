@@ -47,8 +47,9 @@ _SYSTEM = re.compile(
 """Files of Windows, macOS, Office and programs that share files, and copies of a session's own files, such as "journal
 (1).jsonl" or "receipt-HOST.json"; hidden files besides."""
 _FINGERPRINT = re.compile(
-    r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})(?:-([a-z2-7]{2}))?\s+(data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2}|"
-    r"(?:withdrawals\.jsonl|exclusions\.csv)/sub-[A-Za-z0-9]{1,32}|reveals\.jsonl)\s*"
+    r"([a-z2-7]{4}-[a-z2-7]{4}-[a-z2-7]{4})(?:-([a-z2-7]{2}))?\s+((?:sites/[A-Za-z0-9]{1,32}/)?"
+    r"(?:data/sub-[A-Za-z0-9]{1,32}/ses-[0-9]{2}|"
+    r"(?:withdrawals\.jsonl|exclusions\.csv)/sub-[A-Za-z0-9]{1,32}|reveals\.jsonl))\s*"
 )
 Proofs: TypeAlias = tuple[tuple[str, str], ...]
 """Pairs of a fingerprint and the session or record that it belongs to."""

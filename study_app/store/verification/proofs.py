@@ -22,6 +22,7 @@ from study_app.store.blinded.blinding import reveals
 from study_app.store.checksums import Proofs, checked_line, parse_copy, proof_of, read_list
 from study_app.store.exclusions import exclusions, reversals
 from study_app.store.folders import StudyFolder
+from study_app.store.merged import folders_of
 from study_app.store.verification.time_stamps import WAITS_S, checked_stamp, optional_library, request_stamp
 from study_app.store.withdrawals import proof_of_withdrawal, tombstones
 
@@ -46,11 +47,20 @@ def record_proofs(study: StudyFolder) -> Proofs:
 
 
 def _proof_lines(study: StudyFolder) -> str:
-    """Return the lines that prove the current state of a study."""
-    lines = [checked_line(*proof) for proof in (*read_list(study.fingerprints), *record_proofs(study))]
+    """Return the lines that prove the current state of a study; in a merged study the names begin with the site."""
+    lines = [
+        checked_line(proof, f"{site_prefix(study.path, folder)}{name}")
+        for folder in folders_of(study.path).values()
+        for proof, name in (*read_list(StudyFolder(folder).fingerprints), *record_proofs(StudyFolder(folder)))
+    ]
     if not lines:
         raise StoreError(f"{study.path} does not contain an ended session: there is nothing to prove yet")
     return "".join(f"{line}\n" for line in lines)
+
+
+def site_prefix(study: Path, folder: Path) -> str:
+    """Return what the names in a proof begin with for a site in ``folder``: "sites/A/"; "" for the study itself."""
+    return "" if folder == study else f"{folder.relative_to(study).as_posix()}/"
 
 
 def _sign_lines(lines: str) -> str:

@@ -45,7 +45,7 @@ from study_app.store.tables.study_files import (
     table_bytes,
 )
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
-from study_app.store.verification.proofs import Proof, read_proof, record_proofs
+from study_app.store.verification.proofs import Proof, read_proof, record_proofs, site_prefix
 from study_app.store.verification.verify_session import (
     INTERRUPTED,
     CheckedSession,
@@ -68,7 +68,7 @@ def verify_study(folder: Path, fingerprints: Path | None = None) -> Findings:
     folder : Path
         The study folder.
     fingerprints : Path, optional
-        A copy of the ``fingerprints.txt`` of a study that is not merged, or its proof (`proofs`), which was stored
+        The proof of the study (`proofs`), or a copy of its ``fingerprints.txt`` if it is not merged, which was stored
         elsewhere: it must contain every ended session unchanged, and all its records must exist.
 
     Raises
@@ -78,22 +78,25 @@ def verify_study(folder: Path, fingerprints: Path | None = None) -> Findings:
     """
     merged = read_merged(folder)
     findings = Findings(folder)
+    copy = None if fingerprints is None else (fingerprints, read_proof(fingerprints))
     if merged is None:
-        copy = None if fingerprints is None else (fingerprints, read_proof(fingerprints))
         sessions = _verify_study(folder, copy, findings)
-    elif fingerprints is None:
+    else:
         _check_sites(merged, findings)
         sessions = []
         for site in filter(Path.is_dir, map(merged.folder, merged.names)):  # `_check_sites` reports the missing ones
+            of_site = None if copy is None else (copy[0], _proof_of_site(copy[1], site_prefix(folder, site)))
             with findings.reading(site):
-                sessions += _verify_study(site, None, findings)
-    else:
-        raise StoreError(
-            f"{folder} holds several sites: compare each with a copy of its fingerprints, such as {fingerprints} "
-            f"with {merged.folder(merged.names[0])}"
-        )
+                sessions += _verify_study(site, of_site, findings)
     findings.sessions, findings.running = len(sessions), sum(session.running for session in sessions)
     return findings
+
+
+def _proof_of_site(proof: Proof, prefix: str) -> Proof:
+    """Return the lines of a proof whose names begin with a site, without it."""
+    size = len(prefix)
+    lines = tuple((print_, name[size:]) for print_, name in proof.lines if name.lower().startswith(prefix.lower()))
+    return Proof(lines, proof.told)
 
 
 def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findings) -> Sessions:

@@ -13,10 +13,12 @@ import pytest
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.folder_lock import lock_folder
+from study_app.store.folders import StudyFolder
 from study_app.store.merged import read_merged
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.sites import merge as merging
 from study_app.store.sites.merge import merge_sites
+from study_app.store.verification.proofs import proof_text
 from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import die, forked
@@ -68,6 +70,24 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
     with pytest.raises(StoreError, match="was changed while it was copied"):
         merge_sites({"A": lab}, results / "pooled")
     assert list(results.iterdir()) == []
+
+
+def test_the_proof_of_a_merged_study_has_the_sessions_of_every_site(labs: dict[str, Path], results: Path) -> None:
+    pooled, kept = results / "pooled", results / "proof.txt"
+    merge_sites({"A": labs["A"], "C": labs["C"]}, pooled)
+    text = proof_text(StudyFolder(pooled))
+    kept.write_text(text, encoding="utf-8", newline="\n")
+    sessions = {
+        f"sites/{site}/{folder.relative_to(labs[site]).as_posix()}"
+        for site in ("A", "C")
+        for folder in labs[site].glob("data/sub-*/ses-*")
+    }
+    assert sessions <= {line.split()[1] for line in text.splitlines()}
+    assert verify_study(pooled, kept).is_sound
+
+    fewer = [line for line in text.splitlines(keepends=True) if min(sessions) not in line]
+    kept.write_text("".join(fewer), encoding="utf-8", newline="\n")
+    assert not verify_study(pooled, kept).is_sound
 
 
 def merge_until(count: int, lab: Path, to: Path) -> None:
