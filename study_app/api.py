@@ -313,9 +313,9 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
     Sealed columns are omitted until the study is unblinded. docs/data-dictionary.md declares every column.
     """
     from study_app.analysis.data.study_tables import load_study
-    from study_app.analysis.export.tables import deliver
+    from study_app.analysis.export.tables import exported_tables
 
-    return {table.name: table.frame for table in deliver(load_study(Path(results)))}
+    return {table.name: table.frame for table in exported_tables(load_study(Path(results)))}
 
 
 @_checked(results=_PATH, by=_TEXT, reason=_TEXT)

@@ -311,7 +311,7 @@ def _failure(package: str, version: str, words: str) -> PlugInError:
     return PlugInError(f"the plug-in {package} {version} failed ({words}): {UPDATE}")
 
 
-def explained(error: BaseException) -> BaseException:
+def explain_error(error: BaseException) -> BaseException:
     """Return a `PlugInError` for an error raised in a plug-in, else the error itself."""
     if isinstance(error, StudyError):
         return error

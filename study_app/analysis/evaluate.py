@@ -12,7 +12,7 @@ from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.motion import Performance, performance
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.finding import BlockAnswers, block_answers, summarize_block, untested
+from study_app.analysis.findings.finding import BlockAnswers, block_answers, empty_result, summarize_block
 from study_app.analysis.findings.statement_tests import with_gates
 from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.questions import question_results, score_results
@@ -86,7 +86,7 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
         found = (
             lost if isinstance(lost, Failure) else test(next(answers for answers in asked if answers.block is block))
         )
-        return untested(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
+        return empty_result(block, NotTested(found.what, found.why)) if isinstance(found, Failure) else found
 
     def moved() -> Performance | None:
         """Measure motion and force if requested; None while sealed, since the force reveals a thick liquid."""
@@ -103,8 +103,8 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
         people=study.people,
         blocks=blocks,
         contrasts=failures.value("the hypotheses", lambda: contrast_results(study, asked, levels), ()),
-        delivered=failures.value("the delays as they were shown", lambda: delivered(study), ()),
-        orders=failures.value("the orders in which trials were run", lambda: orders(study), {}),
+        delivered=failures.value("the delays as they were shown", lambda: delivery_check(study), ()),
+        orders=failures.value("the orders in which trials were run", lambda: order_balance(study), {}),
         seed=SEED,
         questions=failures.value("the answers to other questions", lambda: question_results(study), ()),
         scores=failures.value("scores of questionnaires", lambda: score_results(study), ()),
@@ -137,7 +137,7 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
     return result
 
 
-def delivered(study: Study) -> tuple[Delivered, ...]:
+def delivery_check(study: Study) -> tuple[Delivered, ...]:
     """Return the manipulation check by setting or, while sealed, over all settings of a block.
 
     Delays must not be revealed by code before the key is opened.
@@ -173,7 +173,7 @@ def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.D
     )
 
 
-def orders(study: Study) -> dict[str, Evenness]:
+def order_balance(study: Study) -> dict[str, Evenness]:
     """Return how balanced the orders of trials were as run (block id → counts), including excluded trials.
 
     They are unknown in a sealed study in which each site or each participant has its own codes.

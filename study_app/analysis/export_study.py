@@ -7,7 +7,7 @@ from pathlib import Path
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.export import psychds_dataset
 from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_bytes, table_files
-from study_app.analysis.export.tables import deliver, wide
+from study_app.analysis.export.tables import exported_tables, wide_table
 from study_app.analysis.results import Failure, Progress, report_no_progress
 from study_app.store.output_files import FileCopy, write_output
 
@@ -63,8 +63,8 @@ def export(
 
 def _files(study: Study, extras: Collection[Extra]) -> tuple[Mapping[str, bytes | FileCopy], tuple[Failure, ...]]:
     """Return all files by name, and the sections of the shared report that failed."""
-    across, cells = wide(study) if extras else (None, {})
-    tables = [*deliver(study), *([] if across is None else [across])]
+    across, cells = wide_table(study) if extras else (None, {})
+    tables = [*exported_tables(study), *([] if across is None else [across])]
     files = table_files(study, tables, extras, cells)
     if "psych-ds" not in extras:
         return files, ()

@@ -75,7 +75,7 @@ def paragraph(words: str, kind: str = "") -> Markup:
     return _part("paragraph", words, kind)
 
 
-def attempted(
+def try_part(
     failures: Failures, what: str, title: Markup, make: Callable[[], Iterable[str]], *, block: str | None = None
 ) -> list[str]:
     """Return a part of the page or, if it fails, its title and the reason; the failure is recorded."""
@@ -165,7 +165,7 @@ def font_face(weight: str) -> str:
     return base64.b64encode(file.read_bytes()).decode("ascii") if file.is_file() else ""
 
 
-def drawn(pictures: Mapping[str, Picture], name: str) -> Iterator[Markup]:
+def drawn_figure(pictures: Mapping[str, Picture], name: str) -> Iterator[Markup]:
     """Yield the figure with this name, if it exists."""
     if name in pictures:
         yield picture(pictures[name])

@@ -202,7 +202,7 @@ class Picture:
     numbers: str = ""
 
 
-def attempted(
+def try_figures(
     pictures: Iterable[tuple[str, str, Callable[[], Picture | None]]], failures: Failures | None
 ) -> Iterator[Picture]:
     """Yield figures from block, name and drawing function; a failure is added to ``failures`` instead."""

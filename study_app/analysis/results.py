@@ -12,10 +12,10 @@ from typing import Any, Final, Literal, TypeAlias, TypeVar
 from study_app.analysis.data.blocks import Block, Decided, Item, Kind, OwnDynamics, Setting
 from study_app.analysis.data.motion import Performance
 from study_app.analysis.statistics.effect_sizes import EffectSize
-from study_app.analysis.statistics.equivalence import STEPS, Equivalence, fewest, minority
+from study_app.analysis.statistics.equivalence import STEPS, Equivalence, fewest_participants, smallest_minority
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.wording import listed, ms, number, percent, significant
-from study_app.discovery import explained
+from study_app.discovery import explain_error
 from study_app.errors import PlugInError
 from study_app.protocol.model import Contrast, Published
 from study_app.protocol.orders.balance import Evenness
@@ -99,7 +99,7 @@ class Failures:
         except Exception as error:  # noqa: BLE001 - a failing part must not prevent the report
             last = traceback.extract_tb(error.__traceback__)[-1]
             words, where = f"{type(error).__name__}: {error}", f"{Path(last.filename).name}, line {last.lineno}"
-            if isinstance(said := explained(error), PlugInError):
+            if isinstance(said := explain_error(error), PlugInError):
                 words, where = str(said), ""
             failure = Failure(what=what, error=words, where=where, block=block)
             self.found.append(failure)
@@ -394,12 +394,12 @@ def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
 
 def min_sample(alpha: float, bound: float) -> str:
     """Return the minimum number of participants for equivalence of statements."""
-    return f"at least {fewest(alpha, bound)} participants"
+    return f"at least {fewest_participants(alpha, bound)} participants"
 
 
 def min_sample_reason(alpha: float, bound: float) -> str:
     """Return a sentence on the minimum number of participants for equivalence of statements, and its reason."""
-    share = minority(bound, STEPS)
+    share = smallest_minority(bound, STEPS)
     return (
         f"{min_sample(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
         f"nobody from a minority ({percent(share)} of all people) whose answers differ by "

@@ -21,7 +21,7 @@ from study_app import __version__
 from study_app.cli import data, demo, evidence, model, power, study
 from study_app.cli.devices import devices, outlets, plugins
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of
-from study_app.discovery import explained
+from study_app.discovery import explain_error
 from study_app.errors import PlugInError, StudyError, naming_the_extra
 
 BY_SIGNAL = 128  # added to a signal's number
@@ -99,13 +99,13 @@ def main() -> None:
         click.echo(f"liquid-study: {_shortened(str(error))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     except (Exception, SystemExit) as error:
-        if isinstance(error, SystemExit) and explained(error) is error:
+        if isinstance(error, SystemExit) and explain_error(error) is error:
             raise
         if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG and error.filename:
             click.echo(f"liquid-study: {_shortened(str(error.filename))}: the file name is too long", err=True)
             sys.exit(EXIT_USER_ERROR)
         log = logging.getLogger(__name__)
-        if (said := explained(error)) is error:
+        if (said := explain_error(error)) is error:
             log.critical("a bug ended the program", exc_info=True)
             raise
         log.info("%s", said, exc_info=True)  # only in the log: the terminal shows the line below

@@ -151,12 +151,12 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
 
 def _motion_along(path: str, scene: Scene) -> Motion:
     """Return the motion of a path's name or a motion file, at the scene's rate."""
-    from study_app.evidence.reference_solutions import stir
+    from study_app.evidence.reference_solutions import stirring_motion
     from study_app.haptics.model import motion
     from study_app.lab.identify.measured_force import at_rate
 
     if path == _DEFAULT_PATH:
-        return stir(scene.scale, scene.rate_hz)
+        return stirring_motion(scene.scale, scene.rate_hz)
     programmed = path in motion.NAMES or not (Path(path).suffix or Path(path).exists())
     return (
         motion.programmed_motion(path, rate_hz=scene.rate_hz)

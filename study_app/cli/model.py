@@ -121,7 +121,7 @@ def identify(
     from study_app.lab.identify.fit import CurveFit, Fit, fit, fit_curve
 
     chosen = _changed_scene(scene, liquid, changes)
-    read = measurements.read(measured)
+    read = measurements.read_measurement(measured)
     fitted = [name.strip() for name in names.split(",")]
     fitted_liquid: Fit | CurveFit
     with progress() as show:

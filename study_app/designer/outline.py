@@ -45,7 +45,7 @@ from study_app.designer.document.elements import (
     short_note,
     title_of,
 )
-from study_app.designer.document.fields import element_noun, label_of, node_at, rows, tags
+from study_app.designer.document.fields import distinguishing_key, element_noun, label_of, node_at, rows
 from study_app.designer.document.steps import AddElement, AddInstrument, AddLiquid, shipped_liquids
 from study_app.designer.document.study import Study
 from study_app.designer.parts import make_dense
@@ -281,7 +281,7 @@ def _addable_instruments() -> tuple[Addable, ...]:
 
 def _addable_entry(study: Study, path: Path) -> Addable:
     """Return the entry that adds to a list; a search finds it by each of its kinds."""
-    known = tags(node_at(study.document, (*path, 0)))[1] if is_format_2(study.document) else ()
+    known = distinguishing_key(node_at(study.document, (*path, 0)))[1] if is_format_2(study.document) else ()
     kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
     to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
     return Addable(

@@ -65,7 +65,7 @@ def enter(device: Any) -> bool:
 
 
 @kernel
-def outlasted(device: Any) -> bool:
+def closed_during_call(device: Any) -> bool:
     """Return whether the device was closed during this call, which must then end the force before returning."""
     if device.ended != RELEASED:
         return False

@@ -28,7 +28,7 @@ from study_app.evidence.reference_solutions import (
     Case,
     Truth,
     error_of,
-    stroke,
+    stroke_motion,
     with_effects,
 )
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
@@ -102,7 +102,7 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, C
     alone = with_effects(scene.model_copy(update={"liquids": (liquid,)}), *kept)
     box = alone.motion_in(liquid)
     speed_mps, rate_per_s = box.speed_mps or math.nan, reference_solutions.strokes_per_s(alone)
-    motion = stroke(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
+    motion = stroke_motion(speed_mps, rate_per_s, CYCLES, alone.rate_hz)
     if "unsteady_drag" in kept:
         even_s = np.full(len(motion.t_s), 1 / alone.rate_hz)
         lift_n = np.array([0.0, _lift_n(alone), 0.0])

@@ -42,7 +42,7 @@ _REST_S: Final = 1.0
 _STRETCHES: Final = 3
 
 
-def stir(scale: float, rate_hz: float) -> Motion:
+def stirring_motion(scale: float, rate_hz: float) -> Motion:
     """Return a stirring motion: 1.5 circles of 30 mm in 3 s, a rest, the same backward, a rest, and forward again.
 
     Each segment has minimum jerk (Flash & Hogan 1985) with a small vertical motion: up to 0.18 m/s at the hand. In the
@@ -61,7 +61,7 @@ def stir(scale: float, rate_hz: float) -> Motion:
     return Motion(t_s, position_m, velocity_mps=along * angular_per_s[:, np.newaxis])
 
 
-def stroke(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> Motion:
+def stroke_motion(speed_mps: float, rate_per_s: float, cycles: int, rate_hz: float) -> Motion:
     """Return back-and-forth strokes along x, v = speed · sin ωt with ω = ``rate_per_s``."""
     t_s = np.arange(round(cycles * 2 * math.pi / rate_per_s * rate_hz) + 1) / rate_hz
     way_m = speed_mps / rate_per_s * (1 - np.cos(rate_per_s * t_s))
@@ -145,7 +145,7 @@ class Truth:
     left_out: Constants | None = None
 
 
-def definition(scene: Scene, motion: Motion) -> Truth:
+def definition_truth(scene: Scene, motion: Motion) -> Truth:
     """Return drag and wake of the scene's liquid from the exact definition, for a motion with its velocities."""
     force_n = respond(scene, motion).force_n
     source = "exact definition of the wake: full length, full rate, float64, exact sums"
@@ -169,7 +169,7 @@ def measured_drag_n(liquid: Liquid, diameter_m: float, speed_mps: Floats) -> Flo
     return force_n
 
 
-def steady(scene: Scene) -> Truth | None:
+def steady_truth(scene: Scene) -> Truth | None:
     """Return measured steady drag up to the scene's greatest speed, or None if all measurements are at higher Re."""
     liquid, diameter_m = scene.liquids[0], scene.body.diameter_m
     per_mps = liquid.density_kg_m3 * diameter_m / (liquid.viscosity_pa_s or math.nan)
@@ -192,7 +192,7 @@ def steady(scene: Scene) -> Truth | None:
     return Truth(name="steady drag", source=f"experiments with spheres, {between}{low}", cases=tuple(cases))
 
 
-def oscillation(scene: Scene) -> Truth:
+def oscillation_truth(scene: Scene) -> Truth:
     """Return the force on a sphere that oscillates in creeping flow, after the initial transient.
 
     Landau & Lifshitz, Fluid Mechanics, §24: F = −6πµR(1 + R/δ) u − 3πR²√(2µρ/ω)(1 + 2R/9δ) du/dt, δ = √(2µ/ρω). The
@@ -200,7 +200,7 @@ def oscillation(scene: Scene) -> Truth:
     """
     liquid, radius_m = scene.liquids[0], scene.body.diameter_m / 2
     rate_per_s, speed_mps = strokes_per_s(scene), creeping_mps(scene)
-    motion = stroke(speed_mps, rate_per_s, CYCLES, scene.rate_hz)
+    motion = stroke_motion(speed_mps, rate_per_s, CYCLES, scene.rate_hz)
     velocity_mps = speed_mps * np.sin(rate_per_s * motion.t_s)
     mu, rho = liquid.viscosity_pa_s or math.nan, liquid.density_kg_m3
     delta_m = math.sqrt(2 * mu / (rho * rate_per_s))
@@ -213,7 +213,7 @@ def oscillation(scene: Scene) -> Truth:
     return Truth(name="oscillation", source=source, cases=(Case(motion, vectors_x(force_n), counted),))
 
 
-def start(scene: Scene) -> Truth:
+def starting_truth(scene: Scene) -> Truth:
     """Return the force on a sphere that starts within one tick in creeping flow, from 10 ms onwards.
 
     Basset 1888: F = −6πµR U (1 + R/√(πνt)); with the start spread over one tick T, 1/√t becomes 2(√t − √(t−T))/T.

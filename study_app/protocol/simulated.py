@@ -38,7 +38,7 @@ from study_app.protocol.trials.designs import Design, ForcedChoice, Rated
 from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stimulated
 from study_app.psychophysics.families import Floats
-from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, drawn, normal
+from study_app.psychophysics.people import ASSUMED, UNIFORM, Person, draw_person, normal
 
 _NO_OPINION: Final = 4.0
 _LEAST_SPEED_MPS: Final = 0.01
@@ -261,7 +261,7 @@ OBSERVER: Final = Observer()
 
 def observer_of(draw: Draw) -> Observer:
     """Return a simulated participant's observer, drawn at random."""
-    return Observer(person=drawn(draw))
+    return Observer(person=draw_person(draw))
 
 
 class Course(NamedTuple):

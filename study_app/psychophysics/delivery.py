@@ -79,11 +79,14 @@ def motion(times_s: NDArray[np.float64], position_m: Vectors, period_s: float, h
     if count <= 2 * half:
         return Motion(np.empty(0), np.empty((0, 3)), np.empty((0, 3)))
     even_s = times_s[0] + period_s * np.arange(count)
-    rates = [[np.convolve(axis, taps, "valid") for axis in at(even_s, times_s, position_m).T] for taps in _taps(half)]
+    rates = [
+        [np.convolve(axis, taps, "valid") for axis in interpolate_vectors(even_s, times_s, position_m).T]
+        for taps in _taps(half)
+    ]
     return Motion(even_s[half:-half], np.array(rates[0]).T / period_s, np.array(rates[1]).T / period_s**2)
 
 
-def at(wanted_s: NDArray[np.float64], times_s: NDArray[np.float64], vectors: Vectors) -> Vectors:
+def interpolate_vectors(wanted_s: NDArray[np.float64], times_s: NDArray[np.float64], vectors: Vectors) -> Vectors:
     """Return vectors (n, 3) interpolated linearly at other times: (m, 3)."""
     return np.array([np.interp(wanted_s, times_s, axis) for axis in vectors.T]).T
 
@@ -112,7 +115,7 @@ def damping(force_n: Vectors, moved: Motion) -> tuple[float, float] | None:
     return (fv * aa - fa * va) / determinant, (fa * vv - fv * va) / determinant
 
 
-def share(sent_n: Vectors, model_n: Vectors) -> float | None:
+def sent_share(sent_n: Vectors, model_n: Vectors) -> float | None:
     """Return the share of the model force that was sent, Σ F_sent·F_model / Σ |F_model|²; None without force.
 
     Parameters

@@ -89,7 +89,7 @@ def normal(draw: Callable[[], float]) -> float:
     return sum(draw() for _ in range(UNIFORM)) - UNIFORM / 2
 
 
-def drawn(draw: Callable[[], float]) -> Person:
+def draw_person(draw: Callable[[], float]) -> Person:
     """Return a random person, who may differ in every parameter, using uniform numbers in [0, 1)."""
     low, high = _WIDTHS
     return Person(
@@ -103,7 +103,7 @@ def drawn(draw: Callable[[], float]) -> Person:
 
 def of_kind(kind: str, draw: Callable[[], float]) -> Person:
     """Return a person of a kind: of `KINDS`, or `MIXED`."""
-    return drawn(draw) if kind == MIXED else KINDS[kind]
+    return draw_person(draw) if kind == MIXED else KINDS[kind]
 
 
 _COVERED: Final = 0.95

@@ -16,7 +16,16 @@ from study_app.protocol.model import Limits, Protocol
 from study_app.protocol.presented.presentation import Presentation, presented_condition
 from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, Stimulated
 from study_app.protocol.trials.tasks import AnyTask, Follow
-from study_app.psychophysics.delivery import Times, Vectors, at, damping, difference, lag, motion, share
+from study_app.psychophysics.delivery import (
+    Times,
+    Vectors,
+    damping,
+    difference,
+    interpolate_vectors,
+    lag,
+    motion,
+    sent_share,
+)
 
 _FORCES: Final = ("device_force_n", "force_n")
 """The fields of the force sent to the hand and of the force of the model."""
@@ -110,7 +119,7 @@ def delivered_values(
     sent_n, model_n = sent_n[first + late :], model_n[first:kept]
     prompt = moved.after(from_s, times_s[kept - 1]) if late and kept > 0 else moved
     judges = len(prompt.times_s) and not adjusted
-    fitted = damping(at(prompt.times_s, times_s[first:kept], sent_n), prompt) if judges else None
+    fitted = damping(interpolate_vectors(prompt.times_s, times_s[first:kept], sent_n), prompt) if judges else None
     value = presented.value if presented.vary not in {None, DELAY} and not adjusted else None
     if _varies_damping(presented):
         value = None if fitted is None else fitted[0]
@@ -118,7 +127,7 @@ def delivered_values(
         value = None if lag_s is None else 1000 * lag_s
     return Delivered(
         value_delivered=value,
-        force_share=share(sent_n, model_n),
+        force_share=sent_share(sent_n, model_n),
         apparent_mass_kg=None if fitted is None else fitted[1],
         pace_mps=moved.rms_speed_mps,
         clipped=bool((samples["limiters"][first:] & (LIMITER_NORM | LIMITER_SATURATED)).any()),
@@ -151,7 +160,7 @@ def delivered_error(
     if not counted.any():
         return None
     rounded_n = np.rint(samples["device_force_n"] / FORCE_STEP_N) * FORCE_STEP_N
-    position_m, sent_n = (at(moved.times_s, times_s, it) for it in (samples["position_m"], rounded_n))
+    position_m, sent_n = (interpolate_vectors(moved.times_s, times_s, it) for it in (samples["position_m"], rounded_n))
     right_n = law_n(moved.times_s, position_m, moved.velocity_mps)[counted]
     off_n = sent_n[counted] - right_n
     off_n2, right_n2 = (float(np.mean(np.einsum("ij,ij->i", it, it))) for it in (off_n, right_n))
@@ -164,7 +173,7 @@ def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, per
     even_s = np.arange(from_s - most * period_s, times_s[-1] if len(times_s) else 0.0, period_s)
     if len(even_s) == 0:
         return None
-    rows = lag(at(even_s, times_s, sent_n), at(even_s, times_s, model_n), most)
+    rows = lag(interpolate_vectors(even_s, times_s, sent_n), interpolate_vectors(even_s, times_s, model_n), most)
     return None if rows is None else rows * period_s
 
 

@@ -23,7 +23,7 @@ from types import TracebackType
 from typing import Any, Final, ParamSpec, TypeVar
 
 import study_app
-from study_app.discovery import explained
+from study_app.discovery import explain_error
 from study_app.errors import WorkerError
 from study_app.workers.server import CONTEXT, compute_in_one_thread, ignore_interrupts
 
@@ -186,7 +186,7 @@ def _run(fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) ->
     try:
         return fn(*args, **kwargs)
     except Exception as error:
-        if (said := explained(error)) is error:
+        if (said := explain_error(error)) is error:
             raise
         raise said from error
 

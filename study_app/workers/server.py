@@ -20,7 +20,7 @@ from typing import Any, Final, TypeAlias
 
 import psutil
 
-from study_app.discovery import explained
+from study_app.discovery import explain_error
 from study_app.errors import MissingExtra, StudyError, naming_the_extra
 
 Send: TypeAlias = Callable[[Any], object]
@@ -121,7 +121,7 @@ def serve_orders(orders: Connection, answers: Connection, task: str, *, backgrou
                     carry_out: Task = resolve_name(task)
                     last = carry_out(order, partial(_send, answers, number), lambda: not waiting.empty())
             except Exception as raised:
-                if not isinstance(error := explained(raised), StudyError):
+                if not isinstance(error := explain_error(raised), StudyError):
                     raise
                 last = Refused(str(error), isinstance(error, Stopped), isinstance(error, MissingExtra))
             answers.send((number, last, True))

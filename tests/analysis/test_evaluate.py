@@ -14,7 +14,7 @@ from study_app.analysis.data.blocks import Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings.delays import ContrastsWithControl
-from study_app.analysis.findings.finding import MANY, judged, of_tables
+from study_app.analysis.findings.finding import MANY, corrected_tests, of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, SettingsDiffer, pairs_of
 from study_app.analysis.report.write_report import as_json_types
@@ -81,7 +81,7 @@ def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> No
         item: friedman([[draw.gauss(shift * place, 1) for place in range(3)] for _ in range(8)])
         for item, shift in zip("abcd", (2.0, 0.1, 1.5, 0.0), strict=True)
     }
-    tested = {one.item: one for one in judged(outcomes, NOBODY, "family")}
+    tested = {one.item: one for one in corrected_tests(outcomes, NOBODY, "family")}
     assert list(tested) == list("abcd")
     ps = {item: outcome.p for item, outcome in outcomes.items()}
     assert (tested["a"].p_adjusted, tested["b"].p_adjusted) == holm([ps["a"], ps["b"]])
@@ -94,12 +94,12 @@ def test_primary_statements_are_a_holm_family_and_the_others_exploratory() -> No
 def test_what_could_not_have_been_shown_is_out_of_reach() -> None:
     three = friedman([[1, 2, 3], [1, 2, 3], [3, 1, 2]])
     assert three.smallest_p == pytest.approx(1 / 36)
-    (one, _) = judged({"a": three, "b": three}, NOBODY, "family")
+    (one, _) = corrected_tests({"a": three, "b": three}, NOBODY, "family")
     assert (one.verdict, one.p_adjusted) == ("out of reach", 1.0)
-    (alone,) = judged({"a": three}, NOBODY, "family")
+    (alone,) = corrected_tests({"a": three}, NOBODY, "family")
     assert alone.verdict == "not shown"  # one test of its own could have come to .028
     flat = friedman([[4, 4, 4]] * 5)
-    (none,) = judged({"a": flat}, NOBODY, "family")
+    (none,) = corrected_tests({"a": flat}, NOBODY, "family")
     assert (none.verdict, none.p_adjusted) == ("not tested", None)
 
 

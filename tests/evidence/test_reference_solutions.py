@@ -65,21 +65,23 @@ def test_measured_drag_goes_through_the_points_and_is_smooth_between_them():
 
 
 def test_steady_drag_is_compared_only_where_experiments_are_known():
-    truth = reference_solutions.steady(scene())
+    truth = reference_solutions.steady_truth(scene())
     speeds = [case.motion.velocity_mps[-1, 0] for case in truth.cases]
     assert max(speeds) == pytest.approx(0.6)
     assert min(speeds) * 1420 * 0.068 / 10 >= 0.1585
     oseen = 24 / 0.1585 * (1 + 3 / 16 * 0.1585)
     assert f"up to {100 * (169.8 / oseen - 1):.0f} % above Oseen's law" in truth.source
-    assert "Oseen" not in reference_solutions.steady(scene(HONEY.model_copy(update={"viscosity_pa_s": 0.01}))).source
+    assert (
+        "Oseen" not in reference_solutions.steady_truth(scene(HONEY.model_copy(update={"viscosity_pa_s": 0.01}))).source
+    )
     slow = scene(HONEY.model_copy(update={"viscosity_pa_s": 1e4}))
-    assert reference_solutions.steady(slow) is None
+    assert reference_solutions.steady_truth(slow) is None
 
 
 def test_the_oscillation_is_stokes_added_mass_and_the_basset_integral():
     """The history of a sine that never began, ∫ cos ω(t − s) s^(−½) ds, by quadrature with its oscillating tail."""
     subject = scene()
-    truth = reference_solutions.oscillation(subject)
+    truth = reference_solutions.oscillation_truth(subject)
     (case,) = truth.cases
     omega, speed_mps = reference_solutions.strokes_per_s(subject), reference_solutions.creeping_mps(subject)
     assert omega == 10
@@ -100,7 +102,7 @@ def test_the_oscillation_is_stokes_added_mass_and_the_basset_integral():
 def test_the_start_has_the_published_factors():
     """1 + R/√(πνt) of a 68 mm ball in honey of ν = 10/1400: 1.723, 1.323, 1.229 after 0.1, 0.5, 1 s."""
     subject = scene(HONEY.model_copy(update={"density_kg_m3": 1400}))
-    (case,) = reference_solutions.start(subject).cases
+    (case,) = reference_solutions.starting_truth(subject).cases
     stokes_n = 6 * math.pi * 10 * RADIUS_M * reference_solutions.creeping_mps(subject)
     half_tick = 0.5e-3
     for after_s, factor in ((0.1, 1.723), (0.5, 1.323), (1.0, 1.229)):

@@ -12,7 +12,7 @@ from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.haptics.model.motion import Motion as Path
 from study_app.haptics.model.scene import ForceLink, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
-from study_app.psychophysics.delivery import EARLIER, at, damping, lag, motion
+from study_app.psychophysics.delivery import EARLIER, damping, interpolate_vectors, lag, motion
 from tests.compiled import needs_servo
 
 RATE_HZ = 1000.0
@@ -41,7 +41,7 @@ def felt(b_nspm: float, t_s: Any, position_m: Any, scale: float = 1.0, velocity:
 
 def fitted(samples: Any, t_s: Any, from_s: float = 1.0) -> tuple[float, float]:
     moved = motion(t_s, samples.position_m, 1 / RATE_HZ).after(from_s)
-    found = damping(at(moved.times_s, t_s, samples.device_force_n), moved)
+    found = damping(interpolate_vectors(moved.times_s, t_s, samples.device_force_n), moved)
     assert found is not None
     return found
 

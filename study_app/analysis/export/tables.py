@@ -43,10 +43,10 @@ def _with_site(study: Study, table: Delivered) -> Delivered:
     place = header(table.columns).index("participant") + 1
     sites = pd.array([study.site_of(str(one)) for one in table.frame["participant"]], dtype="string")
     columns = (*table.columns[:place], SITE, *table.columns[place:])
-    return delivered(table.name, columns, table.frame.assign(site=sites))
+    return select_columns(table.name, columns, table.frame.assign(site=sites))
 
 
-def delivered(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
+def select_columns(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
     """Return a table with these columns of a frame."""
     return Delivered(name, columns, frame[list(header(columns))])
 
@@ -67,13 +67,13 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
         return
     intervals = tables_of(study.protocol_format)["intervals"]
     intervals = intervals if study.revealed else unsealed_columns(intervals)
-    yield delivered("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
+    yield select_columns("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
     if not study.revealed:
         return
     frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
     # the frame has no column for an interval that no trial reached
     of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
-    yield delivered("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
+    yield select_columns("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     results = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     groups = dict(zip(frame["participant"], frame["group"], strict=True))
@@ -86,7 +86,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
                 for row in statistic(of).exported()
             ]
             table = pd.DataFrame(rows, columns=list(header(columns)))
-            yield delivered(
+            yield select_columns(
                 statistic.table, columns, table.astype({column.name: _TYPES[column.kind] for column in columns})
             )
 
@@ -147,7 +147,7 @@ def _may_miss(columns: tuple[Column, ...]) -> tuple[Column, ...]:
     return tuple(replace(column, may_miss=True) for column in columns)
 
 
-def deliver(study: Study) -> tuple[Delivered, ...]:
+def exported_tables(study: Study) -> tuple[Delivered, ...]:
     """Return responses, trials and aggregate of a study; with levels, also intervals, opened tracks and thresholds."""
     opened = OPENED if study.revealed else ()
     achieved = (*OPENED, ACHIEVED) if study.revealed else ()
@@ -157,13 +157,13 @@ def deliver(study: Study) -> tuple[Delivered, ...]:
     about = achieved if responses is RESPONSES else _may_miss(achieved)
     judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED
     tables = (
-        delivered("responses", (*responses, *judged, *about), _named(study, _with_delay_error(study))),
-        delivered(
+        select_columns("responses", (*responses, *judged, *about), _named(study, _with_delay_error(study))),
+        select_columns(
             "trials",
             (*trials, *judged, *(_may_miss(achieved) if study.levels else achieved)),
             _named(study, study.trials),
         ),
-        delivered("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
+        select_columns("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
         *_level_tables(study),
     )
     return tuple(_with_site(study, table) for table in tables)
@@ -226,7 +226,7 @@ class QuestionCells:
     setting: Setting | None
 
 
-def wide(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
+def wide_table(study: Study) -> tuple[Delivered, dict[str, Cells | QuestionCells]]:
     """Return the wide table of all valid answers, and the content of each of its columns.
 
     Columns are ``item__condition``, or ``item__code`` until the key is opened; if names would clash,

@@ -33,7 +33,7 @@ from study_app.analysis.levels.thresholds import (
     psychometric_bands,
 )
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, attempted, picture_of, sample_words
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, picture_of, sample_words, try_figures
 from study_app.analysis.results import Failures, LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.wording import counted
@@ -670,7 +670,7 @@ def level_pictures(
     A figure that fails is omitted and added to ``failures``.
     """
     tracked = cache(partial(tracks, study))
-    yield from attempted(
+    yield from try_figures(
         (
             (level.block, name := f"{what}-{level.block}", partial(draw, study, level, forms, name, tracked))
             for what, applies, draw in _FIGURES

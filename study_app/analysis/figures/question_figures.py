@@ -19,9 +19,9 @@ from study_app.analysis.page_layout import (
     Picture,
     Sheet,
     Style,
-    attempted,
     picture_of,
     sample_words,
+    try_figures,
 )
 from study_app.analysis.results import Failures, QuestionResult
 from study_app.discovery import by_name
@@ -206,7 +206,7 @@ def question_pictures(
     open.
     """
     of_levels = {block.id for block in study.levels if block.design.adjusts or study.revealed}
-    yield from attempted(
+    yield from try_figures(
         (
             (
                 result.where,

@@ -14,7 +14,7 @@ from study_app.analysis.levels.answers import Answers, Settings
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic, level_words
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
-from study_app.analysis.page_layout import Picture, attempted, picture_of, sample_words
+from study_app.analysis.page_layout import Picture, picture_of, sample_words, try_figures
 from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
 from study_app.number_text import capitalised
@@ -78,7 +78,7 @@ def summary_pictures(
     failures: Failures | None = None,
 ) -> Iterator[Picture]:
     """Draw the figures of every hypothesis, of the estimates of blocks of levels, and of ``numbers`` (`numbers_of`)."""
-    yield from attempted(_pictures(study, results, numbers, forms), failures)
+    yield from try_figures(_pictures(study, results, numbers, forms), failures)
 
 
 def _pictures(

@@ -35,7 +35,7 @@ from study_app.analysis.results import (
     min_sample_reason,
     short_text,
 )
-from study_app.analysis.statistics.equivalence import Equivalence, fewest, tost
+from study_app.analysis.statistics.equivalence import Equivalence, fewest_participants, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
@@ -225,7 +225,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
     def limits(self) -> Iterator[str]:
         against, result = self.value, self.found
-        if against and result.n < fewest((first := against[0].found).alpha, first.bound):
+        if against and result.n < fewest_participants((first := against[0].found).alpha, first.bound):
             yield (
                 f"{lead_phrase(result)}: a comparison can count as equivalent only with "
                 f"{min_sample_reason(first.alpha, first.bound)}. This study has {result.n}."

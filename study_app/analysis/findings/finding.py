@@ -13,7 +13,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import KINDS, Block, Decided, Kind
 from study_app.analysis.data.measures import Array, medians, presentations
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.html_page import drawn
+from study_app.analysis.html_page import drawn_figure
 from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import BlockResult, Failure, Failures, NotTested, Results, Tested, Verdict
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
@@ -139,13 +139,13 @@ def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
     delays = enumerate(block.delays_ms) if block.kind == "delays" and block.revealed else ()
     sessions = np.concatenate([numbers[~np.isnan(numbers)] for numbers in answers.sessions.values()] or [np.zeros(0)])
     return replace(
-        untested(block),
+        empty_result(block),
         n=answers.n,
         measures=tuple(
             {str(name): None if pd.isna(value) else value for name, value in row.items()}
             for row in ([] if study is None else study.aggregate(block).to_dict("records"))
         ),
-        presentations=presented(answers.single.values()),
+        presentations=presentation_range(answers.single.values()),
         replicated_ms=tuple(delay for place, delay in delays if columns.count(place) > 1),
         sessions=tuple(sorted({int(number) for number in sessions})),
         incomplete={
@@ -156,7 +156,7 @@ def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
     )
 
 
-def untested(block: Block, *absent: NotTested) -> BlockResult:
+def empty_result(block: Block, *absent: NotTested) -> BlockResult:
     """Return an empty result for a block."""
     return BlockResult(
         id=block.id,
@@ -173,7 +173,7 @@ def untested(block: Block, *absent: NotTested) -> BlockResult:
     )
 
 
-def presented(single: Iterable[Array]) -> tuple[int, int]:
+def presentation_range(single: Iterable[Array]) -> tuple[int, int]:
     """Return the least and greatest number of answers by a participant to one statement in one setting."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
     given = counts[counts > 0]
@@ -187,7 +187,7 @@ FDR: Final = "Benjamini-Hochberg"
 ALONE: Final = "none"
 
 
-def judged(outcomes: Mapping[str, Outcome], answers: BlockAnswers, family: str) -> tuple[Tested, ...]:
+def corrected_tests(outcomes: Mapping[str, Outcome], answers: BlockAnswers, family: str) -> tuple[Tested, ...]:
     """Return the tests of statements (item → outcome): primary ones with Holm's correction, the others with FDR."""
     primary = {item: outcome for item, outcome in outcomes.items() if answers.decided.is_primary(item)}
     others = {item: outcome for item, outcome in outcomes.items() if item not in primary}
@@ -460,7 +460,7 @@ class Finding(Generic[R]):
 
     def drawn(self) -> Iterable[str]:
         """Return the HTML of its figure, if it was drawn."""
-        return drawn(self._pictures, self.figure_name)
+        return drawn_figure(self._pictures, self.figure_name)
 
     def answer(self) -> Answer:
         """Return the answer to its question on the first page once the key is open, also for a negative result."""

@@ -25,7 +25,7 @@ from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short_text
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
-from study_app.analysis.statistics.recognition import Recognition, named, recognition
+from study_app.analysis.statistics.recognition import Recognition, named_labels, recognition
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value
 
 _NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
@@ -65,7 +65,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             return None, (NotTested(cls.what, f"it needs 2 to {MOST_NAMED} conditions and two names"),)
         ratings = np.stack([answers.values[label] for label in labels], axis=2)
         truth = [None if label is None else labels.index(label) for label in right]
-        tested = recognition(named(ratings), truth, len(labels), seed=answers.intervals)
+        tested = recognition(named_labels(ratings), truth, len(labels), seed=answers.intervals)
         said = answers.verdict(tested.p, tested.smallest_p, primary=answers.decided.binding)
         return RecognitionResult(labels, answers.block.codes, right, tested, said), ()
 

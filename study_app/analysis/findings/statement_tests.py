@@ -21,8 +21,8 @@ from study_app.analysis.findings.finding import (
     BlockAnswers,
     Finding,
     Row,
+    corrected_tests,
     in_family,
-    judged,
     judged_row,
     rows_alone,
     test_row,
@@ -111,7 +111,7 @@ def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     if answers.k < 2:
         return (), (NotTested("test of settings", "the block has only one setting, so there is nothing to compare"),)
     outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
-    return judged(outcomes, answers, f"{answers.block.id}: settings differ"), ()
+    return corrected_tests(outcomes, answers, f"{answers.block.id}: settings differ"), ()
 
 
 def _alike(answers: BlockAnswers, values: Any) -> Outcome:
@@ -209,7 +209,7 @@ class DelayTrend(StatementTests):
                 item: trend(values, answers.decided.direction(item), seed=answers.intervals)
                 for item, values in answers.values.items()
             }
-        return judged(outcomes, answers, f"{answers.block.id}: trend over delay"), ()
+        return corrected_tests(outcomes, answers, f"{answers.block.id}: trend over delay"), ()
 
     def methods(self) -> Iterator[str]:
         if trends := self.value:

@@ -12,7 +12,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.html_page import drawn, paragraph, table, table_of
+from study_app.analysis.html_page import drawn_figure, paragraph, table, table_of
 from study_app.analysis.levels.statistic import (
     INTERVAL,
     KINDS,
@@ -341,7 +341,7 @@ class Answers(LevelStatistic[LevelAnswers]):
                 "answers." + (units if result.own_units else ""),
                 "soft",
             )
-        yield from drawn(self.pictures, f"levels-{result.block}")
+        yield from drawn_figure(self.pictures, f"levels-{result.block}")
         if not result.adaptive:
             for standard in sorted({row.standard for row in self.rows}, key=lambda one: one or 0.0):
                 yield self._of_people(standard)

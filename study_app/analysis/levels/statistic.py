@@ -14,7 +14,7 @@ import pandas as pd
 from study_app.analysis import levels
 from study_app.analysis.data.blocks import LevelBlock, published_words
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.html_page import drawn, heading, paragraph, table_of
+from study_app.analysis.html_page import drawn_figure, heading, paragraph, table_of
 from study_app.analysis.levels.columns import RESULTS
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import LevelsResult
@@ -110,7 +110,7 @@ class LevelStatistic(Generic[R]):
         ]:
             yield paragraph(f"Published: {'; '.join(published)}.")
         for name in self.figures:
-            yield from drawn(self.pictures, f"{name}-{self.found.block}")
+            yield from drawn_figure(self.pictures, f"{name}-{self.found.block}")
 
     def heading(self) -> str:
         """Return the heading of its section in the report."""

@@ -37,7 +37,7 @@ from study_app.analysis.planning.simulated_studies import (
     draw_opinions,
 )
 from study_app.analysis.results import min_sample_reason
-from study_app.analysis.statistics.equivalence import STEPS, fewest
+from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
 from study_app.protocol.model import Contrast
 from study_app.protocol.raters import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
@@ -523,7 +523,7 @@ def smallest_differences(
     within = (
         ""
         if bound is None
-        else f" Equivalence requires at least {fewest(alpha / bounds, bound, largest)} "
+        else f" Equivalence requires at least {fewest_participants(alpha / bounds, bound, largest)} "
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
     )
     yield (
@@ -539,7 +539,7 @@ def smallest_differences(
                 reached = detectable(*groups, tail=strictest / (2 if contrast.expected is None else 1))
                 ends = [written(end * spread) for end in reached]
                 if bound is not None:
-                    enough_people = min(groups) >= fewest(alpha / bounds, bound, largest)
+                    enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
                     share = shown_equal(bound / spread, *groups, alpha=alpha / bounds) if enough_people else 0.0
                     ends.append(f"{share:.0%}")
             yield f"| {name} | {n} | {words} | {' | '.join(ends)} |"

@@ -17,7 +17,7 @@ from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
 from study_app.analysis.planning.simulated_studies import compares_statements
 from study_app.analysis.results import min_sample
-from study_app.analysis.statistics.equivalence import fewest
+from study_app.analysis.statistics.equivalence import fewest_participants
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.analysis.wording import counted, listed, percent, significant
@@ -136,7 +136,7 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
     alpha = decisions(protocol).alphas[-1] / bounds
     return (
         " We test equivalence by two one-sided t tests and the bootstrap, Holm-adjusted across "
-        f"{number_text.counted(bounds, 'bound')}; it requires at least {fewest(alpha, reach, largest)} "
+        f"{number_text.counted(bounds, 'bound')}; it requires at least {fewest_participants(alpha, reach, largest)} "
         f"participants{' in each group' if contrast.groups else ''}."
     )
 

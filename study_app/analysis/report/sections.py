@@ -19,7 +19,7 @@ from study_app.analysis.data.motion import (
 from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.finding import Answer, Finding
-from study_app.analysis.html_page import attempted, bullets, drawn, heading, paragraph, table, table_of
+from study_app.analysis.html_page import bullets, drawn_figure, heading, paragraph, table, table_of, try_part
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_section
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions
@@ -268,7 +268,7 @@ def block(
     held = Failures() if failures is None else failures
     pictures = {picture.name.split("-")[0]: picture for picture in drawn if picture.block == result.id}
     for what, make in _parts(result, results, pictures):
-        yield from attempted(held, what, heading(3, what.capitalize()), make, block=result.id)
+        yield from try_part(held, what, heading(3, what.capitalize()), make, block=result.id)
 
 
 def _parts(
@@ -281,7 +281,7 @@ def _parts(
         yield "missing answers", lambda: [paragraph(incomplete_words(result), "soft")]
     effects, *others = all_findings()
     yield effects.what, effects(result, results, pictures).section
-    yield "figure of answers", lambda: drawn(pictures, result.kind)
+    yield "figure of answers", lambda: drawn_figure(pictures, result.kind)
     for finding in others:
         yield finding.what or finding.figure_title, finding(result, results, pictures).section
     if result.absent:
@@ -361,7 +361,7 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
             continue
         rows = [(group.name, measure.cells(asked[where, result.item], group.numbers)) for group in result.groups]
         yield table(("Answers", *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
-        yield from drawn({picture.name: picture for picture in drawn_}, f"question-{where}-{result.item}")
+        yield from drawn_figure({picture.name: picture for picture in drawn_}, f"question-{where}-{result.item}")
     for level in levels:
         yield from level_section(level, drawn_, study.estimator)
 

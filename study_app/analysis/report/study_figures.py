@@ -13,7 +13,7 @@ from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import LowestDelay
 from study_app.analysis.levels.evaluate import level_results
-from study_app.analysis.page_layout import Drawing, Picture, attempted
+from study_app.analysis.page_layout import Drawing, Picture, try_figures
 from study_app.analysis.questions import question_results
 from study_app.analysis.results import Failures, Results
 from study_app.errors import AnalysisError
@@ -27,7 +27,7 @@ def pictures(
 
     A figure that fails is omitted and added to ``failures``.
     """
-    yield from attempted(_of_blocks(study, results, forms), failures)
+    yield from try_figures(_of_blocks(study, results, forms), failures)
 
 
 def _of_blocks(

@@ -20,13 +20,13 @@ from study_app.analysis.data.blocks import Setting
 from study_app.analysis.data.study_tables import Study, group_counts, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import credit_lines, study_head, table_files
-from study_app.analysis.export.tables import deliver
+from study_app.analysis.export.tables import exported_tables
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.figures.question_figures import question_pictures
 from study_app.analysis.figures.summary_figures import Numbers, numbers_of, summary_pictures
 from study_app.analysis.findings import FINDINGS, all_findings
 from study_app.analysis.findings.finding import TESTS
-from study_app.analysis.html_page import attempted, box, bullets, chunks, font_face, heading, paragraph, render, table
+from study_app.analysis.html_page import box, bullets, chunks, font_face, heading, paragraph, render, table, try_part
 from study_app.analysis.levels.evaluate import level_entries
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions, Proposal, planned_exclusions
@@ -326,7 +326,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     for one in drawn:
         files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
         files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
-    files |= failures.value("exported tables", lambda: table_files(study, deliver(study)), {})
+    files |= failures.value("exported tables", lambda: table_files(study, exported_tables(study)), {})
     page_ = _page(study, results, numbers, drawn, texts, planned, failures).encode()
     return {"report.html": page_, "report.json": document(study, results, texts, failures), **files}, tuple(
         failures.found
@@ -393,9 +393,9 @@ def _page(
         ("Counts of answers", lambda: sections.counts_of_answers(results)),
         ("Questions in full", lambda: appendix(recorded_contents(study.folder))),
     ]
-    first = attempted(failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn)])
+    first = try_part(failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn)])
     made = [
-        (title, attempted(failures, f"section “{title}”", heading(2, title), make), place < shown)
+        (title, try_part(failures, f"section “{title}”", heading(2, title), make), place < shown)
         for place, (title, make) in enumerate(sections_)
     ]
     body = render(

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, resamples_for
-from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked, clopper_pearson
+from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked_values, clopper_pearson
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
 
@@ -95,7 +95,7 @@ def tost(
         raise AnalysisError(
             f"an equivalence bound of {bound} is not meaningful; specify a bound above 0 in points of the scale"
         )
-    array = checked(differences, "participants")
+    array = checked_values(differences, "participants")
     kept = np.sort(array[~np.isnan(array)])
     equivalence = _compared(tuple(kept.tolist()), float(bound), alpha, seed, largest)
     return replace(equivalence, dropped=len(array) - len(kept))
@@ -111,7 +111,7 @@ def p_equivalent(means: Means, bound: float, n: int, largest: float | None) -> A
     return np.asarray(np.maximum(np.max(ps, axis=0), p_unseen(n, bound, largest)))
 
 
-def minority(bound: float, largest: float | None) -> float:
+def smallest_minority(bound: float, largest: float | None) -> float:
     """Return the share of people that shifts the mean by the bound if they differ by ``largest``; at most `_UNSEEN`.
 
     With None, differences are unlimited, so that no number of participants excludes the smallest minorities.
@@ -120,13 +120,13 @@ def minority(bound: float, largest: float | None) -> float:
 
 
 def p_unseen(n: int, bound: float, largest: float | None = STEPS) -> float:
-    """Return the probability that a sample of ``n`` participants contains no member of such a `minority`."""
-    return float((1 - minority(bound, largest)) ** n)
+    """Return the probability that a sample of ``n`` participants contains no member of such a `smallest_minority`."""
+    return float((1 - smallest_minority(bound, largest)) ** n)
 
 
-def fewest(alpha: float, bound: float, largest: float | None = STEPS) -> int:
+def fewest_participants(alpha: float, bound: float, largest: float | None = STEPS) -> int:
     """Return the minimum number of participants for which equivalence can be shown."""
-    return math.ceil(math.log(alpha) / math.log1p(-minority(bound, largest)) - 1e-9)
+    return math.ceil(math.log(alpha) / math.log1p(-smallest_minority(bound, largest)) - 1e-9)
 
 
 @lru_cache(maxsize=4096)
@@ -167,7 +167,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
         agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
         equivalence = replace(equivalence, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
     verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
-    few = f"too few participants to call it equivalent: {fewest(alpha, bound, largest)} are needed"
+    few = f"too few participants to call it equivalent: {fewest_participants(alpha, bound, largest)} are needed"
     note = "" if verdict == "equivalent" else few if by_tests else "equivalence is not shown"
     return replace(
         equivalence,

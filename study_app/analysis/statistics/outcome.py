@@ -74,7 +74,7 @@ class Outcome:
     note: str = ""
 
 
-def checked(values: ArrayLike, axes: str) -> Array:
+def checked_values(values: ArrayLike, axes: str) -> Array:
     """Return ``values`` as floats, with NaN for missing answers; ``axes`` names them ("participants, settings")."""
     array = np.asarray(values, dtype=np.float64)
     wanted = axes.count(",") + 1
@@ -85,9 +85,9 @@ def checked(values: ArrayLike, axes: str) -> Array:
     return array
 
 
-def complete(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]:
+def complete_rows(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array, int]:
     """Return the participants (rows) with answers in all settings (columns), and the number of others."""
-    array = checked(values, "participants, settings")
+    array = checked_values(values, "participants, settings")
     if array.shape[1] < at_least:
         raise AnalysisError(f"{array.shape[1]} settings: at least {at_least} are needed{why}")
     whole = ~np.isnan(array).any(axis=1)
@@ -247,7 +247,7 @@ class Lattice:
         return float(np.average(self.start + np.arange(len(self.probabilities)), weights=self.probabilities))
 
 
-def total(parts: Iterable[Lattice]) -> Lattice:
+def sum_distribution(parts: Iterable[Lattice]) -> Lattice:
     """Return the distribution of the sum of independent ``parts``; an empty sum is 0."""
     return reduce(Lattice.plus, parts, Lattice(0, np.ones(1)))
 

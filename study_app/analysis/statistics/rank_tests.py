@@ -28,8 +28,8 @@ from study_app.analysis.statistics.outcome import (
     Lattice,
     Outcome,
     Whole,
-    checked,
-    complete,
+    checked_values,
+    complete_rows,
     doubled_ranks,
     drawn_p,
 )
@@ -63,7 +63,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
 
     Pairs with NaN, a missing answer, are also dropped. The note says if too few pairs remain to reach p of ``alpha``.
     """
-    first, second = checked(x, "participants"), checked(y, "participants")
+    first, second = checked_values(x, "participants"), checked_values(y, "participants")
     if len(first) != len(second):
         raise AnalysisError(
             f"{len(first)} and {len(second)} answers are not pairs; specify one of each per participant"
@@ -71,7 +71,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
     both = first - second
     differences = both[~np.isnan(both)]
     n, dropped = len(differences), int(np.isnan(both).sum())
-    ranks, signs = signed(differences)
+    ranks, signs = signed_ranks(differences)
     v = int(ranks[signs > 0].sum())
     all_ranks = int(ranks.sum())
     effect = (2 * v - all_ranks) / all_ranks if len(ranks) else None
@@ -97,7 +97,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
     )
 
 
-def signed(differences: Array) -> tuple[Whole, Array]:
+def signed_ranks(differences: Array) -> tuple[Whole, Array]:
     """Return the (doubled) ranks and the signs of the differences that are not 0."""
     kept = differences[differences != 0.0]
     # Differences of decimals that should tie differ in the last bit: 0.3 - 0.1 and 0.2.
@@ -199,7 +199,9 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
 
     ``draws`` and ``seed`` are for random permutations, if the exact distribution would take too long.
     """
-    rows, dropped = complete(values, at_least=3, why=" for Friedman's test; compare two by the signed ranks of pairs")
+    rows, dropped = complete_rows(
+        values, at_least=3, why=" for Friedman's test; compare two by the signed ranks of pairs"
+    )
     n, k = rows.shape
     ranks = doubled_ranks(rows)
     spread = _tied_spread(ranks)
@@ -346,7 +348,7 @@ def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) 
     A row of a participant and statement with NaN, a missing answer, is dropped. ``draws`` and ``seed`` are for random
     permutations, if a full enumeration is impossible.
     """
-    array = checked(values, "items, participants, settings")
+    array = checked_values(values, "items, participants, settings")
     k = array.shape[2]
     if k < 2:
         raise AnalysisError(f"{k} settings: at least 2 are needed for a test of settings")

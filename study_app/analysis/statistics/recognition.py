@@ -26,11 +26,11 @@ from study_app.analysis.statistics.outcome import (
     Lattice,
     Outcome,
     Whole,
-    checked,
+    checked_values,
     clopper_pearson,
     holm,
     of_values,
-    total,
+    sum_distribution,
 )
 from study_app.errors import AnalysisError
 
@@ -91,13 +91,13 @@ class Recognition(Outcome):
     unanswered: int
 
 
-def named(ratings: ArrayLike) -> Whole:
+def named_labels(ratings: ArrayLike) -> Whole:
     """Return the index of the label that each participant named for each setting (participants, settings).
 
     ``ratings`` (participants, settings, labels) are agreement with "this liquid behaves like <label>". ``UNDECIDED`` if
     several are highest, ``UNANSWERED`` if a rating is missing.
     """
-    array = checked(ratings, "participants, settings, labels")
+    array = checked_values(ratings, "participants, settings, labels")
     missing = np.isnan(array).any(axis=2)
     filled = np.where(np.isnan(array), -np.inf, array)
     tied = (filled == filled.max(axis=2, keepdims=True)).sum(axis=2) > 1
@@ -107,14 +107,14 @@ def named(ratings: ArrayLike) -> Whole:
 def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, seed: int | None = 1) -> Recognition:
     """Test whether settings were named correctly more often than by chance.
 
-    ``names`` (participants, settings) are from `named`, ``truth`` is the index of the correct label for each setting,
-    None if there is none; ``seed`` is for the bootstrap interval of kappa, which needs two participants.
+    ``names`` (participants, settings) are from `named_labels`, ``truth`` is the index of the correct label for each
+    setting, None if there is none; ``seed`` is for the bootstrap interval of kappa, which needs two participants.
     """
     given = _names(names, truth, labels)
     used = (given != UNANSWERED).any(axis=1)
     right = np.array([UNANSWERED - 1 if label is None else label for label in truth])
     hits = int((given == right).sum())
-    chance = total(_chance(tuple(row), tuple(right.tolist())) for row in given.tolist())
+    chance = sum_distribution(_chance(tuple(row), tuple(right.tolist())) for row in given.tolist())
     effect, interval, reason = _kappa(given, right, labels, seed)
     n = int(used.sum())
     return Recognition(
@@ -141,7 +141,7 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
 
 
 def _names(names: ArrayLike, truth: Sequence[int | None], labels: int) -> Whole:
-    given = checked(names, "participants, settings")
+    given = checked_values(names, "participants, settings")
     if given.shape[1] != len(truth) or not 2 <= len(truth) <= MOST:
         raise AnalysisError(
             f"{given.shape[1]} settings with names, {len(truth)} true names; specify the same number of each, 2 to "

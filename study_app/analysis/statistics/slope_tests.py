@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import f as variance_ratio
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.outcome import FEW, NO_VARIATION, Array, Interval, Outcome, complete
+from study_app.analysis.statistics.outcome import FEW, NO_VARIATION, Array, Interval, Outcome, complete_rows
 from study_app.analysis.statistics.trend import Direction
 from study_app.errors import AnalysisError
 
@@ -52,7 +52,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     direction : "increasing" | "decreasing", optional
         Direction of a single slope that was stated in advance; the test is then one-sided.
     """
-    rows, dropped = complete(values, at_least=2, why=" for a test of means")
+    rows, dropped = complete_rows(values, at_least=2, why=" for a test of means")
     design = _design(rows.shape[1], columns)
     n, several = len(rows), design.shape[1]
     test = SlopeTest(

@@ -20,7 +20,7 @@ from scipy.optimize import brentq
 from scipy.special import xlogy
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked
+from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked_values
 from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, tables
 
 _NOTICED_FROM: Final = 5.0
@@ -84,7 +84,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
     Another test decides whether noticing increases with the level; if it does not, the curve is meaningless.
     """
     array = np.asarray(values, float)
-    array = checked(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")
+    array = checked_values(array[..., None] if array.ndim == 2 else array, "participants, levels, presentations")
     there, presented = ~np.isnan(array), np.asarray(levels, float)
     used = there.any(axis=(1, 2))
     order = np.unique(presented[there.any(axis=(0, 2))])

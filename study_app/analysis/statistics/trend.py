@@ -25,10 +25,10 @@ from study_app.analysis.statistics.outcome import (
     Outcome,
     Whole,
     bootstrap,
-    checked,
-    complete,
+    checked_values,
+    complete_rows,
     doubled_ranks,
-    total,
+    sum_distribution,
 )
 from study_app.analysis.statistics.rank_tests import Alternative, signed_p
 from study_app.analysis.wording import p_value
@@ -84,7 +84,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
     Participants with NaN, a missing answer, are dropped. ``direction`` None means two-sided. ``seed`` is for the
     bootstrap interval of the effect, from ten participants upwards; None: no interval.
     """
-    rows, dropped = complete(values, at_least=2, why=" for a trend")
+    rows, dropped = complete_rows(values, at_least=2, why=" for a trend")
     ranks = doubled_ranks(rows if direction != "decreasing" else -rows)
     n, k = ranks.shape
     scores = ranks @ np.arange(1, k + 1)
@@ -133,12 +133,12 @@ def step_down(
     order of ``delays_ms``, which ascend from the control. Participants with any missing answer are dropped from all
     steps.
     """
-    array = checked(values, "participants, delays")
+    array = checked_values(values, "participants, delays")
     if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):
         raise AnalysisError(
             f"delays {list(delays_ms)} ms must be {array.shape[1]} increasing values, one for each column of answers"
         )
-    rows, dropped = complete(array, at_least=2, why=" for a trend")
+    rows, dropped = complete_rows(array, at_least=2, why=" for a trend")
     steps: list[Step] = []
     lowest: float | None = None
     for last in range(len(delays_ms), 1, -1):
@@ -175,7 +175,7 @@ def _page(ranks: Whole, found: int) -> float:
 @lru_cache(maxsize=256)
 def _sums(patterns: tuple[tuple[int, ...], ...]) -> Lattice:
     """Return the distribution of the sum of all participants' scores."""
-    return total(_scores(pattern) for pattern in patterns)
+    return sum_distribution(_scores(pattern) for pattern in patterns)
 
 
 @lru_cache(maxsize=1024)

@@ -24,7 +24,7 @@ from study_app.app.failures import PAINTING, ThreadExceptions, UncaughtException
 from study_app.app.timing import FrameBudget, ThreadPriority, freeze_garbage, unfreeze_garbage
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
-from study_app.discovery import explained
+from study_app.discovery import explain_error
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
 from study_app.gui.display.screens import Frames, has_graphics_card, place_window
 from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
@@ -311,7 +311,7 @@ class SessionBridge(QObject):
         """Send zero force, then report the failure to the journal, if it still accepts lines, and to the operator."""
         self.parts.servo.stop_force()
         first = not self.trouble
-        raised, error = error, explained(error)
+        raised, error = error, explain_error(error)
         what = str(error) if isinstance(error, StudyError) else f"{type(error).__name__}: {error}"
         if not first:
             return

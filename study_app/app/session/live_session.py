@@ -25,7 +25,7 @@ from study_app.app.timing import collecting_in_this_thread, unfreeze_garbage
 from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.registry import descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
-from study_app.discovery import explained
+from study_app.discovery import explain_error
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import choose_screens, place_window
@@ -218,7 +218,7 @@ class LiveSession(QObject):
         try:
             step()
         except Exception as raised:  # noqa: BLE001 - reported; open parts must be closed in order
-            error = explained(raised)
+            error = explain_error(raised)
             if isinstance(error, StudyError):
                 self.error = error
             else:

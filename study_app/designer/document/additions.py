@@ -10,6 +10,7 @@ from study_app.designer.document.fields import (
     LETTER,
     Row,
     check_id,
+    distinguishing_key,
     element_noun,
     initial_value,
     label_of,
@@ -19,7 +20,6 @@ from study_app.designer.document.fields import (
     rows,
     sections_at,
     table_of,
-    tags,
     violated_bound,
 )
 from study_app.designer.document.study import Study
@@ -40,7 +40,7 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
     Keys that both kinds have keep their values, others are removed; keys that the new kind requires get an initial
     value.
     """
-    key, named = tags(node_at(study.document, path))
+    key, named = distinguishing_key(node_at(study.document, path))
     if not key or kind not in named:
         raise Refused(f"there is no kind {kind!r} here: {', '.join(map(str, named))}")
     node = table_of((named[kind],), {})

@@ -334,9 +334,9 @@ class Document:
 
     def standing(self, known: tuple[Run, ...]) -> Standing:
         if not any(run.sessions for run in known):
-            return standing("", "", self.version, known)
+            return version_standing("", "", self.version, known)
         base = content_hash(with_liquid_files(self.saved.encode(), self.study.folder)) if self.base else ""
-        return standing(content_hash(self.source()), base, self.version, known)
+        return version_standing(content_hash(self.source()), base, self.version, known)
 
     def save(self, known: tuple[Run, ...]) -> None:
         """Write the file, and store the content for sessions.
@@ -429,7 +429,7 @@ class Standing:
     others: int = 0  # sessions that were run with the study's own version and another content
 
 
-def standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
+def version_standing(hash_: str, base: str, version: str, known: Iterable[Run]) -> Standing:
     """Return how a study's content relates to the versions that were run; pilots and rehearsals are ignored.
 
     ``hash_`` and ``base`` are the ``protocol_hash`` of the edited study and of the file from which it is edited, "" for

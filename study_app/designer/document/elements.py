@@ -9,6 +9,7 @@ from typing import Any, Final
 from study_app.designer.document.fields import (
     ITEMS,
     Row,
+    all_references,
     counted_elements,
     element_noun,
     label_of,
@@ -17,7 +18,6 @@ from study_app.designer.document.fields import (
     refused_at,
     row_at,
     rows,
-    uses,
 )
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
@@ -243,9 +243,9 @@ def usage_text(document: Mapping[str, Any], path: Path) -> str:
     """
     if len(path) != 2 or path[0] not in _USED:
         return ""
-    users = {(place[:4] if place[2:3] == (ITEMS,) else place[:2]) for place, used in uses(document) if used == path} - {
-        path
-    }
+    users = {
+        (place[:4] if place[2:3] == (ITEMS,) else place[:2]) for place, used in all_references(document) if used == path
+    } - {path}
     counts = Counter(user[-2] for user in users)
     using = (
         counted(count, "step") if section == "sequence" else counted_elements(count, section)

@@ -227,7 +227,7 @@ def named_places(document: Document) -> Iterator[tuple[Path, Path]]:
                     yield place, path
 
 
-def uses(document: Document) -> Iterator[tuple[Path, Path]]:
+def all_references(document: Document) -> Iterator[tuple[Path, Path]]:
     """Yield every reference, and each omitted key with the only table to which it can refer."""
     yield from named_places(document)
     for section, key in _MAY_LEAVE_OUT:
@@ -246,8 +246,8 @@ def orphaned_keys(document: Document, things: Iterable[Path]) -> tuple[Path, ...
 
 
 def _uses_without_conditions(document: Document) -> Iterator[tuple[Path, Path]]:
-    """Yield the same as `uses`, with the meaning of omitted keys in a study without conditions."""
-    yield from uses(document)
+    """Yield the same as `all_references`, with the meaning of omitted keys in a study without conditions."""
+    yield from all_references(document)
     if "conditions" in document:
         yield from _implied_uses(document, "stimuli", "condition", "liquids")
 
@@ -309,7 +309,7 @@ def table_of(nodes: tuple[_Node, ...], value: Any) -> _Node | None:
     return next(iter(arrays if isinstance(value, tuple) and arrays else several), None)
 
 
-def tags(nodes: tuple[_Node, ...]) -> tuple[str, dict[str | None, _Node]]:
+def distinguishing_key(nodes: tuple[_Node, ...]) -> tuple[str, dict[str | None, _Node]]:
     """Return the key that distinguishes the tables, and the table of each of its values; None: the key is omitted."""
     tables = [node for node in nodes if node.get("type") == "object" and "properties" in node]
     if len(tables) < 2:
@@ -339,7 +339,7 @@ def _with_union_keys(around: _Node, node: _Node) -> _Node:
 
 
 def _is_of(node: _Node, tables: list[_Node], value: Mapping[str, Any]) -> bool:
-    key, named = tags(tuple(tables))
+    key, named = distinguishing_key(tuple(tables))
     if not key:
         return True
     default = next(
@@ -538,7 +538,7 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
         return tuple(row for index in range(length) for row in (row_at(document, (*path, index)),) if row)
     properties = node.get("properties", {})
     written = tuple(value) if isinstance(value, Mapping) else ()
-    keys = list(dict.fromkeys((*filter(None, [tags(nodes)[0]]), *properties, *written)))
+    keys = list(dict.fromkeys((*filter(None, [distinguishing_key(nodes)[0]]), *properties, *written)))
     found_rows = (row_at(document, (*path, key)) for key in keys)
     return tuple(row for row in found_rows if row is not None)
 
@@ -565,7 +565,7 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     around = table_of(siblings, value_at(document, path[:-1]))
     if around is None:
         return None
-    key, named = tags(siblings)
+    key, named = distinguishing_key(siblings)
     if key and key == path[-1]:
         options = tuple(
             Choice(tag, (" ".join(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0].split())))
@@ -605,7 +605,7 @@ def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...],
     }
     if is_localised(nodes):
         return Row(path=path, kind="paragraphs" if first.get("lines") == "several" else "localised", **common)
-    if len(nodes) > 1 and not tags(nodes)[0]:
+    if len(nodes) > 1 and not distinguishing_key(nodes)[0]:
         either = tuple(_make_row(document, path, (node,), value, required=required) for node in nodes)
         return Row(path=path, kind="either", **common, either=either)
     named = (*path, 0) if first.get("type") == "array" else path

@@ -16,7 +16,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, enter, leave, outlasted
+from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, closed_during_call, enter, leave
 from study_app.devices.falcon import constants, mechanics, replies
 from study_app.devices.falcon.bulk import BULK, BulkCalls
 from study_app.haptics.kernels import c_functions
@@ -251,7 +251,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     answer = c_functions.READ_LOST
     if enter(falcon):
         answer = _take_reply(falcon, context, now_ns, c_functions.reading_at(reading))
-        if outlasted(falcon):
+        if closed_during_call(falcon):
             finish(falcon, context)
         leave(falcon)
     return answer
@@ -262,7 +262,7 @@ def _write(context: int, command: int) -> int:
     answer = c_functions.READ_LOST
     if enter(falcon):
         answer = _send_force(falcon, context, asked.force_n)
-        if outlasted(falcon):
+        if closed_during_call(falcon):
             finish(falcon, context)
         leave(falcon)
     copy(falcon.sent_n, asked.sent_n)

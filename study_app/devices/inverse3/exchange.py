@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numba import types
 
-from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, enter, leave, outlasted
+from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, closed_during_call, enter, leave
 from study_app.devices.inverse3 import wire
 from study_app.haptics.kernels import c_functions
 from study_app.haptics.kernels.compiled import kernel
@@ -111,7 +111,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     answer = c_functions.READ_LOST
     if enter(device):
         answer = _take_replies(device, context, now_ns, c_functions.reading_at(reading))
-        if outlasted(device):
+        if closed_during_call(device):
             finish(device, context)
         leave(device)
     return answer
@@ -122,7 +122,7 @@ def _write(context: int, command: int) -> int:
     answer = c_functions.READ_LOST
     if enter(device):
         answer = _send_force(device, context, asked.force_n)
-        if outlasted(device):
+        if closed_during_call(device):
             finish(device, context)
         leave(device)
     copy(device.sent_n, asked.sent_n)

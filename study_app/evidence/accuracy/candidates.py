@@ -334,7 +334,7 @@ def drag_and_wake(scene: Scene) -> Scene:
     return _with_only(scene, liquid.model_copy(update={"effects": effects}))
 
 
-def numerical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
+def numerical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     """Return implementations of the same definition, or of parts of it, and the one that the program uses.
 
     ``scene`` has one liquid, as returned by `drag_and_wake`. Without a wake, the candidates for the wake are omitted.
@@ -377,7 +377,7 @@ def _lists(exact: Scene) -> list[Candidate]:
     return candidates
 
 
-def physical(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
+def physical_candidates(scene: Scene) -> tuple[tuple[Candidate, ...], Candidate]:
     """Return models of a viscous liquid in order of accuracy, and the one that the program would select."""
     exact = with_given_velocity(_with_only(scene, scene.liquids[0]))
     candidates: list[Candidate] = [_LinearViscosity("linear viscosity", "linear viscosity", "law", exact)]

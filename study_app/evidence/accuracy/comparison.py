@@ -114,8 +114,8 @@ def accuracy(
     found: list[Truth] = []
     if numerical is not None:
         scene = models.drag_and_wake(numerical)
-        candidates, choice = models.numerical(scene)
-        truth = truths.definition(with_given_velocity(scene), motion)
+        candidates, choice = models.numerical_candidates(scene)
+        truth = truths.definition_truth(with_given_velocity(scene), motion)
         if not truth.cases[0].force_n.any():
             raise StudyError(
                 f"along {named} {scene.liquids[0].id} exerts no force: there is no share of it to be wrong by"
@@ -123,7 +123,7 @@ def accuracy(
         measured += _rows("numerical", scene, candidates, choice, (truth,), progress)
         found.append(truth)
     if physical is not None:
-        candidates, choice = models.physical(physical)
+        candidates, choice = models.physical_candidates(physical)
         real = _physical_truths(candidates[0].scene, said)
         measured += _rows("physical", physical, candidates, choice, real, progress)
         found += real
@@ -137,14 +137,14 @@ def accuracy(
 
 
 def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:
-    measured = truths.steady(scene)
+    measured = truths.steady_truth(scene)
     if measured is None:
         notes.append("steady drag: no experiment is known at Reynolds numbers so low")
     solved = solver_truths(scene)
     if not solved:
         notes.append(f"fluid solver: no table is stored for {scene.liquids[0].id} and this ball")
     steady = () if measured is None else (measured,)
-    return (*steady, truths.oscillation(scene), truths.start(scene), *solved)
+    return (*steady, truths.oscillation_truth(scene), truths.starting_truth(scene), *solved)
 
 
 def _rows(

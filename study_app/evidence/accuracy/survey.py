@@ -87,18 +87,18 @@ def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda
 
 
 def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
-    models, model = candidates.physical(scene)
+    models, model = candidates.physical_candidates(scene)
     alone = models[0].scene
 
     def share(truth: truths.Truth) -> float:
         return error_of(model.forces_against(truth), truth).rms
 
-    steady, solved = truths.steady(alone), solver_truths(alone)
+    steady, solved = truths.steady_truth(alone), solver_truths(alone)
     mps_per_reynolds = viscosity_pa_s / (liquid.density_kg_m3 * scene.body.diameter_m)
     motions = [case.motion for it in solved for case in it.cases]
     speeds = [float(np.abs(it.velocity_mps).max()) for it in motions if it.velocity_mps is not None]
     speed_mps = scene.motion_in(liquid).speed_mps or math.nan
-    creeping = max(share(truths.oscillation(alone)), share(truths.start(alone)))
+    creeping = max(share(truths.oscillation_truth(alone)), share(truths.starting_truth(alone)))
     return Surveyed(
         liquid=name,
         speed_mps=speed_mps,
@@ -114,7 +114,7 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
     )
 
 
-def spread(reynolds: float) -> float:
+def law_spread(reynolds: float) -> float:
     """Return the greatest difference between published laws of steady drag, relative to their mean."""
     ratios = [law(reynolds) for law in PUBLISHED.values()]
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
@@ -135,7 +135,7 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
             _percent(it.steady),
             _percent(it.solver) + (f" (Re {_range(least, greatest)})" if it.solver is not None else ""),
             f"{checked_mps:.2g} m/s" if it.model == "unsteady drag" else "–",
-            _percent(spread(it.reynolds)),
+            _percent(law_spread(it.reynolds)),
             _percent(it.expected.causes.law),
             _percent(it.expected.error_share),
             f"{it.expected.cost_ns:.0f}",
@@ -145,7 +145,7 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
     for reynolds in _REYNOLDS:
         drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
         values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds))]
-        laws.append((f"{reynolds:,g}", *values, _percent(spread(reynolds))))
+        laws.append((f"{reynolds:,g}", *values, _percent(law_spread(reynolds))))
     tables = (
         Table(_HEADINGS, liquids, left=(0, 2)),
         Table(("Re", *PUBLISHED, "unsteady drag", "experiments", "spread"), laws),

@@ -59,7 +59,7 @@ def false_claims() -> Iterator[DrawnStudies]:
     yield from _trends()
 
 
-def powers() -> Iterator[DrawnStudies]:
+def true_claims() -> Iterator[DrawnStudies]:
     """Yield studies in which the claim is true."""
     yield DrawnStudies(
         name="thresholds of two blocks, 1.5 : 1, 3-down-1-up, 60 trials",

@@ -39,7 +39,7 @@ from study_app.analysis.report.sections import answers as answered
 from study_app.analysis.results import BlockResult, Failures, Results
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import noticed
-from study_app.evidence.report_rates.hypotheses import false_claims, powers
+from study_app.evidence.report_rates.hypotheses import false_claims, true_claims
 from study_app.evidence.table import Evidence, Table
 from study_app.protocol.raters import REHEARSED
 
@@ -63,7 +63,7 @@ TRUTH: Final = 4000
 """The true differences of means are those of so many simulated people."""
 
 
-def alike(block: Block, extent: _Extent) -> Mapping[int, int]:
+def equal_settings(block: Block, extent: _Extent) -> Mapping[int, int]:
     """Return, for each condition that is truly equal to an earlier one, the index of that one."""
     k = len(block.settings)
     if extent in _NO_EFFECT:
@@ -73,7 +73,7 @@ def alike(block: Block, extent: _Extent) -> Mapping[int, int]:
     return dict.fromkeys(range(1, k // 2 + 1), 0) if block.kind == "delays" else {k - 1: 0}
 
 
-def answers(
+def simulate_answers(
     simulation: Plan, generator: Generator, extent: _Extent, participants: int, seed: int, study: int
 ) -> tuple[Array, ...]:
     """Return the answers (participants, settings, items) of one simulated study, block by block."""
@@ -96,7 +96,7 @@ def _opined(block: Block, opinions: Opinions, extent: _Extent, rng: np.random.Ge
     if extent == "own trends":
         own = _own(block, (len(thought), *thought.shape[2:]), rng)
         return replace(opinions, thought=thought.mean(axis=2, keepdims=True) + own[:, None]).answers(1.0, PEOPLE)
-    for place, other in alike(block, extent).items():
+    for place, other in equal_settings(block, extent).items():
         thought[:, :, place] = thought[:, :, other]
     return replace(opinions, thought=thought).answers(1.0, PEOPLE)
 
@@ -109,7 +109,7 @@ def _probit(
         latent = leaning[:, None, None] + _own(block, (len(leaning), *effects.shape), rng)
         latent += rng.normal(size=latent.shape)
         return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
-    for place, other in alike(block, extent).items():
+    for place, other in equal_settings(block, extent).items():
         effects[place] = effects[other]
     latent = leaning[:, None, None] + slope[:, None, None] * effects + rng.normal(size=(len(leaning), *effects.shape))
     return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
@@ -143,9 +143,11 @@ def _effects(simulation: Plan, block: Block) -> Array:
 def _true_differences(simulation: Plan, generator: Generator, extent: _Extent) -> tuple[Array, ...]:
     """Return the true mean differences from the first condition (settings, items), block by block."""
     differences = []
-    for block, given in zip(simulation.blocks, answers(simulation, generator, extent, TRUTH, 0, 0), strict=True):
+    for block, given in zip(
+        simulation.blocks, simulate_answers(simulation, generator, extent, TRUTH, 0, 0), strict=True
+    ):
         means = given.mean(axis=0)
-        for place, other in alike(block, extent).items():
+        for place, other in equal_settings(block, extent).items():
             means[place] = means[other]
         differences.append(np.asarray(means - means[0]))
     return tuple(differences)
@@ -287,7 +289,7 @@ class Cell:
         return f"{self.generator}, {self.extent}{looks}"
 
 
-def truth(simulation: Plan, cell: Cell) -> _Truth:
+def true_effects(simulation: Plan, cell: Cell) -> _Truth:
     """Return the true effects in the studies of a cell, which do not depend on their size."""
     return _true_differences(simulation, cell.generator, cell.extent)
 
@@ -306,7 +308,7 @@ def count_studies(simulation: Plan, cell: Cell, truth: _Truth, seed: int, batch:
 
 def _study(simulation: Plan, cell: Cell, truth: _Truth, seed: int, study: int) -> dict[Event, bool]:
     failures = Failures()
-    given = answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
+    given = simulate_answers(simulation, cell.generator, cell.extent, cell.participants, seed, study)
     if cell.looks:
         planned = replace(simulation.decided, looks=cell.looks, spending=cell.spending)
         seen = (
@@ -395,7 +397,7 @@ def _recognised(result: BlockResult) -> bool:
 
 def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
     """Return the pairs of codes whose conditions are truly equal."""
-    like = alike(block, extent)
+    like = equal_settings(block, extent)
     codes = block.codes
     return {
         (first, second)
@@ -407,7 +409,7 @@ def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
 
 def _in_delays(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
-    null = [block.settings[at].delay_ms or 0.0 for at in alike(block, cell.extent)]
+    null = [block.settings[at].delay_ms or 0.0 for at in equal_settings(block, cell.extent)]
     if cell.extent in _NO_EFFECT:
         yield ("trend in a statement", "at most 5 %"), any(test.verdict in FOUND for test in DelayTrend.of(result))
         yield ("detection threshold printed", "at most 5 %"), _printed(result)
@@ -494,7 +496,7 @@ def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
         tests[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
     for claim in false_claims():
         tests[claim.name, claim.participants] = ("at most 5 %", claim.claim, claim.trial)
-    for power in powers():
+    for power in true_claims():
         tests[power.name, power.participants] = ("counted", power.claim, power.trial)
     return tests
 
@@ -606,7 +608,7 @@ def _cell_counts(simulation: Plan, sizes: Sequence[int]) -> Mapping[_Key, _Count
     """Return the function that counts the rates of each cell."""
     every = cells(sizes)
     kinds = {(cell.generator, cell.extent): cell for cell in every}
-    truths = {kind: truth(simulation, cell) for kind, cell in kinds.items()}
+    truths = {kind: true_effects(simulation, cell) for kind, cell in kinds.items()}
     return {
         **{
             (cell.name, cell.participants): partial(

@@ -8,7 +8,7 @@ from PySide6.QtGui import QCloseEvent, QColor, QGuiApplication, QKeySequence, QP
 from PySide6.QtWidgets import QDialog, QMainWindow, QSizePolicy, QStackedWidget, QWidget
 from shiboken6 import isValid
 
-from study_app.discovery import explained
+from study_app.discovery import explain_error
 from study_app.errors import StudyError
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.icons import draw_icon
@@ -165,7 +165,7 @@ _NARROW_BELOW = 1680
 
 def bug_sentence(error: BaseException) -> str:
     """Return the sentence about a bug of the program or a plug-in."""
-    if isinstance(said := explained(error), StudyError):
+    if isinstance(said := explain_error(error), StudyError):
         return f"{said}."
     return f"{type(error).__name__}: {error}. This is a bug: please report it with the output in the terminal."
 

@@ -88,7 +88,7 @@ class Branches:
     second: tuple[Floats, Floats]
 
 
-def read(path: Path) -> Measured | FlowCurve:
+def read_measurement(path: Path) -> Measured | FlowCurve:
     """Read a table (`text_tables`) with one of the headers in `_HEADER`, in any column order; ignore other columns.
 
     Lines that begin with # are ignored. A motion given by its velocity along a line is along x, with integrated

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.export.tables import wide
+from study_app.analysis.export.tables import wide_table
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.protocol.simulated import TrialFeatures
@@ -120,7 +120,7 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     assert {group.name: group.numbers["n"] for group in found.groups} == n
     score = next(one for one in results.scores if one.where == "load")
     assert {group.name: group.numbers["n"] for group in score.groups} == n
-    table, _ = wide(study)
+    table, _ = wide_table(study)
     rows = study.answered.query("form == 'load' and item == 'effort'").set_index("participant")
     codes = ["0", "stir", "again"]
     for code in codes:
@@ -159,7 +159,7 @@ def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path:
     counts = Counter(rows["after_block"].fillna("0"))
     assert counts["0"] == counts["stir"] + counts["again"] == PEOPLE
     assert min(counts["stir"], counts["again"]) > 0
-    table, _ = wide(study)
+    table, _ = wide_table(study)
     assert {code: table.frame[f"load__effort__{code}"].count() for code in counts} == counts
     found = next(one for one in evaluate(study).questions if (one.where, one.item) == ("load", "effort"))
     words = {"0": "At the start", "stir": "After Stir", "again": "After Again"}

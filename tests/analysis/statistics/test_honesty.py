@@ -14,7 +14,7 @@ from scipy.stats import binom
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
-from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named, recognition
+from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named_labels, recognition
 from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.analysis.statistics.trend import step_down, trend
@@ -45,7 +45,7 @@ TESTS: dict[str, Callable[[np.ndarray], Outcome]] = {
     "step down": lambda values: step_down(values, (0, 100, 200)).steps[0].trend,
     "tost": lambda values: tost(values[:, 2] - values[:, 0], 1.0),
     "threshold": lambda values: noticed(values, (0, 100, 200)),
-    "recognition": lambda values: recognition(named(np.stack([values, values[:, ::-1]], axis=1)), [0, 2], 3),
+    "recognition": lambda values: recognition(named_labels(np.stack([values, values[:, ::-1]], axis=1)), [0, 2], 3),
     "means": slope_test,
     "slope": lambda values: slope_test(values, [[0.0], [1.0], [2.0]], "increasing"),
 }
@@ -99,7 +99,7 @@ def matching(hits: list[int]) -> Recognition:
 
 def test_the_name_is_the_single_highest_rating() -> None:
     ratings = [[[7, 1, 2], [3, 3, 4], [1, 6, 5]], [[4, 4, 4], [5, 5, 1], [1, np.nan, 7]]]
-    assert named(ratings).tolist() == [[0, 2, 1], [UNDECIDED, UNDECIDED, UNANSWERED]]
+    assert named_labels(ratings).tolist() == [[0, 2, 1], [UNDECIDED, UNDECIDED, UNANSWERED]]
 
 
 @pytest.mark.parametrize(("n", "fewest", "binomial"), CRITICAL)

@@ -105,8 +105,8 @@ def of_pairs() -> Iterator[str]:
     yield from results(outcome.false_discovery, {str(ps): (ps,) for ps in (*PS, (1.2,))})
     tables = {"2": [[5, 1], [2, 7]], "0": [[0, 0], [0, 0]], "3": [[3, 0, 1], [0, 4, 0], [2, 0, 5]]}
     yield from results(recognition.kappa, tables)
-    yield from results(recognition.named, named_(1, 3))
-    names = {name: (recognition.named(one), (0, 1, None)) for name, one in named_(2, 3).items()}
+    yield from results(recognition.named_labels, named_(1, 3))
+    names = {name: (recognition.named_labels(one), (0, 1, None)) for name, one in named_(2, 3).items()}
     yield from results(recognition.recognition, names, labels=4)
     yield from results(outcome.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
     yield from results(thresholds.group_mean, {
@@ -124,7 +124,7 @@ def of_equivalence() -> Iterator[str]:
     for bound, alpha in ((1.0, 0.05), (0.5, 0.05), (3.0, 0.2)):
         yield from results(equivalence.tost, cases, bound, alpha=alpha)
     limits = {f"{alpha} {bound}": (alpha, bound) for alpha in (0.2, 0.05, 0.01) for bound in (0.5, 1.0, 3.0)}
-    yield from results(equivalence.fewest, limits)
+    yield from results(equivalence.fewest_participants, limits)
     yield from results(mean_tests.resamples_for, {str(alpha): alpha for alpha in (0.2, 0.05, 0.01, 0.001, 1e-5)})
     rows = {name: one[None] for name, one in cases.items() if len(one) > 2 and not np.isnan(one).any()}
     yield from results(simulated_studies.difference_ranks, rows)

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from study_app.designer.document.document import Document, check_version, next_version, standing
+from study_app.designer.document.document import Document, check_version, next_version, version_standing
 from study_app.designer.document.fields import rows
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set
@@ -191,14 +191,14 @@ def test_standing_says_when_saving_asks_and_which_version_is_free() -> None:
         Run(hash="def", version="1.1", sessions=1),
         Run(hash="pil", version="1.2", pilots=3),
     )
-    assert not standing("new", "old", "0.1", [Run(hash="pil", version="0.1", pilots=1, rehearsals=2)]).asks
-    same = standing("abc", "abc", "1.0", ran)
+    assert not version_standing("new", "old", "0.1", [Run(hash="pil", version="0.1", pilots=1, rehearsals=2)]).asks
+    same = version_standing("abc", "abc", "1.0", ran)
     assert (same.asks, same.version, same.sessions) == (False, "1.0", 2)
-    changed = standing("new", "abc", "1.0", ran)
+    changed = version_standing("new", "abc", "1.0", ran)
     assert (changed.asks, changed.version, changed.was, changed.others) == (True, "1.2", "1.1", 2)
-    raised = standing("new", "def", "2.0", ran)
+    raised = version_standing("new", "def", "2.0", ran)
     assert (raised.asks, raised.version, raised.others) == (True, "2.0", 0)
-    assert not standing("newer", "new", "2.0", ran).asks
+    assert not version_standing("newer", "new", "2.0", ran).asks
 
 
 @pytest.mark.parametrize("version", ["", "1 2", "1,2", "é"])

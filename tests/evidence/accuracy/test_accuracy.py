@@ -3,7 +3,7 @@
 import pytest
 
 from study_app.evidence.accuracy.comparison import accuracy
-from study_app.evidence.reference_solutions import stir
+from study_app.evidence.reference_solutions import stirring_motion
 from tests.evidence.accuracy.scenes import REAL, TANK, compiled, first_seconds
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]
@@ -11,7 +11,7 @@ pytestmark = [pytest.mark.nightly, pytest.mark.slow]
 
 @pytest.fixture(scope="module")
 def found():
-    motion = first_seconds(stir(10, 1000), 6.0)
+    motion = first_seconds(stirring_motion(10, 1000), 6.0)
     return accuracy(TANK, REAL, motion, named="half a stir", repeats=2, batches=3, allowance_s=0.2)
 
 

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from study_app.evidence.expected_error import expected, physical_n
-from study_app.evidence.reference_solutions import stroke
+from study_app.evidence.reference_solutions import stroke_motion
 from study_app.haptics.model.effects.drag import Drag
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.estimators import Ewma, Given, Kalman
@@ -66,7 +66,7 @@ def test_the_error_is_split_by_what_causes_it():
 def test_the_force_of_a_slow_stroke_is_that_of_creeping_flow():
     """Far below Re 1 the drag by experiments is Stokes', within their scatter, and the rest is exact."""
     omega, v = 10.0, 1e-3
-    t_s = stroke(v, omega, 1, 1000).t_s
+    t_s = stroke_motion(v, omega, 1, 1000).t_s
     force = physical_n(REAL, v, omega, t_s)
     radius, mu, rho = 0.034, 10.0, 1420.0
     delta = math.sqrt(2 * mu / (rho * omega))

@@ -24,11 +24,11 @@ from study_app.evidence.report_rates.simulation import (
     PRINTED,
     Cell,
     Generator,
-    answers,
     count_single,
     count_studies,
     evidence,
-    truth,
+    simulate_answers,
+    true_effects,
 )
 from study_app.protocol.load import load
 from study_app.protocol.simulated import TrialFeatures
@@ -57,7 +57,7 @@ def rek() -> Plan:
 
 
 def test_each_generator_answers_in_its_own_way(rek: Plan) -> None:
-    one, other = (answers(rek, generator, "full", 20, 3, 1) for generator in GENERATORS)
+    one, other = (simulate_answers(rek, generator, "full", 20, 3, 1) for generator in GENERATORS)
     assert all((first != second).any() for first, second in zip(one, other, strict=True))
 
 
@@ -67,7 +67,7 @@ def test_each_generator_answers_in_its_own_way(rek: Plan) -> None:
 def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participants: int) -> None:
     people = tuple(f"P{number}" for number in range(participants))
     for extent in EXTENTS:
-        given = answers(rek, "ordinal probit", extent, participants, 5, 2)
+        given = simulate_answers(rek, "ordinal probit", extent, participants, 5, 2)
         for block, values in zip(rek.blocks, given, strict=True):
             single_ = {item.id: values[:, :, [column]] for column, item in enumerate(block.items)}
             whole, quick = (
@@ -93,7 +93,7 @@ def test_verdicts_alone_are_those_of_the_whole_evaluation(rek: Plan, participant
 def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studies, "TRUTH", 200)
     cells = [Cell(generator, extent, 5) for extent in EXTENTS]
-    rates = [rate for cell in cells for rate in count_studies(rek, cell, truth(rek, cell), 1, 0, 2)]
+    rates = [rate for cell in cells for rate in count_studies(rek, cell, true_effects(rek, cell), 1, 0, 2)]
     assert {rate.studies for rate in rates} == {2}
     assert {rate.cell for rate in rates} == {f"{generator}, {extent}" for extent in EXTENTS}
     assert [rate.hits for rate in rates if rate.what == LOST[0]] == [0] * len(EXTENTS)
@@ -102,7 +102,7 @@ def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeyp
     assert {"detection threshold printed (delays)", "equal liquids distinguished (liquids)"} <= {
         one.what for one in rates
     }
-    assert rates == [rate for cell in cells for rate in count_studies(rek, cell, truth(rek, cell), 1, 0, 2)]
+    assert rates == [rate for cell in cells for rate in count_studies(rek, cell, true_effects(rek, cell), 1, 0, 2)]
     files = evidence(rates, "rates").files
     assert len(files["rates.md"].splitlines()) == len(files["rates.csv"].splitlines()) + 3 == len(rates) + 4
 

@@ -159,7 +159,7 @@ def test_from_a_rheometer_file_to_a_preset(tmp_path):
 def test_a_flow_curve_that_cannot_be_used_is_one_line(tmp_path, text, said):
     (tmp_path / "curve.csv").write_text(text, encoding="utf-8", newline="\n")
     with pytest.raises(StudyError, match=said) as caught:
-        measured_force.read(tmp_path / "curve.csv")
+        measured_force.read_measurement(tmp_path / "curve.csv")
     assert "\n" not in str(caught.value)
 
 

@@ -70,7 +70,7 @@ def test_slower_and_uneven_rows_tell_the_same():
 def test_a_measured_force_does_not_lag_so_velocities_from_places_do_not(tmp_path):
     """Through the filter of a device the added mass of a real ball would be felt 9.5 ms late, as less of it."""
     force_n = noisy(OIL, REACH, 0.01)
-    read = measured_force.read(write_csv(tmp_path / "measured.csv", REACH, force_n, velocities=False))
+    read = measured_force.read_measurement(write_csv(tmp_path / "measured.csv", REACH, force_n, velocities=False))
     assert read.motion.velocity_mps is None
     names = ["viscosity_pa_s", "added_mass.coefficient"]
     centred = fit(OIL, "oil", names, measured_force.with_centred_velocity(read.motion), read.force_n)
@@ -179,7 +179,7 @@ def test_what_cannot_be_fitted_is_said(names, said):
     with pytest.raises(StudyError, match="does not contain liquid 'lake'; its liquids: tank"):
         fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
     with pytest.raises(StudyError, match="it is a device, which may never end"):
-        measured_force.read(Path("/dev/null"))  # /dev/zero would fill the memory
+        measured_force.read_measurement(Path("/dev/null"))  # /dev/zero would fill the memory
 
 
 @pytest.mark.parametrize(

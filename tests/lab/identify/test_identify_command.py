@@ -77,7 +77,7 @@ def test_places_along_a_line_follow_from_the_velocity(tmp_path):
     (tmp_path / "line.csv").write_text(
         "t_s,velocity_mps,force_n\n0,0,1\n0.01,0.2,2\n0.02,0.4,3\n0.04,0.4,4\n", encoding="utf-8", newline="\n"
     )
-    read = measured_force.read(tmp_path / "line.csv")
+    read = measured_force.read_measurement(tmp_path / "line.csv")
     assert read.motion.position_m[:, 0] == pytest.approx([0, 0.001, 0.004, 0.012])
     assert read.force_n[:, 0].tolist() == [1, 2, 3, 4]
 

@@ -5,7 +5,7 @@ import pytest
 
 from study_app.evidence.cfd import fits, stored_flows
 from study_app.evidence.reference_model import unsteady_n
-from study_app.evidence.reference_solutions import oscillation, start
+from study_app.evidence.reference_solutions import oscillation_truth, starting_truth
 from study_app.evidence.stability.stability_cases import parse
 from study_app.evidence.stability.verdict import judge
 from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
@@ -37,7 +37,7 @@ def test_steady_drag_is_stokes_at_rest_and_that_of_the_solver_to_re_200():
 
 
 @compiled
-@pytest.mark.parametrize("truth", [oscillation, start])
+@pytest.mark.parametrize("truth", [oscillation_truth, starting_truth])
 @pytest.mark.parametrize("name", FLUIDS)
 def test_as_re_vanishes_it_is_stokes_added_mass_and_basset_within_a_percent(name, truth):
     """Landau & Lifshitz §24 and Basset 1888, at Re 1e-5."""
