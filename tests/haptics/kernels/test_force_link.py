@@ -194,6 +194,6 @@ def test_delay_and_jitter_beyond_the_kept_forces_are_refused():
     assert not ForceLink(delay_s=0.2, jitter_s=0.05).fits(5000)
     with pytest.raises(ValidationError, match=r"below 204\.8 ms"):
         Scene.model_validate(damper(delay_s=0.2, jitter_s=0.05).model_copy(update={"rate_hz": 5000.0}).model_dump())
-    with pytest.raises(StudyError, match="pack it with a capacity"):
+    with pytest.raises(StudyError, match="specify a capacity when you pack it"):
         pack_into(pack(damper()), damper(delay_s=0.001))
     assert len(pack(damper(loss=0.1)).forces_n) == STORED_FORCES
