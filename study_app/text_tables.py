@@ -40,7 +40,7 @@ def decoded(content: bytes, first_line: int = 1) -> str:
     Raises
     ------
     ValueError
-    The content has another encoding.
+        The content has another encoding.
     """
     if content.startswith(_UTF_16) or b"\0" in content:
         raise ValueError("it is not UTF-8 text but seems to be UTF-16: save it as CSV in UTF-8")
@@ -77,7 +77,7 @@ def split(text: str, names: Collection[str], *, comment: str = "") -> TextTable:
     Raises
     ------
     ValueError
-    A quotation mark is not closed, or is within a field.
+        A quotation mark is not closed, or is within a field.
     """
     kept = ["\n" if comment and line.startswith(comment) else line for line in io.StringIO(text, newline="")]
     header = next((line for line in kept if line.strip()), "")
@@ -145,7 +145,7 @@ def _numbers_at(line: Line, places: Sequence[int], columns: int, decimal_sign: s
     Raises
     ------
     ValueError
-    The number of fields differs from ``columns``, or one of these fields is not a finite number.
+        The number of fields differs from ``columns``, or one of these fields is not a finite number.
     """
     if wrong := wrong_length(line.fields, columns):
         raise ValueError(f"line {line.number}: {wrong}")
@@ -164,7 +164,7 @@ def rows_of(table: TextTable, places: Sequence[int]) -> list[list[float]]:
     Raises
     ------
     ValueError
-    A row is invalid (the first one is named), or the decimal sign is ambiguous.
+        A row is invalid (the first one is named), or the decimal sign is ambiguous.
     """
     columns, sign = len(table.names), "."
     for line in table.lines:

@@ -132,9 +132,9 @@ def measure_delays(
     Raises
     ------
     StudyError
-    The seconds are out of range, or the session broke.
+        The seconds are out of range, or the session broke.
     DisplayError
-    No window can be opened here.
+        No window can be opened here.
     """
     if not LEAST_S <= seconds <= MOST_S:
         raise StudyError(f"each delay is shown for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
@@ -262,7 +262,7 @@ class WindowsThread(QObject):
     Raises
     ------
     DisplayError
-    No window can be opened here, although the load requires one.
+        No window can be opened here, although the load requires one.
     """
 
     _asked = Signal(object)

@@ -240,7 +240,7 @@ class _LabSaving(QObject):
         Raises
         ------
         ProtocolError
-        Lists every problem of the file.
+            Lists every problem of the file.
         """
         choices = liquids_of(str(path))
         self.liquids = (*(it for it in self.liquids if it not in choices), *choices)

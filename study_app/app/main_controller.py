@@ -157,7 +157,7 @@ def run_home_window(
     Raises
     ------
     DisplayError
-    No window can be opened here.
+        No window can be opened here.
     """
     application = application_here()
     controller = MainController(results)

@@ -155,7 +155,7 @@ class FramedDevice(Device):
         Raises
         ------
         DeviceError
-        The device is not connected or cannot be used; nothing is left open.
+            The device is not connected or cannot be used; nothing is left open.
         """
         if self.connection is not None:
             if self.exchange.ended == RUNS:
@@ -308,7 +308,7 @@ def examine(
     Raises
     ------
     DeviceError
-    The device cannot have faults, or not these ones.
+        The device cannot have faults, or not these ones.
     """
     request = OpenRequest(argument=name.partition(":")[2], options=options or {}, progress=progress)
     device = framed_device(name, request)

@@ -58,7 +58,7 @@ class Guard:
         Raises
         ------
         DeviceError
-        The guard does not start, so no force may be sent.
+            The guard does not start, so no force may be sent.
         """
         if self.child is not None:
             return

@@ -75,7 +75,7 @@ def open_device(name: str, **request: Any) -> Device:
     DeviceNotFound
         No device has this name, or none is connected.
     DeviceError
-    The device is connected but cannot be used, or it does not have an option.
+        The device is connected but cannot be used, or it does not have an option.
     """
     device = descriptor_of(name)
     asked = OpenRequest(**request)
@@ -98,7 +98,7 @@ def doctor_of(name: str) -> Doctor:
     DeviceNotFound
         No device has this name.
     DeviceError
-    The device has no diagnosis.
+        The device has no diagnosis.
     """
     doctor = descriptor_of(name).doctor
     if doctor is None:
@@ -119,7 +119,7 @@ def check_options(name: str, options: Iterable[str]) -> None:
     DeviceNotFound
         No device has this name.
     DeviceError
-    The device does not have one of these options.
+        The device does not have one of these options.
     """
     taken = {option.name for option in descriptor_of(name).options}
     for option in options:

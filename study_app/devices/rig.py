@@ -137,7 +137,7 @@ def open_rig(
     Raises
     ------
     StudyError
-    The device cannot be opened; nothing is left open.
+        The device cannot be opened; nothing is left open.
     """
     from study_app.haptics.runtime.servo import Servo  # noqa: PLC0415 - the compiler: only once it is needed
 

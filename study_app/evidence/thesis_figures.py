@@ -183,7 +183,7 @@ def figures(to: Path) -> tuple[Path, ...]:
     Raises
     ------
     StoreError, AnalysisError
-    The folder cannot be created or written.
+        The folder cannot be created or written.
     """
     make_folder(to, waits=False)
     files: dict[str, bytes] = {}

@@ -179,7 +179,7 @@ class Live:
         Raises
         ------
         StudyError
-        There is no such path, or no setting is presented yet.
+            There is no such path, or no setting is presented yet.
         """
         self.path, self._ghost = None, None
         if name is None:
@@ -341,7 +341,7 @@ def open_live(
     Raises
     ------
     StudyError
-    The device cannot be opened; nothing is left open.
+        The device cannot be opened; nothing is left open.
     """
     taken = {option.name for option in descriptor_of(name).options}
     settings = RigSettings(

@@ -86,7 +86,7 @@ def parameter(scene: Scene, name: str) -> Parameter:
     Raises
     ------
     StudyError
-    The scene has no parameter with this name.
+        The scene has no parameter with this name.
     """
     for section in sections(scene):
         for it in section.parameters:
@@ -131,7 +131,7 @@ def the_liquid(scene: Scene) -> Liquid:
     Raises
     ------
     StudyError
-    The scene has no liquid, several, or takes its velocities from a table.
+        The scene has no liquid, several, or takes its velocities from a table.
     """
     if len(scene.liquids) != 1:
         raise StudyError(f"the lab opens one liquid at a time, not {len(scene.liquids)}: choose one")

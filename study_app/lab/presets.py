@@ -64,7 +64,7 @@ def liquids_of(source: str) -> tuple[Choice, ...]:
     Raises
     ------
     ProtocolError
-    Lists every problem of the file.
+        Lists every problem of the file.
     """
     return tuple(
         Choice(source=source, liquid=name, title=f"{displayed_name(name)} ({Path(source).stem})")

@@ -35,7 +35,7 @@ def programmed_path(name: str, scene: Scene, half_m: _Vector) -> Motion:
     Raises
     ------
     StudyError
-    There is no path with this name.
+        There is no path with this name.
     """
     if name not in TITLES:
         raise StudyError(f"unknown path {name!r}: there are {', '.join(TITLES)}")

@@ -95,9 +95,9 @@ def marker_of(event: str, t_s: float, origin_ns: int, fields: Mapping[str, Any])
     Parameters
     ----------
     t_s : float
-    Time of the event on the session's clock [s].
+        Time of the event on the session's clock [s].
     origin_ns : int
-    The servo's clock at the origin of the session's clock [ns].
+        The servo's clock at the origin of the session's clock [ns].
     fields : mapping
         The other fields of the journal's line.
     """
@@ -152,7 +152,7 @@ class SinkThread:
     Attributes
     ----------
     lost : str
-    The reason why the sink no longer gets markers; empty while it works.
+        The reason why the sink no longer gets markers; empty while it works.
     """
 
     def __init__(self, sink: Sink) -> None:

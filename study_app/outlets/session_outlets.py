@@ -66,7 +66,7 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
     Raises
     ------
     OutletError
-    The address is invalid, or the sink cannot be opened.
+        The address is invalid, or the sink cannot be opened.
     """
     name, _, place = address.partition(":")
     kind = SINKS.get(name)

@@ -138,7 +138,7 @@ class _SerialPort:
         Raises
         ------
         OutletError
-        The port does not accept it, for example because an adapter was unplugged.
+            The port does not accept it, for example because an adapter was unplugged.
         """
         try:
             self._port.write(bytes((byte,)))

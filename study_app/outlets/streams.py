@@ -41,7 +41,7 @@ def library() -> Any:
     Raises
     ------
     OutletError
-    pylsl, or the library that it loads, is not installed.
+        pylsl, or the library that it loads, is not installed.
     """
     try:
         import pylsl  # noqa: PLC0415 - an extra
@@ -140,9 +140,9 @@ class SampleStream:
     Attributes
     ----------
     sent : int
-    Number of samples sent so far.
+        Number of samples sent so far.
     lost : str
-    The reason why samples are missing; empty while none are.
+        The reason why samples are missing; empty while none are.
 
     Raises
     ------

@@ -53,19 +53,18 @@ class TrialFeatures:
 
     Attributes
     ----------
-    force_mean_n, force_peak_n
+        force_mean_n, force_peak_n
         Mean and largest norm of the force sent [N].
-    speed_rms_mps
+        speed_rms_mps
         Root mean square of the hand's (estimated, not differenced) speed [m/s].
-    push_share
+        push_share
         Share, 0 to 1, of the force's power along the motion: Σ of positive F·v over Σ |F·v|. It is 0 for pure drag,
         and larger for a wake that carries the hand.
-    roughness_n
+        roughness_n
         Root mean square of the change of the force from one tick to the next [N].
-    delay_s
+        delay_s
         Mean age of the drawn position when it was drawn [s].
-    force_delay_s
-    Delay of the force [s]; 0 in studies that do not delay it.
+        force_delay_s Delay of the force [s]; 0 in studies that do not delay it.
     """
 
     force_mean_n: float
@@ -201,13 +200,13 @@ def simulate_ratings(
     items : sequence of str
         Ids of the statements.
     trials : sequence of sequence of TrialFeatures
-    Trials of each condition, from which one is drawn for each presentation.
+        Trials of each condition, from which one is drawn for each presentation.
     repetitions : int
-    Number of presentations of each condition.
+        Number of presentations of each condition.
     person : Rater
-    The simulated person.
+        The simulated person.
     random : random.Generator
-    Random generator for trials and noise.
+        Random generator for trials and noise.
 
     Returns
     -------
@@ -230,11 +229,11 @@ class Observer:
     Attributes
     ----------
     weber_fraction : float
-    Weber fraction of resistance, at 75 % correct in two intervals without lapses.
+        Weber fraction of resistance, at 75 % correct in two intervals without lapses.
     delay_jnd_s : float
-    Just noticeable delay, likewise [s].
+        Just noticeable delay, likewise [s].
     person : Person
-    The other individual parameters of the observer.
+        The other individual parameters of the observer.
     estimates : tuple of float, optional
         Exponent of estimates over resistance, and the standard deviation of their logarithm; None: 1/2 of the noisy
         resistance.
@@ -427,13 +426,13 @@ def simulate_study(
     protocol : Protocol
         The study.
     people : mapping of str to Observer
-    The observers by participant id.
+        The observers by participant id.
     seed : int
-    Seed of orders, the sealed key and answers.
+        Seed of orders, the sealed key and answers.
     study : str
-    Name of the random streams, so that one seed gives many independent studies.
+        Name of the random streams, so that one seed gives many independent studies.
     sense : callable
-    Returns the perceived quantity of an interval.
+        Returns the perceived quantity of an interval.
     """
     random = stream(seed, study).random
     key = Key(draw_key(protocol, random), draw_secret(random))

@@ -188,7 +188,7 @@ class Answers(NamedTuple):
     towards, before : (tracks, trials) array
         The correct answer, and the previous answer: 1 the first of two intervals, −1 the second, 0 neither.
     done : (tracks, trials) array
-    The fraction of trials done, from 0 to 1.
+        The fraction of trials done, from 0 to 1.
     """
 
     levels: Floats
@@ -232,7 +232,7 @@ class Observers:
     presented : callable, optional
         Maps requested to presented levels, both in u; by default they are equal.
     moves : float or (tracks,) array
-    Rise of the threshold from the first trial to the last, in u.
+        Rise of the threshold from the first trial to the last, in u.
     criterion, repeats : float or (tracks,) array
         Preference for the first of two intervals, and for the last answer [SD of the decision].
     towards : (tracks, trials) array, optional
@@ -288,7 +288,7 @@ def constant_tracks(levels: Sequence[float], repetitions: int, observers: Observ
     repetitions : int
         Presentations of each level.
     observers : Observers
-    The simulated observers.
+        The simulated observers.
     draws : (tracks, trials) array
         Uniform numbers in [0, 1).
     """
@@ -311,7 +311,7 @@ def staircase_tracks(
     staircase : Staircase
         The rule.
     observers : Observers
-    The simulated observers.
+        The simulated observers.
     draws : (tracks, trials) array
         Uniform numbers in [0, 1).
     stop : tuple of int, optional
@@ -352,7 +352,7 @@ def search_tracks(
     search : Search
         Chooses the levels.
     observers : Observers
-    The simulated observers.
+        The simulated observers.
     draws : (tracks, trials) array
         Uniform numbers in [0, 1).
     begin : int, optional

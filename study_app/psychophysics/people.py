@@ -39,7 +39,7 @@ class Person(NamedTuple):
     width : float
         Of the psychometric function, as a share of that of an observer whose d′ is proportional to the level.
     lapse : float
-    Share of random answers, of which one in k is correct with k alternatives.
+        Share of random answers, of which one in k is correct with k alternatives.
     criterion, repeats : float
         Preference for the first interval, and for the last answer [SD of the decision].
     change : float
@@ -179,7 +179,7 @@ class Expected:
         Parameters
         ----------
         participants : int
-        Number of participants; the result is infinite below two.
+            Number of participants; the result is infinite below two.
         trials : float, optional
             Of each standard; variances of errors are taken to be inversely proportional to their number. What people
             share is an error that the standards have in common.

@@ -54,13 +54,13 @@ class Given(NamedTuple):
     levels : (k,) array
         The levels presented, ascending, in the coordinate u.
     places : (n,) array
-    Index of the level of each trial.
+        Index of the level of each trial.
     successes : (n,) array of bool
         Whether answers are successes.
     towards, before : (n,) array
         The correct answer, and the previous answer: 1 the first of two intervals, −1 the second, 0 neither.
     done : (n,) array
-    The fraction of trials done, from 0 to 1.
+        The fraction of trials done, from 0 to 1.
     """
 
     levels: Floats
@@ -113,7 +113,7 @@ class PersonFit:
     given : Given
         The answers.
     shifts : (n,) array
-    Shift of each decision towards the correct answer due to a preference [SD].
+        Shift of each decision towards the correct answer due to a preference [SD].
     change : float
         Most probable rise of the threshold from the first trial to the last, in u.
     named : bool

@@ -104,7 +104,7 @@ def make_folder(path: Path, *, waits: bool = True) -> None:
     Raises
     ------
     StoreError
-    The folder cannot be created.
+        The folder cannot be created.
     """
     path = path.absolute()
     missing = [level for level in (path, *path.parents) if waits and not is_there(level)]
@@ -313,7 +313,7 @@ def refuse_special_files(path: Path) -> None:
     Raises
     ------
     StoreError
-    The folder contains such a file; the message names its path and type.
+        The folder contains such a file; the message names its path and type.
     """
     for inside in (path, *paths_in(path)):
         if inside.is_symlink():

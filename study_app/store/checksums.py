@@ -162,7 +162,7 @@ def sha256(path: Path) -> str:
     Raises
     ------
     StoreError
-    The file cannot be read.
+        The file cannot be read.
     """
     try:
         with open_regular(path) as file:

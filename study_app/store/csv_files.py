@@ -176,7 +176,7 @@ def read_cells(table: bytes) -> list[list[str]]:
     Raises
     ------
     ValueError
-    The table is not CSV in UTF-8, or its records differ in length.
+        The table is not CSV in UTF-8, or its records differ in length.
     """
     try:
         rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]

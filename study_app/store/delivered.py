@@ -94,7 +94,7 @@ def delivered_values(
     protocol : Protocol
         The study.
     presented : Stimulated
-    The requested contents of the interval.
+        The requested contents of the interval.
     task : AnyTask
         The task that was done.
     samples : array of `JUDGED` (n,)
@@ -149,7 +149,7 @@ def delivered_error(
     rate_hz : float
         Samples per second.
     fade_s : float
-    Fade-in time of the force; the error is evaluated from `_SETTLED_S` later.
+        Fade-in time of the force; the error is evaluated from `_SETTLED_S` later.
     law_n : callable
         Returns the law's forces (m, 3) [N] from times (m,) [s], positions and velocities (m, 3) of the hand [m, m/s].
     """
@@ -227,15 +227,15 @@ def broken_trial_limits(
     Parameters
     ----------
     limits : Limits
-    The limits of the study.
+        The limits of the study.
     due : Presentation
-    The presentation of the trial.
+        The presentation of the trial.
     holds : sequence of bool
-    Whether each interval presented the comparison.
+        Whether each interval presented the comparison.
     errors_ms : sequence of float or None
-    The error of the visual or force delay in each interval [ms].
+        The error of the visual or force delay in each interval [ms].
     rate_hz : float
-    Ticks per second; a force delay may deviate by one more tick.
+        Ticks per second; a force delay may deviate by one more tick.
     """
     vary = due.intervals[0].vary
     if limits.level_error_ms is None or vary not in DELAYS or len(errors_ms) < len(holds):

@@ -34,7 +34,7 @@ class Draft:
     selected : tuple of str or int
         The path that was selected.
     kept_at : str
-    The time of writing, as ISO 8601 with the time zone.
+        The time of writing, as ISO 8601 with the time zone.
     """
 
     text: str
@@ -74,7 +74,7 @@ class Keeper:
         Raises
         ------
         StoreError
-        The draft cannot be written or deleted; it stays due.
+            The draft cannot be written or deleted; it stays due.
         """
         return (self._pending is None or now_s >= self._due_s) and self.write()
 
@@ -84,7 +84,7 @@ class Keeper:
         Raises
         ------
         StoreError
-        The draft cannot be written or deleted; it stays due.
+            The draft cannot be written or deleted; it stays due.
         """
         if self._pending is None:
             if self._obsolete:
@@ -120,7 +120,7 @@ def write_draft(file: Path, draft: Draft) -> None:
     Raises
     ------
     StoreError
-    The draft cannot be written.
+        The draft cannot be written.
     """
     path = _draft_file(file)
     kept = {
@@ -174,7 +174,7 @@ def delete_draft(file: Path) -> None:
     Raises
     ------
     StoreError
-    The draft cannot be deleted.
+        The draft cannot be deleted.
     """
     try:
         _draft_file(file).unlink(missing_ok=True)

@@ -146,7 +146,7 @@ def check_study_name(name: object) -> str:
     Raises
     ------
     ValueError
-    The name is invalid for a study and its files.
+        The name is invalid for a study and its files.
     """
     if not isinstance(name, str) or not STUDY_NAME.fullmatch(name):
         raise ValueError("a study with this name does not exist")
@@ -159,7 +159,7 @@ def locate_session(path: Path) -> tuple[StudyFolder, SessionFolder]:
     Raises
     ------
     StoreError
-    The path is not in a session folder.
+        The path is not in a session folder.
     """
     folder = path.resolve()
     number = _SESSION_FOLDER.fullmatch(folder.name)
@@ -202,7 +202,7 @@ def check_name_and_reason(by: str, reason: str, why: str) -> tuple[str, str]:
     Raises
     ------
     StoreError
-    Name or reason is empty (``why`` states their purpose) or contains unprintable characters.
+        Name or reason is empty (``why`` states their purpose) or contains unprintable characters.
     """
     for name, text in (("by", by), ("reason", reason)):
         if not text.strip():

@@ -85,9 +85,9 @@ def _missing_sentence(count: int, asked: int, reasons: Mapping[str, int], limits
     Parameters
     ----------
     count, asked : int
-    Numbers of missing trials and of all trials.
+        Numbers of missing trials and of all trials.
     reasons : mapping of str to int
-    The number of missing trials that violated each limit, by its key.
+        The number of missing trials that violated each limit, by its key.
     limits : mapping of str to float
         The limits of the study, by their keys.
     """

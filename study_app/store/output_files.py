@@ -148,7 +148,7 @@ def write_output(
     Raises
     ------
     AnalysisError
-    The files cannot be written; nothing was written.
+        The files cannot be written; nothing was written.
     """
     written = write_files(to, files)
     at = datetime.now().astimezone().isoformat(timespec="seconds")

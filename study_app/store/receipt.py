@@ -132,7 +132,7 @@ def read(path: Path) -> dict[str, Any]:
     Raises
     ------
     StoreError
-    The file is missing or not a receipt.
+        The file is missing or not a receipt.
     """
     try:
         receipt = parse_json(read_own(path, study_root(path)))

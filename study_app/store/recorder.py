@@ -57,7 +57,7 @@ class Recorder:
     Parameters
     ----------
     folder : Path
-    The folder of the files, created with the first one.
+        The folder of the files, created with the first one.
     facts : mapping
         Metadata of every file.
     secret : bytes, optional

@@ -118,7 +118,7 @@ def read_samples(path: Path, secret: bytes | None = None) -> Any:
     Raises
     ------
     StoreError
-    The file cannot be read, is not a recording of samples, or is sealed.
+        The file cannot be read, is not a recording of samples, or is sealed.
     """
     columns, facts = _read_columns(path, "samples", secret)
     samples = records(SAMPLE, len(columns["tick"]))
@@ -143,7 +143,7 @@ def read_frames(path: Path, secret: bytes | None = None) -> Any:
     Raises
     ------
     StoreError
-    The file cannot be read, is not a recording of frames, or is sealed.
+        The file cannot be read, is not a recording of frames, or is sealed.
     """
     columns, _ = _read_columns(path, "frames", secret)
     frames = records(_FRAME, len(columns["painted_ns"]))
@@ -172,7 +172,7 @@ def read_checks(path: Path, secret: bytes | None = None) -> Checks:
     Raises
     ------
     StoreError
-    The file cannot be read, or has no CRCs.
+        The file cannot be read, or has no CRCs.
     """
     facts = read_facts(path, secret)
     if facts["kind"] != "samples":

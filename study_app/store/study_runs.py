@@ -31,10 +31,10 @@ class Run:
     version : str
         Its version.
     sessions, pilots, rehearsals : int
-    Numbers of sessions; pilots include those that were played in the study designer and kept; rehearsals are
+        Numbers of sessions; pilots include those that were played in the study designer and kept; rehearsals are
         the other sessions on simulated devices.
     last : str
-    Start of the newest session, as ISO 8601.
+        Start of the newest session, as ISO 8601.
     receipt : Path or None
         A receipt that holds the protocol, without its conditions.
     """

@@ -62,7 +62,7 @@ def save_study(file: Path, text: str, base: str) -> str:
     file : Path
         The protocol file; permissions and links are preserved.
     text : str
-    The whole text with its line endings.
+        The whole text with its line endings.
     base : str
         `content_hash` of the content that the text was edited from; "" for a new file.
 

@@ -74,7 +74,7 @@ class Withdrawn:
     Attributes
     ----------
     tombstone : Tombstone
-    The remaining record of the participant.
+        The remaining record of the participant.
     folders : tuple of Path
         The study folders from which the sessions were erased.
     outputs : tuple of Path
@@ -82,7 +82,7 @@ class Withdrawn:
     elsewhere : tuple of Output
         Outputs outside of the results folder, which were left.
     left : tuple of str
-    Paths that still name the participant, or contain sessions other than the erased ones.
+        Paths that still name the participant, or contain sessions other than the erased ones.
     """
 
     tombstone: Tombstone

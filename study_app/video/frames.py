@@ -26,7 +26,7 @@ class VideoFrame:
     due_ns : int
         Display time without a delay [ns, servo's clock]: when it was ready, or its time in the footage.
     age_ns : int or None
-    Age of the picture at that time, by the source's time stamps; None if unknown, 0 for footage.
+        Age of the picture at that time, by the source's time stamps; None if unknown, 0 for footage.
     period_ns : int
         Time from one frame of the source to the next.
     """

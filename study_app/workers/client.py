@@ -80,7 +80,7 @@ class WorkerClient(Generic[Order, Answer]):
         Parameters
         ----------
         wait_s : float
-        Maximum time to wait for the first answer [s].
+            Maximum time to wait for the first answer [s].
         """
         if self._closed:
             return []

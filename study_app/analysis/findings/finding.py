@@ -378,7 +378,7 @@ class Finding(Generic[R]):
     statements : bool
         Whether the value is tests of single statements whose verdicts belong to the limits of the study.
     empty : R
-    The value if nothing was tested.
+        The value if nothing was tested.
     figure_name, figure_title : str
         File name and title of its figure; empty if it has none.
     question : str

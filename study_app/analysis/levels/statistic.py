@@ -48,7 +48,7 @@ class LevelStatistic(Generic[R]):
     title : str
         The heading of its part of the report.
     figures : tuple of str
-    The names of the figures below its table.
+        The names of the figures below its table.
     table : str
         The name of the exported table (CSV, Parquet, SPSS, codebook) in `columns.RESULTS`, whose columns are attributes
         of rows of participants; empty if none is exported.

@@ -745,7 +745,7 @@ def estimate_slope(levels: ArrayLike, answers: ArrayLike) -> float:
     Parameters
     ----------
     levels, answers : (n,) array
-    Level and answer of each trial, at two or more different levels, all above zero.
+        Level and answer of each trial, at two or more different levels, all above zero.
     """
     log_levels, log_answers = (np.log(np.asarray(one, float)) for one in (levels, answers))
     places, which = np.unique(log_levels, return_inverse=True)
@@ -783,7 +783,7 @@ def jnd_slope(standards: ArrayLike, jnds: ArrayLike) -> float:
     Parameters
     ----------
     standards, jnds : (k,) array
-    Two or more different standards, and the JND at each, all above zero, in the same unit.
+        Two or more different standards, and the JND at each, all above zero, in the same unit.
     """
     slope, _ = np.polyfit(np.log(np.asarray(standards, float)), np.log(np.asarray(jnds, float)), 1)
     return float(slope)

@@ -138,9 +138,9 @@ def jzs_bayes_factor(t: float, n: int, m: int | None = None, scale: float = PRIO
     t : float
         Student's t of differences, or of two groups with equal variances.
     n, m : int
-    Number of differences or, with ``m``, the sizes of the groups.
+        Number of differences or, with ``m``, the sizes of the groups.
     scale : float
-    Scale of the Cauchy prior of the standardised difference.
+        Scale of the Cauchy prior of the standardised difference.
     """
     freedom, size = (n - 1, float(n)) if m is None else (n + m - 2, n * m / (n + m))
 

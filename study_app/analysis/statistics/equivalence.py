@@ -81,13 +81,13 @@ def tost(
     Parameters
     ----------
     differences : (participants,) array
-    NaN for a missing answer, which is dropped.
+        NaN for a missing answer, which is dropped.
     bound : float
-    The equivalence bound in scale points.
+        The equivalence bound in scale points.
     alpha : float
         Level of each one-sided test.
     seed : int
-    Seed of the resamples.
+        Seed of the resamples.
     largest : float
         Largest difference of a participant that the scale permits, in points.
     """

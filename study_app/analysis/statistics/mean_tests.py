@@ -103,11 +103,11 @@ def means_of(
         One number for each of two or more participants. Random weights are assigned by rank, so that names do not
         matter; with ``weights`` the numbers must ascend.
     weights : (participants,) array, optional
-    Weights of the participants in the means; by default all are equal.
+        Weights of the participants in the means; by default all are equal.
     seed, group : int
-    Seed of the resamples; groups that are compared need different group numbers.
+        Seed of the resamples; groups that are compared need different group numbers.
     resamples : int
-    Number of resamples.
+        Number of resamples.
     """
     n, values = values.shape[1], np.sort(values, axis=1)
     weights = np.ones(n) if weights is None else weights / weights.mean()

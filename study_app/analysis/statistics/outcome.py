@@ -113,11 +113,11 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     Parameters
     ----------
     looks : tuple of int
-    Number of participants at each look, ascending.
+        Number of participants at each look, ascending.
     alpha : float
-    Overall error rate.
+        Overall error rate.
     spending : "obrien-fleming" | "pocock"
-    Spending function (Lan & DeMets 1983, Biometrika 70, 659–663).
+        Spending function (Lan & DeMets 1983, Biometrika 70, 659–663).
 
     Notes
     -----

@@ -163,7 +163,7 @@ def save_calibration(serial: str, calibration: Calibration) -> Path:
     Raises
     ------
     DeviceError
-    The calibration cannot be written.
+        The calibration cannot be written.
     """
     file = calibration_file(serial)
     fresh = file.with_suffix(".new")

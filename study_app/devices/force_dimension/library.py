@@ -131,7 +131,7 @@ class Library:
         Raises
         ------
         DeviceFailure
-        No device can be opened.
+            No device can be opened.
         """
         device_id = self._functions.dhdOpenSerial(int(serial)) if serial else self._functions.dhdOpen()
         if device_id < 0:
@@ -145,7 +145,7 @@ class Library:
         Raises
         ------
         DeviceFailure
-        The device is not calibrated, not safe, or its force cannot be enabled.
+            The device is not calibrated, not safe, or its force cannot be enabled.
         """
         call, device = self._functions, self.id
         if not call.drdIsInitialized(device) or self._status()[RESET]:

@@ -66,9 +66,9 @@ class SpaceMouseDevice(PointedDevice):
         Raises
         ------
         DeviceNotFound
-        No SpaceMouse is connected.
+            No SpaceMouse is connected.
         DeviceError
-        The SpaceMouse cannot be opened or reports no motion.
+            The SpaceMouse cannot be opened or reports no motion.
         """
         if self.thread is not None and self.thread.is_alive():
             return

@@ -182,9 +182,9 @@ def release(
     handle_kg : float
         Mass of the handle.
     phase : float
-    Time of the release, in periods of the stroke.
+        Time of the release, in periods of the stroke.
     delay : int
-    Delay of each force [ticks].
+        Delay of each force [ticks].
 
     Returns
     -------

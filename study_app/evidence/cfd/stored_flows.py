@@ -81,7 +81,7 @@ def load_tables(folder: Traversable | None = None, of: str = "") -> tuple[Table,
     Raises
     ------
     StudyError
-    There is no such table, or one cannot be parsed.
+        There is no such table, or one cannot be parsed.
     """
     place = folder or package()
     place = place / of if of else place
@@ -130,7 +130,7 @@ def read_table(file: Traversable, names: Sequence[str], noted: Sequence[str] = (
     Raises
     ------
     StudyError
-    The file does not exist, or cannot be parsed.
+        The file does not exist, or cannot be parsed.
     """
     try:
         lines = file.read_text(encoding="utf-8").splitlines()

@@ -71,7 +71,7 @@ class Ledger:
         Returns
         -------
         |wake - definition| at the last accepted sample, in units of Σ|e|/S; infinite if that is not finite, None
-        if there is nothing to compare
+            if there is nothing to compare
         """
         records_here = self._ledger[0], self._wake[0], self._elements
         last = _last_accepted(samples)

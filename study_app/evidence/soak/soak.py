@@ -392,7 +392,7 @@ def soak(
     Raises
     ------
     StudyError
-    The hours are out of range.
+        The hours are out of range.
     """
     ending = ending or threading.Event()
     with Soak(scenes, hours, virtual=virtual, seed=seed) as run:

@@ -113,11 +113,11 @@ class Measure:
     interval : callable
         Returns the ends of its interval from a confidence.
     least, most : float
-    The range that the limit permits.
+        The range that the limit permits.
     limit : str
-    The limit as text.
+        The limit as text.
     written : callable
-    Returns a value as text.
+        Returns a value as text.
     """
 
     study: str
@@ -446,7 +446,7 @@ def known_value(name: str, protocol: Protocol) -> Known:
     Raises
     ------
     ValueError
-    No main block has a known value.
+        No main block has a known value.
     """
     blocks = [
         main_block

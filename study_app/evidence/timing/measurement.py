@@ -459,7 +459,7 @@ def timing(
     Raises
     ------
     StudyError
-    The seconds or the spin are out of range.
+        The seconds or the spin are out of range.
     ServoFault
         The servo stopped itself.
     """

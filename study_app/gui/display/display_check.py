@@ -74,7 +74,7 @@ def naming_missing_library() -> Iterator[None]:
     Raises
     ------
     DisplayError
-    A system library is missing.
+        A system library is missing.
     """
     try:
         yield

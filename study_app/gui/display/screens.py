@@ -63,7 +63,7 @@ def choose_screens(number: int | None) -> tuple[QScreen, QScreen]:
     Raises
     ------
     DisplayError
-    There is no screen with this number.
+        There is no screen with this number.
     """
     screens = QGuiApplication.screens()
     if number is not None and not 1 <= number <= len(screens):

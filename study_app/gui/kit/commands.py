@@ -16,11 +16,11 @@ class Command:
     Attributes
     ----------
     id, words : str
-    Its name in the program, and its description.
+        Its name in the program, and its description.
     keys : tuple of str
-    Alternative keys.
+        Alternative keys.
     within : str
-    The part of the window in which its keys work; "" for the whole window.
+        The part of the window in which its keys work; "" for the whole window.
     held : bool
         Whether the key is held, not pressed.
     run : callable

@@ -87,7 +87,7 @@ def resumed_rows(protocol: Protocol, schedule: Schedule, lines: Iterable[Event])
     Raises
     ------
     SessionError
-    The journal does not fit this schedule.
+        The journal does not fit this schedule.
     """
     journal = list(lines)
     start = resume_at(protocol, schedule, journal)

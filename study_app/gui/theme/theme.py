@@ -66,7 +66,7 @@ def font(role: TypeRole, *, scale: float = 1.0, weight: int | None = None, tabul
     Parameters
     ----------
     scale : float
-    Size factor, for pages that grow with their window.
+        Size factor, for pages that grow with their window.
     weight, tabular : int, bool, optional
         Override those of the role: 400, 500, 600 or 700; tabular figures.
     """

@@ -87,7 +87,7 @@ def rules_from(described: Mapping[str, Any]) -> ForceRules:
     Raises
     ------
     StoreError
-    The version of the rules is unknown to this program.
+        The version of the rules is unknown to this program.
     """
     version = described.get("force_rules", 1)
     if version not in VERSIONS:

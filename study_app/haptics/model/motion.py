@@ -34,7 +34,7 @@ class Motion:
     Raises
     ------
     StudyError
-    Shapes differ, numbers are not finite, or times do not increase.
+        Shapes differ, numbers are not finite, or times do not increase.
     """
 
     t_s: Floats
@@ -92,9 +92,9 @@ def refuse_device(path: Path) -> None:
     Raises
     ------
     StudyError
-    The file is a device.
+        The file is a device.
     OSError
-    The system cannot determine its type.
+        The system cannot determine its type.
     """
     if path.is_char_device():
         raise StudyError(f"cannot read {path}: it is a device, which may never end; specify a CSV file")
@@ -140,7 +140,7 @@ def programmed_motion(name: str, *, rate_hz: float = 1000.0, **parameters: float
     Raises
     ------
     StudyError
-    There is no motion with this name.
+        There is no motion with this name.
     """
     if name not in _PATHS:
         near = difflib.get_close_matches(name, NAMES, n=1)

@@ -39,7 +39,7 @@ def override_all(scene: Scene, values: Mapping[str, object]) -> Scene:
     Raises
     ------
     StudyError
-    A name is unknown, or a value is out of range.
+        A name is unknown, or a value is out of range.
     """
     tree = _tree(scene)
     for name, value in values.items():

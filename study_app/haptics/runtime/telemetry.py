@@ -25,7 +25,7 @@ class Telemetry:
     Parameters
     ----------
     history : int
-    Number of samples that are kept.
+        Number of samples that are kept.
     """
 
     def __init__(self, history: int = HISTORY) -> None:

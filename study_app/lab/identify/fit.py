@@ -72,7 +72,7 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     Raises
     ------
     StudyError
-    There is no such liquid or parameter, or there are too few measurements.
+        There is no such liquid or parameter, or there are too few measurements.
     """
     measured = Measured(motion, vectors_x(force_n) if force_n.ndim == 1 else force_n)
     scene = resolve(scene)
@@ -130,7 +130,7 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
     Raises
     ------
     StudyError
-    There is no such liquid or flow-curve parameter, or there are too few measurements.
+        There is no such liquid or flow-curve parameter, or there are too few measurements.
     """
     scene = resolve(scene)
     parameters = find_parameters(scene, liquid_id, names)

@@ -155,7 +155,7 @@ def with_centred_velocity(motion: Motion) -> Motion:
     Raises
     ------
     StudyError
-    There are too few rows, or they are too far apart.
+        There are too few rows, or they are too far apart.
     """
     if motion.velocity_mps is not None:
         return motion

@@ -42,7 +42,7 @@ def write_fit(fit: Fit | CurveFit, to: Path, source: Path) -> tuple[Path, ...]:
     Raises
     ------
     StoreError, AnalysisError
-    The folder cannot be created or written.
+        The folder cannot be created or written.
     """
     make_folder(to, waits=False)
     name = f"{fit.liquid_id}-fit"

@@ -79,17 +79,17 @@ def rehearse_answers(
     protocol : str or Path
         File or name of a protocol.
     participants : int
-    Number of participants.
+        Number of participants.
     seed : int
-    Seed of all randomness, including the key's.
+        Seed of all randomness, including the key's.
     results : Path, optional
         Study folder; by default a new ``results/<study>-rehearsal-<n>`` of the workspace.
     group : str, optional
         The pre-existing group of all participants; by default they are distributed evenly.
     features : ConditionFeatures, optional
-    The features of each condition; by default they are rehearsed first.
+        The features of each condition; by default they are rehearsed first.
     progress : callable, optional
-    Called with a line from time to time.
+        Called with a line from time to time.
 
     Raises
     ------
@@ -270,7 +270,7 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
     source : bytes
         Its source.
     start : SessionStart
-    The initial data of the session.
+        The initial data of the session.
     step : int
         The index of the step in the schedule of `preview.preview` with the same seed and participant.
 

@@ -84,11 +84,11 @@ def _withheld_shares(
     Parameters
     ----------
     rig : Rig
-    The rig of `_late_rig`.
+        The rig of `_late_rig`.
     scene : Scene
         The liquid.
     task : AnyTask
-    The task of the simulated hand.
+        The task of the simulated hand.
     workspace_m : tuple of float
         Full sizes of the tank [m, hand frame].
     """

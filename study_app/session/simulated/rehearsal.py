@@ -484,9 +484,9 @@ def rehearse(
     protocol : str or Path
         File or name of a protocol.
     participants : int
-    Number of participants.
+        Number of participants.
     seed : int
-    Seed of all randomness, including the key's.
+        Seed of all randomness, including the key's.
     device : str
         A simulated device.
     results : Path, optional
@@ -555,9 +555,9 @@ def finish_session(
     protocol : str or Path
         File or name of a protocol.
     participant : str
-    The participant's id.
+        The participant's id.
     seed : int
-    Seed of all randomness of a new session, including the key's.
+        Seed of all randomness of a new session, including the key's.
     device : str
         A simulated device, for a new session.
     results : Path
@@ -568,7 +568,7 @@ def finish_session(
     Raises
     ------
     StudyError
-    As for `rehearse` and `reopen_session`; earlier data are safe.
+        As for `rehearse` and `reopen_session`; earlier data are safe.
     """
     folder = StudyFolder(results)
     session = folder.session(participant, 1)
@@ -627,15 +627,15 @@ def open_session(
     Parameters
     ----------
     study : Protocol
-    The study to run.
+        The study to run.
     source : bytes
         Its source.
     participant : str
-    The participant's id.
+        The participant's id.
     results : Path
         The study folder.
     seed : int
-    Seed of all its randomness.
+        Seed of all its randomness.
     session : int
         The number of the participant's session.
     device : str

@@ -127,7 +127,7 @@ def check_conditions(folder: Path, protocol: Protocol) -> None:
     Raises
     ------
     StoreError
-    The key has other conditions, or cannot be used.
+        The key has other conditions, or cannot be used.
     """
     study = StudyFolder(folder)
     if is_there(study.key):
@@ -180,7 +180,7 @@ def revealed_key(folder: Path) -> Key | None:
     Raises
     ------
     StoreError
-    The key was revealed, and is now missing, unreadable or changed.
+        The key was revealed, and is now missing, unreadable or changed.
     """
     study = StudyFolder(folder)
     return verified_key(study) if reveals(folder) else None
@@ -301,7 +301,7 @@ def read_key(folder: Path) -> Key:
     Raises
     ------
     StoreError
-    The key is missing or invalid.
+        The key is missing or invalid.
     """
     path = StudyFolder(folder).key
     sealed = journal.as_written(read_own(path, folder))
@@ -438,7 +438,7 @@ def opened_key(folder: StudyFolder) -> Key | None:
     Raises
     ------
     StoreError
-    The key was opened, and is now missing or unreadable.
+        The key was opened, and is now missing or unreadable.
     """
     return read_key(folder.path) if reveals(folder.path) else None
 

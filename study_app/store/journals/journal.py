@@ -72,7 +72,7 @@ class SessionClock:
     origin_at : datetime, optional
         Wall time at the origin, with its zone; by default derived from the current wall time.
     shown_s : float
-    Current time of the clock [s], above 0 in a resumed session.
+        Current time of the clock [s], above 0 in a resumed session.
     """
 
     def __init__(
@@ -129,7 +129,7 @@ def read(path: Path) -> list[Event]:
     Raises
     ------
     StoreError
-    The journal cannot be read, or is damaged before its last line.
+        The journal cannot be read, or is damaged before its last line.
     """
     return read_complete(path).lines
 
@@ -250,7 +250,7 @@ class Journal:
         Raises
         ------
         StoreError
-        The file exists already, or cannot be created.
+            The file exists already, or cannot be created.
         """
         with contextlib.ExitStack() as failing:
             try:
@@ -273,7 +273,7 @@ class Journal:
         Raises
         ------
         StoreError
-        The journal cannot be read or written, or has changed since.
+            The journal cannot be read or written, or has changed since.
         """
         try:
             if contents.torn_bytes:
@@ -339,7 +339,7 @@ class Journal:
         Raises
         ------
         StoreError
-        The last flush in the background failed; the message gives the reason.
+            The last flush in the background failed; the message gives the reason.
         """
         if (failed := self._failed) is not None:
             raise cannot_write(self.path, failed)

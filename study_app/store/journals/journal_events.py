@@ -737,7 +737,7 @@ def start_of(lines: Sequence[Event]) -> SessionStarted:
     Raises
     ------
     StoreError
-    The first line is another event.
+        The first line is another event.
     """
     if not lines or not isinstance(start := lines[0], SessionStarted):
         raise StoreError(

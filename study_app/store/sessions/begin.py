@@ -62,7 +62,7 @@ class SessionStart:
     participant : str
         The participant's id.
     seed : int
-    Seed of all its randomness.
+        Seed of all its randomness.
     operator : str
         Name or initials of the operator.
     language : str
@@ -74,9 +74,9 @@ class SessionStart:
     simulated : bool
         Whether the participant, or the hand, is simulated.
     session : int
-    Number of the participant's session, from 1.
+        Number of the participant's session, from 1.
     pilot : bool
-    Whether the session is a pilot.
+        Whether the session is a pilot.
     recordings : bool
         Whether the trials' samples and frames are recorded, by the ``recorder`` of the store.
     motors_masked : mapping, optional
@@ -122,11 +122,11 @@ def begin_session(
     results : Path
         The study folder.
     protocol : Protocol
-    The protocol to run.
+        The protocol to run.
     source : bytes
         The content of the protocol's file, hashed into the receipt.
     start : SessionStart
-    Participant, device and other initial data.
+        Participant, device and other initial data.
     clock : SessionClock, optional
         Its origin is the session's; by default the system's monotonic clock from now.
 
@@ -303,7 +303,7 @@ class UsedIds:
         Raises
         ------
         StoreError
-        The session or id is used; the message names the three possible remedies.
+            The session or id is used; the message names the three possible remedies.
         """
         if not 1 <= number <= MAX_SESSION:
             raise StoreError(f"session number {number} cannot be used: it must be from 1 to {MAX_SESSION}")
@@ -351,7 +351,7 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
     Raises
     ------
     StoreError
-    The id is invalid; the message names the permitted characters.
+        The id is invalid; the message names the permitted characters.
     """
     if not ID_PATTERN.fullmatch(participant) or len(participant) > _MAX_ID_LENGTH:
         raise StoreError(
@@ -371,7 +371,7 @@ def refuse_never_begun(session: SessionFolder) -> None:
     Raises
     ------
     StoreError
-    The session was never begun; the message says how to begin it.
+        The session was never begun; the message says how to begin it.
     """
     if is_abandoned(session.path):
         raise StoreError(

@@ -167,7 +167,7 @@ class SessionStore:
         Raises
         ------
         StoreError
-        A flush failed; the message gives the reason.
+            A flush failed; the message gives the reason.
         """
         self.journal.check_flushed()
 

@@ -89,7 +89,7 @@ def reopen_store(
     session_folder : Path
         The session's ``ses-NN`` folder.
     protocol : Protocol
-    The protocol to run.
+        The protocol to run.
     source : bytes
         The content of the protocol's file, with the hash recorded when the session began.
     operator : str
@@ -160,7 +160,7 @@ def check_resumable(session_folder: Path, protocol: Protocol, source: bytes) -> 
     Raises
     ------
     StoreError
-    As for `reopen_store`.
+        As for `reopen_store`.
     """
     study_folder, folder = locate_session(session_folder)
     refuse_never_begun(folder)
@@ -174,7 +174,7 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
     Raises
     ------
     StoreError
-    The path is not a session folder.
+        The path is not a session folder.
     """
     study_folder, _ = locate_session(session_folder)
     try:

@@ -43,13 +43,13 @@ class SimulatedStudy:
     results : Path
         The study folder.
     protocol : Protocol
-    The protocol to answer.
+        The protocol to answer.
     source : bytes
         The content of the protocol's file, hashed into the receipts.
     participants : tuple of str
-    Ids of all coming participants; none may be used.
+        Ids of all coming participants; none may be used.
     seed : int
-    Seed of the sessions and of the key.
+        Seed of the sessions and of the key.
     device : mapping
         Description for the receipts.
     screens : mapping
@@ -109,7 +109,7 @@ class SimulatedStudy:
         Raises
         ------
         StoreError
-        Another program wrote the session first, or it cannot be written.
+            Another program wrote the session first, or it cannot be written.
         """
         place, lines, key = session.place, session.lines, opened_key(self.folder)
         ended = {**lines[-1].fields(), "ended_at": lines[-1].at}
@@ -191,7 +191,7 @@ class SimulatedSession:
         Raises
         ------
         StoreError
-        The session cannot be written, or exists already.
+            The session cannot be written, or exists already.
         """
         self.append(SessionEnded(status=status, reason=reason))
         self._study.keep(self)

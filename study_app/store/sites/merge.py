@@ -74,7 +74,7 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
     to : Path
         The merged study's folder.
     progress : callable, optional
-    Called with the current step and the fraction done.
+        Called with the current step and the fraction done.
 
     Raises
     ------

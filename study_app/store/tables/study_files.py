@@ -265,7 +265,7 @@ def check_study(folder: StudyFolder, study: str) -> None:
     Raises
     ------
     StoreError
-    The folder is unsuitable; the message names its kind and the one to use instead.
+        The folder is unsuitable; the message names its kind and the one to use instead.
     """
     refuse_merged(folder.path)
     described = described_study(folder)

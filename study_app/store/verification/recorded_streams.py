@@ -36,7 +36,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
     Raises
     ------
     StoreError
-    The recording cannot be read, or has no stream of this program.
+        The recording cannot be read, or has no stream of this program.
     """
     streams = [(str(next(iter(it["info"].get("name") or ()), "")), it) for it in _read(file)]
     ours = [(name, it) for name, it in streams if name in {MARKERS, SAMPLES}]

@@ -37,7 +37,7 @@ def request_stamp(lines: str, server: str) -> str:
     Raises
     ------
     StoreError
-    The server returns no valid stamp within `WAITS_S`.
+        The server returns no valid stamp within `WAITS_S`.
     """
     client = optional_library("rfc3161_client")
     request = client.TimestampRequestBuilder().data(lines.encode()).build()

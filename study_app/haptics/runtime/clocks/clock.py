@@ -58,7 +58,7 @@ class SystemClock:
     Raises
     ------
     StudyError
-    The spin is below 0 or above 1000 µs.
+        The spin is below 0 or above 1000 µs.
     """
 
     runs = True
