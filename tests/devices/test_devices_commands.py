@@ -71,7 +71,7 @@ class TestDoctor:
             ("drop=1.5", "must be 0 to 1, not 1.5"),
             ("drop", "not known; choose from: drop=CHANCE"),
             ("never", "never-homes, "),
-            ("frozen=1", "does not come by chance"),
+            ("frozen=1", "cannot occur at random"),
             ("", "not known"),
         ],
     )

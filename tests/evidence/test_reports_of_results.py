@@ -49,7 +49,7 @@ def soaked(to: Path) -> tuple[Path, ...]:
     paths: list[Path] = []
     for name, share in (("clean", 0), ("some", 1), ("failed", 9)):
         rng = np.random.default_rng(share)
-        counts, device = (np.zeros(1, kind).view(np.recarray)[0] for kind in (soak.sample_audit.COUNTS, FAULTS))
+        counts, device = (np.zeros(1, kind).view(np.recarray)[0] for kind in (soak.sample_audit._COUNTS, FAULTS))
         for record in (counts, device):
             for field in record.dtype.names if share else ():
                 record[field] = rng.integers(0, share + 1, record.dtype[field].shape)

@@ -75,7 +75,7 @@ class Design(Table):
     )
     feedback: _Feedback | None = Field(
         default=None,
-        description="When the participant sees whether an answer was correct. practice (default): only in practice; "
+        description="When the participant sees whether an answer was correct. practice: only in practice, the default; "
         "always: after every answer; never: not at all. If no answer can be correct, the default is never.",
     )
     feedback_s: Annotated[float, within(0.2, 10, "people need 0.2 s to see a sign")] = Field(
@@ -220,7 +220,7 @@ class Oddity(Design):
         return self.answers[distances.index(max(distances))]
 
 
-class _Abx(Design):
+class Abx(Design):
     """Which of the first two was repeated as the third? (Munson & Gardner 1950, J. Acoust. Soc. Am. 22, 675)."""
 
     kind: Literal["abx"] = "abx"
@@ -241,7 +241,7 @@ class _Abx(Design):
         return self.answers[abs(third - first) >= abs(third - second)]
 
 
-class _SameDifferent(Design):
+class SameDifferent(Design):
     """Were the two the same? (Macmillan & Creelman 2005, Detection Theory, chapter 9)."""
 
     kind: Literal["samedifferent"] = "samedifferent"
@@ -263,7 +263,7 @@ class _SameDifferent(Design):
         return self.answers[attention.distinct(first - second, (first + second) / 2)]
 
 
-class _YesNo(Design):
+class YesNo(Design):
     """Was it there? (Green & Swets 1966): the answer "yes" to a comparison is a hit, to a standard a false alarm."""
 
     kind: Literal["yesno"] = "yesno"
@@ -310,7 +310,7 @@ class Rated(_JudgementDesign):
     reply: ClassVar = "rating"
 
 
-class _Estimation(_JudgementDesign):
+class Estimation(_JudgementDesign):
     """How strong was it, as a number? (Stevens 1957, Psychological Review 64, 153)."""
 
     kind: Literal["estimation"] = "estimation"
@@ -340,7 +340,7 @@ class Adjusted(_JudgementDesign):
 
 KINDS: Final[dict[str, type[Design]]] = {
     kind: design
-    for design in (_Abx, Adjusted, _Estimation, ForcedChoice, Oddity, Rated, _SameDifferent, _YesNo)
+    for design in (Abx, Adjusted, Estimation, ForcedChoice, Oddity, Rated, SameDifferent, YesNo)
     for kind in get_args(design.model_fields["kind"].annotation)
 }
 

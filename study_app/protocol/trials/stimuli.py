@@ -125,8 +125,8 @@ class Stimulus(Table):
     )
     level: _LevelKind | None = Field(
         default=None,
-        description="weber (default): (comparison − standard)/standard; difference (default for a time, …_ms): "
-        "comparison − standard; value: the comparison itself.",
+        description="weber: (comparison − standard)/standard, the default; difference: comparison − standard, the "
+        "default for a time (…_ms); value: the comparison itself.",
     )
     standards: tuple[float, ...] = Field(
         default=(), max_length=8, description="The standard stimuli; default: the present value."

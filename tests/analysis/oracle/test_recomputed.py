@@ -148,9 +148,9 @@ def control_exchanged_with_delay(patched: pytest.MonkeyPatch) -> None:
 
 
 def conditions_exchanged(patched: pytest.MonkeyPatch) -> None:
-    def swapped(contrast: Any, block: str, condition: Any, *rest: Any, of: Any = contrasts._values) -> Any:
+    def swapped(study: Any, contrast: Any, block: str, condition: Any, *rest: Any, of: Any = contrasts._values) -> Any:
         others = [other for other in contrast.conditions or () if other != condition] or [condition]
-        return of(contrast, block, others[0], *rest)
+        return of(study, contrast, block, others[0], *rest)
 
     patched.setattr(contrasts, "_values", swapped)
 

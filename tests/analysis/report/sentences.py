@@ -748,6 +748,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"minority that shifts the mean by the bound\.",
      lambda match, told: int(match[1] or 1)
      == sum(one["contrast"]["bound"] is not None for one in told.contrasts)),
+    (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
+     when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Some participants were excluded from a hypothesis because a number is missing \(.*\)\.",
      when(lambda told: any(one["left_out"] for one in told.contrasts))),
     (r"Statements were rated on seven-point scales and treated as ordinal: answers are summarised by medians and "

@@ -36,7 +36,9 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     results.open()
     study = load_study(results.folder)
     told = methods(study, evaluate(study))
-    both = "p Holm-adjusted across 1 primary statement and by Benjamini-Hochberg over {} exploratory statements"
+    both = (
+        "Holm method across 1 primary statement and by the Benjamini-Hochberg method across {} exploratory statements"
+    )
     assert both.format("eight") in told
     assert both.format("four") in told
 

@@ -241,7 +241,7 @@ def test_sessions_that_were_asked_other_statements_are_not_pooled(rek: Results) 
     )
     path = rek.responses("P002")
     path.write_text(path.read_text("utf-8").replace("like_tar", "like_glue"), encoding="utf-8", newline="\n")
-    assert "other statements" in refusal(rek.folder)
+    assert "different statements" in refusal(rek.folder)
 
 
 def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:

@@ -120,7 +120,7 @@ from study_app.protocol.load import load_scene
 
 application, writing = QCoreApplication(), threading.Event()
 lab_controller.save_preset = lambda *_written: (writing.set(), threading.Event().wait())
-saving, scene = lab_controller.LabSaving(()), load_scene("rek2024", "water")
+saving, scene = lab_controller._LabSaving(()), load_scene("rek2024", "water")
 saving.save_preset(Path("never.toml"), Setting("Water", scene, scene))
 assert writing.wait(20)
 saving.wait(0.1)

@@ -137,7 +137,7 @@ def test_a_length_beyond_what_was_measured_ends_at_the_edge():
     short = paths.programmed_motion("line", moving_s=0.2)
     found = fit(override_all(TANK, {"length": 100}), "tank", ["length"], short, force_of(TANK, short))
     assert found.values["length"] == 200
-    assert any("edge of its range, 200 (at most" in warning for warning in found.warnings)
+    assert any("reached the end of its range, 200 (it cannot exceed" in warning for warning in found.warnings)
 
 
 def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
