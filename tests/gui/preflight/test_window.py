@@ -79,13 +79,14 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
     protocol = load("demo")
     schedule = build_schedule(protocol, "P007", 5)
     first, second = (trial.number for trial in schedule.trials[:2])
+    answers = [{"item": "a", "first_s": 3.0}, {"item": "b", "first_s": 4.0}]
     happened = (
         {"event": "session_started"},
         {"event": "page_shown", "page": "welcome"},
         {"event": "page_left", "page": "welcome"},
         {"event": "trial_started", "trial": first, "attempt": 1, "phase": "main"},
         {"event": "trial_ended", "trial": first, "attempt": 1, "outcome": "complete"},
-        {"event": "responses", "trial": first, "attempt": 1, "items": [{"item": "a", "first_s": 3.0}, {"item": "b", "first_s": 4.0}]},
+        {"event": "responses", "trial": first, "attempt": 1, "items": answers},
         {"event": "trial_started", "trial": second, "attempt": 1, "phase": "main"},
     )
     journal = [event_from({**line, "t_s": float(at)}) for at, line in enumerate(happened)]
