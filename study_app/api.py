@@ -187,7 +187,7 @@ def simulate_force(
     motion : str, Path or tuple
         A programmed path (``"circle"``, ``"line"``, ``"stop"`` …), a CSV file, or times (n,) [s] and positions (n, 3)
         [m, scene], one row per tick.
-        **parameters
+    **parameters
         Values that override the file's, such as ``viscosity_pa_s=2.0``.
 
     Returns
