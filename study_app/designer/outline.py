@@ -234,21 +234,20 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
         for path in sections
     ]
     entries += _addable_questions(study, around) if not any(path[0] == _QUESTIONNAIRES for path in lists) else ()
-    entries += (*_addable_liquids(), *_addable_instruments()) if second else ()
+    entries += (*_addable_liquids(study), *_addable_instruments()) if second else ()
     return tuple(entries)
 
 
-@cache
-def _addable_liquids() -> tuple[Addable, ...]:
+def _addable_liquids(study: Study) -> tuple[Addable, ...]:
     """Return the liquids of the shipped studies."""
     return tuple(
         Addable(
-            words=f"{label_of(name)} liquid ({study})",
+            words=f"{label_of(name)} liquid ({source})",
             icon=icon_of(("liquids", name), {}),
-            asks=AddLiquid(study, name),
-            help=f"As in the shipped study {study}, with all its numbers",
+            asks=AddLiquid(source, name),
+            help=AddLiquid(source, name).help(study),
         )
-        for study, name in shipped_liquids()
+        for source, name in shipped_liquids()
     )
 
 

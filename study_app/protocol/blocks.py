@@ -16,7 +16,10 @@ Compared: TypeAlias = Literal["liquids", "delays", "views"]
 Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*$", max_length=MAX_ID)]
 
 
-_WAYS: Final = ("a stimulus", "conditions", "conditions and no design")
+_NOT_WITH_DESIGN: Final = ("max_repeats", "min_distance", "questionnaire")
+"""Keys of a block without a design: a design draws its own order and asks its own question."""
+
+_WAYS: Final = ("a stimulus", "a design", "conditions and no design")
 """What a block presents, in words, for each entry of `Block.NOT_WITH`."""
 _ROUNDING: Final = 1e-9
 
@@ -67,8 +70,8 @@ class Block(Table):
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("conditions", "stimulus"),)
     NOT_WITH: ClassVar[tuple[tuple[tuple[str, ...], tuple[str, ...]], ...]] = (
-        (("stimulus",), ("standard", "repetitions", "order", "compares")),
-        (("design",), ("standards", "method", "catch", "order", "compares")),
+        (("stimulus",), ("standard", "repetitions", "order", "compares", *_NOT_WITH_DESIGN)),
+        (("design",), ("standards", "method", "catch", "order", "compares", *_NOT_WITH_DESIGN)),
         ((), ("standard", "standards", "method", "until", "catch")),
     )
     SECTIONS: ClassVar[tuple[tuple[str, tuple[str, ...]], ...]] = (
@@ -155,11 +158,13 @@ class Block(Table):
         ways = zip(_WAYS, self.NOT_WITH, strict=True)
         what, refused = next((what, keys) for what, (given, keys) in ways if all(getattr(self, key) for key in given))
         for name in refused:
-            if name in self.model_fields_set:
-                elsewhere = (what, name) == ("a stimulus", "repetitions")
-                instead = "set it in the method's table" if elsewhere else "omit it"
+            if name in self.model_fields_set and getattr(self, name) is not None:  # receipts contain every key
+                instead = {
+                    "repetitions": "set it in the method's table",
+                    "questionnaire": "ask it in a form after the block",
+                }.get(name, "omit it")
                 raise invalid(f"cannot be used in a block with {what}: {instead}", name, kind="surplus")
-        if what == "conditions" and (self.standard not in self.conditions or len(self.conditions) < 2):
+        if what == "a design" and (self.standard not in self.conditions or len(self.conditions) < 2):
             raise invalid("must be one of at least two conditions: choose the reference", "standard")
         return self
 
@@ -171,9 +176,9 @@ class Block(Table):
             if self.part is None:
                 raise invalid("a main block needs a part: 1, 2, …", "part")
         elif self.compares is not None:
-            raise invalid(f"a {self.phase} block does not make a comparison: omit this key", "compares")
+            raise invalid(f"a {self.phase} block does not make a comparison: omit this key", "compares", kind="surplus")
         elif self.code_prefix is not None:
-            raise invalid(f"a {self.phase} block is not blinded: omit code_prefix", "code_prefix")
+            raise invalid(f"a {self.phase} block is not blinded: omit code_prefix", "code_prefix", kind="surplus")
         elif len(self.conditions) > 1 and self.design is None:
             count = len(self.conditions)
             raise invalid(

@@ -170,7 +170,8 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
     part = "" if block.part is None else f"Part {block.part}: "
     questionnaire, compared = protocol.questionnaire_of(block.id), protocol.compared_in(block.id)
     trials = order_of(protocol, block).trials
-    times = f"every condition {block.repetitions} times" if block.repetitions > 1 else ""
+    shown = "condition" if block.design is None else "comparison"
+    times = f"every {shown} {block.repetitions} times" if block.repetitions > 1 else ""
     rows = [
         ("Trials", ", ".join(filter(None, (counted(trials, "trial"), times, _order_text(block))))),
         *_assignment_and_break_rows(protocol, block, language),
@@ -252,6 +253,8 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
 def _order_text(block: Block) -> str:
     if len(block.conditions) < 2:
         return ""
+    if block.design is not None:
+        return "another order for each participant"
     match block.order:
         case "fixed":
             return "in the order written: readers of the protocol can identify the codes"

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 import shiboken6
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.steps import AddKey, RenameElement
@@ -93,3 +93,14 @@ def test_any_language_from_right_to_left_is_typed_so(
     field = designer.field(*row)
     lines = [*field.findChildren(QLineEdit), *field.findChildren(QPlainTextEdit)]
     assert {one.layoutDirection() for one in lines} == {Qt.LayoutDirection.RightToLeft}
+
+
+def test_a_field_does_not_move_while_its_row_shrinks(designer: Any) -> None:
+    """When a message disappears, the row and the form are too high until Qt has laid them out."""
+    designer.open("kitchen", "blocks", "liquids")
+    (line,) = designer.field("blocks", "liquids", "title").findChildren(QLineEdit)
+    for higher in (designer.form_row("blocks", "liquids", "title"), designer.place.form.panel):
+        before = line.mapTo(higher, QPoint())
+        higher.resize(higher.width(), higher.height() + 80)
+        higher.layout().activate()
+        assert line.mapTo(higher, QPoint()) == before

@@ -102,6 +102,15 @@ def test_every_form_and_view_fits_and_has_names(
 
 
 @SIZES
+def test_a_block_without_a_design_fits(designer: Any, editors: None, size: tuple[int, int]) -> None:
+    """It offers the keys with the longest names; a form that does not fit is cut on the left."""
+    designer.window.resize(*size)
+    designer.controller.begin_study("template:empty", "mine")
+    designer.go_to("blocks", "liquids")
+    assert fits(designer.place.form.area)
+
+
+@SIZES
 @pytest.mark.parametrize("theme", [LIGHT, DARK])
 def test_measures_and_the_page_of_a_new_study_fit(
     qtbot: Any, designer: Any, windows: list[str], size: tuple[int, int], theme: Any

@@ -73,7 +73,6 @@ def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...
     others: list[Edit] = [Unset((*path[:2], key)) for key in refused_at(after, path[:2]) if key in block]
     sequence, form = value_at(after, ("sequence",)), block.get("questionnaire")
     if "design" in block:
-        others += [Unset((*path[:2], key)) for key in ("max_repeats", "min_distance", "questionnaire") if key in block]
         if form is not None and isinstance(sequence, tuple) and path[1] in sequence and form not in sequence:
             others.append(Insert(("sequence", sequence.index(path[1]) + 1), form))
         conditions = block.get("conditions", ())

@@ -43,6 +43,7 @@ from study_app.ids import free_id
 from study_app.number_text import counted
 from study_app.protocol.formats import is_format_2
 from study_app.protocol.load import read_document, shipped, source_bytes
+from study_app.protocol.model import SceneDefaults
 from study_app.protocol.questionnaires import instrument_tables
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name, languages_of
@@ -248,12 +249,16 @@ class AddInstrument(Request):
 
 
 @cache
+def _shipped_documents() -> dict[str, Mapping[str, Any]]:
+    return {name: read_document(source_bytes(name), name)[0] for name in shipped()}
+
+
+@cache
 def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
     """Return the shipped studies' liquids that have the same meaning in format 2, by study and id."""
-    documents = {name: read_document(source_bytes(name), name)[0] for name in shipped()}
     return {
         (study, name): table
-        for study, document in documents.items()
+        for study, document in _shipped_documents().items()
         for name, table in document.get("liquids", {}).items()
         if is_format_2(document) or table.get("effects", "auto") != "auto"
     }
@@ -265,6 +270,17 @@ class AddLiquid(Request):
 
     source: str
     name: str
+
+    def help(self, study: Study) -> str:
+        """Return where the liquid comes from, and whether its forces differ because the scales of the scenes do."""
+        theirs, own = (
+            value_at(document, ("scene", "scale")) or SceneDefaults.model_fields["scale"].default
+            for document in (_shipped_documents()[self.source], study.document)
+        )
+        origin = f"As in the shipped study {self.source}, with all its numbers"
+        if theirs == own:
+            return origin
+        return f"{origin}. Its forces differ: there the scale of the scene is {theirs:g}, here {own:g}."
 
     def step(self, at: Situation) -> Step:
         document = at.study.document

@@ -219,6 +219,7 @@ class RowWidget(Themed, QWidget):
         if wide and not bare:
             column.addWidget(self.field)
         add_layout(column, self._buttons)
+        column.addStretch(1)  # otherwise a field moves while its row shrinks, and a click misses it
         self.show_row(row)
 
     @cached_property
@@ -228,7 +229,7 @@ class RowWidget(Themed, QWidget):
         column = self.layout()
         assert isinstance(column, QVBoxLayout)  # noqa: S101 - made so
         made.hide()
-        column.insertWidget(column.count() - 1, made)
+        column.insertWidget(column.count() - 2, made)
         name_scroll_bars(made)
         return made
 
@@ -534,6 +535,8 @@ class _FormHead(QWidget):
 
 
 _ACROSS = 2
+_ADD_PX = 235
+"""The greatest width of a button in a column of `_AddKeys` [px]."""
 _FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
 
@@ -568,11 +571,15 @@ class _AddKeys(QWidget):
         super().__init__()
         grid = grid_of(0, 0, margins=0, parent=self)
         self.buttons: dict[Path, QWidget] = {}
-        for at, (inner, name, help_) in enumerate(keys):
+        at = 0
+        for inner, name, help_ in keys:
             made = self.buttons[inner] = add_button(f"Add {name}", name)
             made.setToolTip(help_)
             made.clicked.connect(lambda _checked=False, inner=inner: add(inner))
-            grid.addWidget(made, at // _ACROSS, at % _ACROSS, Qt.AlignmentFlag.AlignLeft)
+            columns = _ACROSS if made.sizeHint().width() > _ADD_PX else 1
+            at += -at % columns  # a long name has a line of its own
+            grid.addWidget(made, at // _ACROSS, at % _ACROSS, 1, columns, Qt.AlignmentFlag.AlignLeft)
+            at += columns
 
 
 class FormCard(Card):
@@ -601,7 +608,7 @@ class FormCard(Card):
         self.above, self.panel, self.below = QuestionRows(), Panel(), QuestionRows()
         for questions in (self.above, self.below):
             questions.asked.connect(self.asked)
-        self.sections = vbox(spacing=7, parent=self.panel)
+        self.sections = vbox(STRETCH, spacing=7, parent=self.panel)
         self.inside = QWidget()
         vbox(self.above, self.panel, self.below, STRETCH, spacing=7, margins=(0, 2, 8, 2), parent=self.inside)
         self.area = scrolled(self.inside)

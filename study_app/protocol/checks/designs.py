@@ -96,11 +96,6 @@ def _missing_for(protocol: Protocol, rule: ExclusionRule) -> str | None:
 
 def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     design, place = design_of(protocol, block), ("blocks", block.id)
-    if block.questionnaire is not None:
-        message = "a block with a design asks the question of its design"
-        yield Fault(
-            (*place, "questionnaire"), message, "omit questionnaire, and ask other questions in a form after the block"
-        )
     correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.designer.document.fields import kind_note, row_at
+from study_app.designer.document.fields import kind_note, refused_at, row_at
 from study_app.designer.document.steps import AddKey, AddLiquid, RemoveKey, SetValue, Situation, shipped_liquids
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.outline import addable_elements
@@ -71,6 +71,15 @@ def test_each_design_of_the_list_is_one_step_without_a_problem(study: Study, kin
     assert whole.document["sequence"] == ("feel", "after"), "the questionnaire comes once, after the block"
 
 
+def test_a_block_with_a_design_does_not_offer_a_questionnaire_after_each_trial(study: Study) -> None:
+    refused = refused_at(after(study, SetValue(DESIGN, "abx")).document, DESIGN[:2])
+    assert {"questionnaire", "max_repeats", "min_distance"} <= refused
+    wrong = after(study, SetValue(DESIGN, "abx"), SetValue((*DESIGN[:2], "questionnaire"), "after"))
+    (fault,) = wrong.faults
+    assert fault.kind == "surplus"
+    assert fault.message == "cannot be used in a block with a design: ask it in a form after the block"
+
+
 def test_a_design_that_is_added_and_removed_again_leaves_no_problem(study: Study) -> None:
     added = after(study, AddKey(DESIGN))
     assert added.faults == ()
@@ -103,6 +112,9 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     entries = {entry.words: entry for entry in addable_elements(study, ())}
     slime = entries["Slime liquid (slime)"]
     assert isinstance(slime.asks, AddLiquid)
+    assert slime.help.endswith("Its forces differ: there the scale of the scene is 3, here 10.")
+    same = after(study, SetValue(("scene", "scale"), 3))
+    assert slime.asks.help(same) == "As in the shipped study slime, with all its numbers"
     added = after(study, slime.asks)
     assert added.faults == ()
     table = added.document["liquids"]["slime_2"]
