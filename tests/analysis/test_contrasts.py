@@ -101,6 +101,19 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
         assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
 
 
+def test_methods_name_all_compared_conditions_with_their_delays(tmp_path: Path) -> None:
+    text = DELAYED
+    for old, new in D_PRIMES:
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "delayed.toml").write_text(text.replace('"threshold"', '"d_prime"').replace("1.25", "0.3"), "utf-8")
+    folder = rehearse_answers(tmp_path / "delayed.toml", participants=3, seed=3, results=tmp_path / "s")
+    unblind(folder, "AB", "to analyse")
+    made = load_study(folder)
+    words = methods(made, evaluate(made))
+    assert "damper and damper with a visual delay of 60 ms were compared by two-interval forced choice" in words
+
+
 def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_block(tmp_path: Path) -> None:
     """A 3-down-1-up track stays above the threshold, which may therefore lie below all levels that a person met."""
     method = 'kind = "updown", rule = "3down1up", tracks = 2, trials = 24'

@@ -282,6 +282,8 @@ class LevelBlock:
     method: Method | None = None
     published: tuple[Published, ...] = ()
     wrong_most: float | None = None
+    reference: Setting | None = None
+    """The condition that the block's other conditions are compared with; None with a stimulus or a sealed key."""
 
     @property
     def has_correct_answer(self) -> bool:
@@ -326,11 +328,14 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
     stimulus: Stimulus | None = None
     method: Method | None = None
     published: tuple[Published, ...] = ()
-    if whole is not None:
+    reference: Setting | None = None
+    if whole is not None and key is not None:
         block = whole.blocks[step]
         design = design_of(whole, block)
         if block.stimulus is not None:
             stimulus, method = stimulus_of(whole, block), method_of(whole, block)
+        if block.standard is not None:
+            reference = _of_condition(key.tables["conditions"][block.standard], block.standard, block.standard)
         if whole.analysis is not None:
             published = tuple(published for published in whole.analysis.published if published.block == step)
     elif (written := protocol.get("designs", {}).get(table["design"])) is not None:
@@ -340,7 +345,7 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
     title = text_in(table["title"], display_language(protocol))
     return LevelBlock(
         step, title, table["phase"], design, stimulus, _settings_in(protocol, step, key), method, published,
-        (table.get("catch") or {}).get("wrong_most"),
+        (table.get("catch") or {}).get("wrong_most"), reference,
     )  # fmt: skip
 
 

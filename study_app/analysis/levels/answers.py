@@ -9,7 +9,7 @@ from typing import Final, NamedTuple
 import numpy as np
 import pandas as pd
 
-from study_app.analysis.data.blocks import LevelBlock
+from study_app.analysis.data.blocks import LevelBlock, Setting
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import drawn_figure, paragraph, table, table_of
@@ -38,6 +38,12 @@ from study_app.protocol.trials.designs import Reply
 from study_app.protocol.trials.stimuli import Stimulus
 
 _MOST_NAMED = 6
+
+
+def _condition_words(setting: Setting) -> str:
+    """Return the liquid of a condition with its visual delay, if it has one."""
+    delay = f" with a visual delay of {setting.delay_ms:g} ms" if setting.delay_ms else ""
+    return f"{(setting.liquid or '').replace('_', ' ')}{delay}{f' ({setting.link})' if setting.link else ''}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -400,7 +406,8 @@ class Answers(LevelStatistic[LevelAnswers]):
             return
         stimulus, title, design = block.stimulus, self.found.title, block.design.paper_name
         if stimulus is None:
-            yield f"In “{title}” conditions were compared by {design}."
+            known = [] if block.reference is None else [block.reference, *block.settings]
+            yield f"In “{title}” {listed([*map(_condition_words, known)]) or 'conditions'} were compared by {design}."
             return
         kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
         chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"

@@ -177,7 +177,7 @@ def _apparatus(study: Study) -> str:
 def _liquids(study: Study) -> str:
     """Return the liquids of the main blocks with their parameters; "" while the key is sealed."""
     settings = [setting for block in study.blocks for setting in block.settings]
-    settings += [setting for block in study.levels for setting in block.settings]
+    settings += [setting for block in study.levels for setting in (block.reference, *block.settings) if setting]
     held = [
         setting.liquid
         for each in settings
