@@ -314,6 +314,12 @@ class MainController(QObject):
     def open_designer(self, source: str) -> None:
         self._go_to_designer(lambda designer: designer.open(source))
 
+    def discard_draft(self, source: str) -> None:
+        """Show a draft in the designer and discard it; the designer asks first if the study was never saved."""
+        self._go_to_designer(
+            lambda designer: designer.open(source), lambda designer: designer.saving.answer_banner("discard")
+        )
+
     def show_version(self, session: SessionFacts) -> None:
         """Open the designer at the changes since a session; without the study's file, list those between sessions."""
         try:
@@ -359,6 +365,7 @@ class MainController(QObject):
         made.results_asked.connect(self.show_study)
         made.protocol_opened.connect(self.machine.remember_protocol)
         made.edit_asked.connect(self.open_designer)
+        made.discard_asked.connect(self.discard_draft)
         made.new_asked.connect(self.begin_new_study)
         made.device.display.clicked.connect(self._test_display)
         self._home_place = made

@@ -269,6 +269,7 @@ class _FileCard(Card):
     """
 
     edit = Signal(object)
+    discard = Signal(object)
 
     def __init__(self, facts: Facts, title: str, *, copies: bool = False, first: bool = False, sign: str = "") -> None:
         super().__init__(padding=20, gap=8)
@@ -285,6 +286,7 @@ class _FileCard(Card):
         add_layout(self.column, top)
         self.draft = label("" if facts.draft is None else f"{facts.draft.words}.", "small", "warn", wraps=True)
         self.pen: ActionButton | IconButton
+        self.bin: IconButton | None = None
         if facts.draft is None:
             word, name = ("Make a copy", f"Make a copy of {title}") if copies else ("Edit", f"Edit {title}")
             self.pen = IconButton("copy" if copies else "pen", name, word, size=36, role="plain")
@@ -293,7 +295,12 @@ class _FileCard(Card):
         else:
             self.pen = ActionButton("pen", "Continue", role="primary" if first else "", height=38)
             self.pen.setAccessibleName(f"Continue {title}, {Path(facts.source).stem}")
-            row = hbox((self.draft, 1, Qt.AlignmentFlag.AlignTop), (self.pen, 0, Qt.AlignmentFlag.AlignTop), spacing=12)
+            name = f"Discard the draft of {title}, {Path(facts.source).stem} …"
+            self.bin = IconButton("trash", name, "Discard the draft …", size=38, role="danger")
+            self.bin.clicked.connect(lambda: self.discard.emit(facts))
+            row = hbox((self.draft, 1), self.pen, self.bin, spacing=12)
+            for part in (self.draft, self.pen, self.bin):
+                row.setAlignment(part, Qt.AlignmentFlag.AlignTop)
             add_layout(self.column, row)
         self.pen.clicked.connect(lambda: self.edit.emit(facts))
 

@@ -69,8 +69,8 @@ class HomePlace(Place):
     """The page with studies, sessions, device and lab.
 
     ``session_asked`` carries the operator's choices, ``results_asked`` a study folder, ``protocol_opened`` the file of
-    a study that was opened here, ``edit_asked`` the source of a study to edit, ``new_asked`` that of one to copy, ""
-    for any.
+    a study that was opened here, ``edit_asked`` the source of a study to edit, ``discard_asked`` that of a draft to
+    discard, ``new_asked`` that of a study to copy, "" for any.
 
     Parameters
     ----------
@@ -82,6 +82,7 @@ class HomePlace(Place):
     results_asked = Signal(object)
     protocol_opened = Signal(object)
     edit_asked = Signal(str)
+    discard_asked = Signal(str)
     new_asked = Signal(str)
 
     def __init__(self, results: Path, draft_words: LoadWords = None) -> None:
@@ -232,6 +233,7 @@ class HomePlace(Place):
                 card = BrokenCard(facts, first=first)
             asked = self.new_asked if ships else self.edit_asked
             card.edit.connect(lambda facts, asked=asked: asked.emit(facts.source))
+            card.discard.connect(lambda facts: self.discard_asked.emit(facts.source))
             cards.append(card)
         held, bar = self._focused_card(), self.cards_area.verticalScrollBar()
         down_px = bar.value()
@@ -448,7 +450,8 @@ def _row_beside_bar(part: QWidget | QLayout) -> QHBoxLayout:
 
 
 def _card_buttons(card: StudyCard | BrokenCard) -> tuple[QWidget, ...]:
-    return (card.pen, card.new, card.rehearse) if isinstance(card, StudyCard) else (card.pen,)
+    of_file = (card.pen,) if card.bin is None else (card.pen, card.bin)
+    return (*of_file, card.new, card.rehearse) if isinstance(card, StudyCard) else of_file
 
 
 def _read_sessions(

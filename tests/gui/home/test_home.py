@@ -157,6 +157,17 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
         assert (len(home.grid.cards), held, bar.value()) == (count - 1, home.grid.cards[0], 0)
 
 
+def test_a_draft_can_be_discarded_from_its_card(qtbot, tmp_path):
+    text = own_study(tmp_path).read_text(encoding="utf-8")
+    write_draft(tmp_path / "protocols" / "fresh.toml", Draft(text=text, base=""))
+    home = open_home(qtbot, tmp_path / "results")
+    drafts = [card for card in home.grid.cards if card.bin is not None]
+    assert [card.facts.source for card in drafts] == [str(tmp_path / "protocols" / "fresh.toml")]
+    with qtbot.waitSignal(home.discard_asked) as asked:
+        qtbot.mouseClick(drafts[0].bin, Qt.MouseButton.LeftButton)
+    assert asked.args == [drafts[0].facts.source]
+
+
 def test_where_only_samples_exist_sessions_are_one_line_until_they_are_asked_for(qtbot, tmp_path):
     hold(tmp_path / "sample-demo", "P001", simulated=True)
     home = open_home(qtbot, tmp_path)
