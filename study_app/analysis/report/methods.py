@@ -123,12 +123,7 @@ def _exclusions(study: Study) -> str:
     trials, sessions = sum(exclusion.trial is not None for exclusion in study.exclusions), len(study.excluded_sessions)
     out = [(study.left_out, "unfinished session"), (sessions, "excluded session"), (trials, "excluded trial")]
     parts = [counted(count, noun) for count, noun in out if count]
-    many = len(parts) > 1 or any(count > 1 for count, _ in out)
-    sentences = []
-    if parts:
-        sentences.append(
-            f"{number_text.capitalised(listed(parts))} {'were' if many else 'was'} excluded from the analysis."
-        )
+    sentences = [f"The analysis does not include {listed(parts)}."] if parts else []
     if study.late:
         sentences.append(f"Decisions after the key was opened: {late_exclusions(study)}.")
     elif study.revealed and any(exclusion.rule_or_person not in RULES for exclusion in study.exclusions):

@@ -76,8 +76,8 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     report(small.folder, tmp_path / "report")
     told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "in 2 different files); 1 participant lacks a condition, because individual trials were excluded. 1 "
-        "excluded session and two excluded trials were excluded from the analysis." in told
+        "in 2 different files); 1 participant lacks a condition, because individual trials were excluded. The "
+        "analysis does not include 1 excluded session and two excluded trials." in told
     )
     assert (
         f"Decisions after the key was opened: 1 exclusion of {len(gone) + 1} and the reversal of 1 exclusion."
