@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from study_app.devices import DEFAULT_DEVICE
-from study_app.devices.descriptor import NOT_AVAILABLE, Backend, DeviceDescriptor, Doctor, OpenRequest
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend, DeviceDescriptor, Doctor, OpenRequest
 from study_app.devices.descriptors import DEVICES as OWN
 from study_app.discovery import Registry, Returns
 from study_app.errors import DeviceError, DeviceNotFound
@@ -88,6 +88,15 @@ def open_device(name: str, **request: Any) -> Device:
             "study_app.devices.base.Device"
         )
     return opened
+
+
+def check_connected(name: str) -> None:
+    """Raise DeviceNotFound if the probe of a device finds none, before anything is compiled for it."""
+    device = descriptor_of(name)
+    states = _probe_device(device)
+    absent = [backend.why for backend in states if backend.state == NONE]
+    if absent and all(backend.state in {NONE, NOT_AVAILABLE} for backend in states):
+        raise DeviceNotFound(f"{device.title}: {NONE}{f' ({absent[0]})' if absent[0] else ''}")
 
 
 def doctor_of(name: str) -> Doctor:

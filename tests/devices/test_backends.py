@@ -5,13 +5,15 @@ from types import SimpleNamespace
 import numba
 import pytest
 
-from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY
+from study_app.devices import registry
+from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.falcon.failures import UsbFailure
 from study_app.devices.falcon.transport import probe as probe_falcon
 from study_app.devices.falcon.transport import probe_ftdi
 from study_app.devices.registry import backends, list_devices
 from study_app.devices.spacemouse.hid import MODELS
 from study_app.devices.spacemouse.hid import probe as probe_spacemouse
+from study_app.errors import DeviceNotFound
 
 
 def hid(*models):
@@ -101,3 +103,20 @@ def test_this_machine_can_be_asked_and_no_compiler_is_loaded():
     )
     finished = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, text=True)
     assert (finished.returncode, finished.stdout.strip()) == (0, "10"), finished.stderr
+
+
+@pytest.mark.parametrize(
+    ("states", "missing"),
+    [((NONE, NOT_AVAILABLE), True), ((NONE, DRIVER_READY), False), ((READY,), False), ((NOT_AVAILABLE,), False)],
+)
+def test_a_missing_device_is_reported_before_anything_is_compiled(
+    monkeypatch: pytest.MonkeyPatch, states: tuple[str, ...], missing: bool
+) -> None:
+    found = [Backend("pen", "a library", state=state, can="force", why="connect its cable") for state in states]
+    pen = SimpleNamespace(title="Pen", probe=lambda: found)
+    monkeypatch.setattr(registry, "descriptor_of", lambda _name: pen)
+    if not missing:
+        registry.check_connected("pen")
+        return
+    with pytest.raises(DeviceNotFound, match=r"^Pen: none connected \(connect its cable\)$"):
+        registry.check_connected("pen")

@@ -23,7 +23,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 from study_app.app.failures import BY_SIGNAL_S, CrashTrace, ending_on_signals
 from study_app.app.timing import collecting_in_this_thread, unfreeze_garbage
 from study_app.devices import DEFAULT_DEVICE
-from study_app.devices.registry import descriptor_of
+from study_app.devices.registry import check_connected, descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.discovery import explain_error
 from study_app.errors import SessionError, StoreError, StudyError
@@ -171,6 +171,7 @@ class LiveSession(QObject):
 
             study = self.chosen.read_protocol()
             check_choices(self.chosen, study)
+            check_connected(self.chosen.device)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
             with following_compilation(self._compiled.emit):
                 rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
