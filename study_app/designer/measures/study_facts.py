@@ -54,11 +54,12 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
     """Return for each language the numbers of its present and its required texts."""
     languages = languages_of(study.document)
     counted = {code: [0, 0] for code in languages}
-    for _, value in texts_of(study):
+    for path, value in texts_of(study):
+        is_instrument = value_at(study.document, (*path[:2], "instrument")) is not None  # the program has its texts
         for place, code in enumerate(languages):
             counted[code][1] += 1
             text = value.get(code) if isinstance(value, Mapping) else value if place == 0 else ""
-            counted[code][0] += bool(text.strip() if isinstance(text, str) else text)
+            counted[code][0] += is_instrument or bool(text.strip() if isinstance(text, str) else text)
     return {code: (present, wanted) for code, (present, wanted) in counted.items()}
 
 
