@@ -20,7 +20,7 @@ from study_app.protocol.load import validate_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import Evenness, balances, numbered_participants
 from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s
+from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s, variants
 from study_app.protocol.sequences import row_count
 from study_app.protocol.source.document import Path, frozen, has, value_at
 from study_app.protocol.source.problems import Fault
@@ -311,12 +311,13 @@ def facts(study: Study) -> Facts:
         known = replace(known, forces_n=forces_n)
     if not valid.whole:
         return known
-    orders = orders_of(protocol)
+    session = max((variant.protocol for variant in variants(protocol)), key=expected_duration_s)  # as `check` counts
+    orders = orders_of(session)
     warned = warnings(protocol, simulates=False, without_force=device_without_force()) if valid.forces else ()
     return replace(
         known,
-        expected_s=expected_duration_s(protocol),
-        range_s=duration_range_s(protocol),
+        expected_s=expected_duration_s(session),
+        range_s=duration_range_s(session),
         trials=sum(block.trials for block in orders.blocks),
         answers=orders.answers,
         breaks=sum(block.breaks for block in orders.blocks),

@@ -5,6 +5,7 @@ import pytest
 from study_app.designer.document.fields import kind_note, refused_at, row_at
 from study_app.designer.document.steps import AddKey, AddLiquid, RemoveKey, SetValue, Situation, shipped_liquids
 from study_app.designer.document.study import Study, read_study
+from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable_elements
 from study_app.protocol.warnings.study_warnings import warnings
 
@@ -93,6 +94,12 @@ def test_the_standard_is_one_of_the_blocks_conditions(study: Study) -> None:
     assert row is not None
     assert [choice.value for choice in row.choices] == ["water", "slime"]
     assert not any("^" in bound for bound in row.bounds)
+
+
+def test_a_repeated_form_is_counted_each_time_with_and_without_groups() -> None:
+    plain = STUDY.replace(b'questionnaire = "after"\n', b"").replace(b'["feel"]', b'["after", "feel", "after"]')
+    grouped = plain + b"[groups.experts]\n[groups.novices]\n"
+    assert facts(read_study(plain)).answers == facts(read_study(grouped)).answers == 2
 
 
 def warned(study: Study) -> str:
