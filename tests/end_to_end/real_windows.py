@@ -18,7 +18,7 @@ from PySide6.QtCore import QPoint, QSize
 from PySide6.QtWidgets import QAbstractButton, QWidget
 
 COMPILED_S = 180.0  # by then the force model is compiled on any machine
-NEEDED = ("Xvfb", "xdotool")
+NEEDED = ("Xvfb", "xdotool", "xset")
 MISSING = [tool for tool in NEEDED if shutil.which(tool) is None]
 needs_display = pytest.mark.skipif(bool(MISSING), reason=f"not installed here: {', '.join(MISSING)}")
 
@@ -39,9 +39,11 @@ def virtual_display(*more: str, size: tuple[int, int] = (1920, 1080)) -> Iterato
     os.close(write_end)
     with os.fdopen(read_end) as numbers:
         number = numbers.readline().strip()
-    yield f":{number}"
-    server.terminate()
-    server.wait(10)
+    try:
+        yield f":{number}"
+    finally:
+        server.terminate()
+        server.wait(10)
 
 
 def wait_for(found: Callable[[], object], what: str, seconds: float = 60.0) -> None:

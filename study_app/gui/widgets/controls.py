@@ -265,7 +265,7 @@ class Choice(Themed, QComboBox):
         whole = self.currentText() or self.placeholderText()
         field = QStyle.SubControl.SC_ComboBoxEditField
         room = self.style().subControlRect(QStyle.ComplexControl.CC_ComboBox, option, field, self).width()
-        shown = self.fitted(whole, room)
+        shown = self.fitted(whole, room + 1)  # Qt rounds the width of the longest entry, perhaps down
         option.currentText = shown  # type: ignore[attr-defined]  # missing in the stubs
         painter.drawControl(QStyle.ControlElement.CE_ComboBoxLabel, option)
         self.setToolTip(plain_tip(whole if shown != whole else ""))
