@@ -254,7 +254,16 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
 @click.option(
     "--withheld", is_flag=True, help=("Only print the proportion of each liquid's force that safety holds back.")
 )
-@click.option("--delivered", is_flag=True, help="Only print the error of each liquid's force at the hand.")
+@click.option(
+    "--delivered",
+    is_flag=True,
+    help="Only print the error of the force that acts on the hand, with limits; this takes a minute.",
+)
+@click.option(
+    "--whole",
+    is_flag=True,
+    help="With --delivered: also each hand with each handle, and the liquids of all shipped studies.",
+)
 @click.option(
     "--velocity",
     is_flag=True,
@@ -278,6 +287,7 @@ def stability(
     table: Path | None,
     withheld: bool,
     delivered: bool,
+    whole: bool,
     velocity: bool,
     delayed: Path | None,
     seed: str | None,
@@ -297,6 +307,8 @@ def stability(
 
     parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
     exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
+    if whole and not delivered:
+        raise click.UsageError("--whole extends the table of --delivered: add --delivered")
     make_output_folder(to)
     if line is not None:
         case = parse(line)
@@ -322,7 +334,7 @@ def stability(
     if any(parts.values()):
         part = next(name for name, chosen in parts.items() if chosen)
         with progress() as show, executor_for(workers) as executor:
-            measured = _measure(part, executor, show)
+            measured = _measure(part, executor, show, whole=whole)
         _present_evidence(measured, None)
         return
     seed = seed or secrets.token_hex(4)
@@ -350,7 +362,7 @@ def stability(
     exit_if(swept.unstable)
 
 
-def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
+def _measure(part: str, executor: Executor, show: ShowProgress, *, whole: bool) -> Evidence:
     """Return the evidence from one separate measurement."""
     from study_app.evidence.stability import delivered_force, velocity, withheld_force
 
@@ -359,7 +371,7 @@ def _measure(part: str, executor: Executor, show: ShowProgress) -> Evidence:
     show(f"measuring the force {part}")
     if part == "withheld":
         return withheld_force.evidence(withheld_force.measure(executor=executor))
-    return delivered_force.evidence(delivered_force.measure(executor=executor))
+    return delivered_force.evidence(delivered_force.measure(whole=whole, executor=executor))
 
 
 _MOST_COMPARED_S = 300.0

@@ -16,7 +16,7 @@ from study_app.evidence.accuracy import accuracy_report, comparison, survey
 from study_app.evidence.outlets import streams, triggers
 from study_app.evidence.report_rates import simulation
 from study_app.evidence.soak import soak
-from study_app.evidence.stability import delivered_force, force_delay, stability_report, velocity, withheld_force
+from study_app.evidence.stability import force_delay, stability_report, velocity, withheld_force
 from study_app.evidence.table import Evidence
 from study_app.evidence.thresholds import known_values, noticed_delays
 from study_app.evidence.timing import delays, device_lateness, report
@@ -70,7 +70,6 @@ GIVEN: dict[str, Any] = {
     "shown": shown, "candidate": candidate, "truths": (), "studies": 400,
     "hits": lambda rng: int(rng.choice([0, 12, 24, 390])),
     "delay": lambda rng: int(rng.integers(1, 4)),
-    "device": lambda rng: str(rng.choice(list(delivered_force.DEVICES))),
     "strokes": lambda rng: tuple(rng.choice([0.0, 0.03, 0.2], len(withheld_force.STROKES)).tolist()),
     "after": lambda rng: tuple(tuple(rng.choice([0.0, 0.0004, 0.1], 4).tolist()) for _ in withheld_force.QUICK),
     "reasons": lambda rng: tuple(rng.choice(["not finite", "swing"], int(rng.integers(0, 3)), replace=False)),
@@ -85,7 +84,7 @@ QUICK = {
     "stability_report-group_table": stability_report.group_table,
     "stability_report-in_words": stability_report.in_words, "stability_report-summary": stability_report.summary,
     "force_delay-report": force_delay.evidence, "criteria-report": velocity.evidence,
-    "withheld_force-report": withheld_force.evidence, "delivered_force-report": delivered_force.evidence,
+    "withheld_force-report": withheld_force.evidence,
 }  # fmt: skip
 SLOW = {
     "timing_report-write": report.evidence, "delay_report-write": delays.evidence,

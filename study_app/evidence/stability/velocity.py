@@ -24,7 +24,7 @@ from scipy.linalg import solve_toeplitz
 
 from study_app.evidence.cost import TickTimer
 from study_app.evidence.reference_solutions import along_x, without_buoyancy
-from study_app.evidence.stability.bench import Bench, fast_part, law_along, sine_path
+from study_app.evidence.stability.bench import DIRECTION, Bench, fast_part, law_along, sine_path
 from study_app.evidence.stability.damping_limits import boundary_nspm
 from study_app.evidence.stability.stability_cases import Case, scenes
 from study_app.evidence.table import Evidence
@@ -209,10 +209,23 @@ def wiener_bound(scene: Scene, count_m: float, delay_s: float) -> float:
     return math.sqrt(max(1 - explained_n2 / variance_n2, 0.0))
 
 
-def _spectrum(rate_hz: float) -> tuple[Any, Floats]:
+_FADES_IN_S: Final = 1.0
+
+
+def random_path(stroke_hz: float, rate_hz: float, seed: int = 1) -> Floats:
+    """Return positions (2^15, 3) [m] of noise about strokes of a frequency; the motion fades in from rest at 0."""
+    turns, power_m2 = _spectrum(rate_hz, stroke_hz)
+    phase = np.random.default_rng(seed).uniform(0, 2 * math.pi, len(turns))
+    share = np.minimum(np.arange(_ROWS) / rate_hz / _FADES_IN_S, 1.0)
+    x_m = _course(np.sqrt(2 * power_m2) * np.exp(1j * phase)) * share**2 * (3 - 2 * share)
+    path_m: Floats = np.outer(x_m, DIRECTION)
+    return path_m
+
+
+def _spectrum(rate_hz: float, stroke_hz: float = WHOLE.frequency_hz) -> tuple[Any, Floats]:
     """Return iω [1/s] and the motion's power [m²] at each frequency above 0."""
     frequency_hz = np.fft.rfftfreq(_ROWS, 1 / rate_hz)[1:-1]
-    ratio = frequency_hz / WHOLE.frequency_hz
+    ratio = frequency_hz / stroke_hz
     power_m2 = 1 / ((1 - ratio**2) ** 2 + (2 * _DAMPING_RATIO * ratio) ** 2) ** 2
     return 2j * math.pi * frequency_hz, WHOLE.amplitude_m**2 / 2 * power_m2 / power_m2.sum()
 
