@@ -70,11 +70,16 @@ def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
 def scene(scene: str, liquid: str | None, delay: int) -> None:
     """Print the effects that a scene needs and why, the measured cost of each, and the expected force error."""
     from study_app.evidence.cost import report
-    from study_app.evidence.expected_error import error_report
+    from study_app.evidence.expected_error import acting_report, error_report
     from study_app.protocol.load import load_scene, load_scenes
 
     chosen = [load_scene(scene, liquid)] if liquid else list(load_scenes(scene).values())
-    click.echo("\n\n".join(f"{report(subject)}\n{error_report(subject, delay)}" for subject in chosen))
+    click.echo(
+        "\n\n".join(
+            f"{report(subject)}\n{error_report(subject, delay)}\n{acting_report(subject)}".rstrip()
+            for subject in chosen
+        )
+    )
 
 
 @click.command()

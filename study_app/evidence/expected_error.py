@@ -6,7 +6,7 @@ encoder counts, with the scene's velocity estimator. The force is the one sent, 
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -30,13 +30,16 @@ from study_app.evidence.reference_solutions import (
     error_of,
     stroke_motion,
     with_effects,
+    without_buoyancy,
 )
+from study_app.evidence.stability.delivered_force import Acting, acting_on_sine, case_of
+from study_app.evidence.stability.velocity import WHOLE
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
 from study_app.haptics.model.effect import GRAVITY_MPS2
 from study_app.haptics.model.effects.local_wake import LocalWake
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.motion import Floats, Motion
-from study_app.haptics.model.scene import Effect, Everywhere, Scene
+from study_app.haptics.model.scene import Effect, Everywhere, Kalman, Liquid, Scene, Velocity
 from study_app.haptics.runtime.offline import samples_along
 from study_app.lab.identify.measured_force import vectors_x
 
@@ -88,6 +91,50 @@ def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
     )
 
 
+def acting_report(scene: Scene) -> str:
+    """Return, for each liquid, how much of each part of its force acts on the hand at two and three ticks of delay.
+
+    If ``kalman`` would have a smaller error than the scene's estimator, its values follow.
+    """
+    lines: list[str] = []
+    if scene.velocity.kind == "given":
+        return ""
+    for liquid in resolve(scene).liquids:
+        alone = scene.model_copy(update={"liquids": (_unbounded(liquid),)})
+        if not set(resolve(alone).liquids[0].effects) - {"buoyancy"}:
+            continue
+        own, of_kalman = (_acting(alone, velocity) for velocity in (scene.velocity, Kalman()))
+        better = [ticks for ticks in _LATE_TICKS if of_kalman[ticks].error < own[ticks].error]
+        lines.append(
+            f"{liquid.id} on the hand (middle hand, 0.2 kg, {WHOLE}), {scene.velocity.kind}: {_acting_text(own)}"
+        )
+        if better:
+            lines.append(f'  with velocity = {{ kind = "kalman" }}: {_acting_text(of_kalman)}')
+    return "\n".join(lines)
+
+
+_LATE_TICKS: Final = (2, 3)
+
+
+def _acting(scene: Scene, velocity: Velocity) -> dict[int, Acting]:
+    """Return what acts of a scene's force with an estimator, by ticks of delay."""
+    scene = without_buoyancy(scene.model_copy(update={"velocity": velocity}))
+    return {ticks: acting_on_sine(case_of(scene, velocity.kind, ticks), scene) for ticks in _LATE_TICKS}
+
+
+def _acting_text(by_ticks: Mapping[int, Acting]) -> str:
+    return "; ".join(
+        f"{ticks} ticks: {', '.join(f'{share:.0f} % of {part}' for part, share in acting.parts.items())} act, "
+        f"error {acting.error:.2g} %"
+        for ticks, acting in by_ticks.items()
+    )
+
+
+def _unbounded(liquid: Liquid) -> Liquid:
+    """Return the liquid as if it filled the scene without a current."""
+    return liquid.model_copy(update={"region": Everywhere(), "current": None})
+
+
 def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
     if not scene.liquids:
         return 0.0, 0.0, Causes(), "a scene without liquid"
@@ -96,7 +143,7 @@ def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
 
 def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
     """Return the errors of one liquid, as if it filled the scene without a current."""
-    liquid = scene.liquids[index].model_copy(update={"region": Everywhere(), "current": None})
+    liquid = _unbounded(scene.liquids[index])
     named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
     kept = tuple(it for it in named if it not in {"current", "surface"})
     alone = with_effects(scene.model_copy(update={"liquids": (liquid,)}), *kept)

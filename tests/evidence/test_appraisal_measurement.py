@@ -1,6 +1,7 @@
 """What a scene costs and how true it is, here and in the process that answers a lab."""
 
 import math
+import re
 from dataclasses import replace
 
 import numba
@@ -12,7 +13,7 @@ from study_app.evidence import appraisal_measurement, cost
 from study_app.evidence.appraisal import Costs, DeliveryQuestion, Question, start_appraisal_worker
 from study_app.evidence.appraisal_measurement import appraise, withheld_share
 from study_app.evidence.cost import measure, report
-from study_app.evidence.expected_error import error_report, expected
+from study_app.evidence.expected_error import acting_report, error_report, expected
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.wake import Wake
@@ -20,7 +21,7 @@ from study_app.haptics.model.estimators import Given, Kalman
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import samples_along
-from study_app.protocol.load import load, load_scenes
+from study_app.protocol.load import load, load_scene, load_scenes
 from study_app.protocol.trials.tasks import Explore, Reach, Stroke
 from study_app.session.preflight import PredictedDelivery
 from tests.compiled import needs_servo
@@ -149,6 +150,18 @@ def test_non_newtonian_liquids_are_compared_with_their_law_added_mass_and_buoyan
     lacking = expected(tank(name, scale=3.0, motion=STROKES))
     assert lacking.causes.law > found.causes.law + 0.02
     assert f"{PRESETS[name][1].kind} law (no reference in unsteady flow)" in error_report(whole)
+
+
+@pytest.mark.slow
+def test_scene_states_what_acts_of_each_part_at_two_and_three_ticks_and_offers_kalman():
+    own, offered = acting_report(load_scene("rek2024", "water")).splitlines()
+    pattern = r"2 ticks: \d+ % of drag, (\d+) % of wake act, error [\d.]+ %; 3 ticks: .* % of wake act, error"
+    assert own.startswith("water on the hand (middle hand, 0.2 kg, 1.6 Hz ±20 mm), ewma: ")
+    assert offered.startswith('  with velocity = { kind = "kalman" }: ')
+    assert int(re.search(pattern, own)[1]) < 20
+    assert int(re.search(pattern, offered)[1]) > 70
+    assert "of inertia act" in acting_report(load_scene("physical2", "honey"))
+    assert acting_report(Scene()) == ""
 
 
 RIVER = Liquid(

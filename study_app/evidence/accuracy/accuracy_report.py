@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app import figure_style as style
-from study_app.evidence.accuracy.comparison import Accuracy, Kind, Row, pareto_front, worst_rows
+from study_app.evidence.accuracy.comparison import Accuracy, ActingError, Kind, Row, pareto_front, worst_rows
 from study_app.evidence.reference_solutions import PERCEPTIBLE_N, RELATIVE, ROUNDING
 from study_app.evidence.table import Evidence, Table, duration, plot_files
 
@@ -56,13 +56,16 @@ def draw(accuracy: Accuracy) -> Figure:
     kinds: tuple[Kind, ...] = ("numerical", "physical")
     panels = [_Panel(accuracy, kind) for kind in kinds if accuracy.of(kind)]
     key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in accuracy.notes), _LETTERS)
-    height_pt = sum(panel.height_pt for panel in panels) + _FOOT_PT + _LINE_PT * len(key)
+    acting_pt = _ACTING_TOP_PT + _PANEL_PT + _FOOT_PT + 6 if accuracy.acting else 0.0
+    height_pt = sum(panel.height_pt for panel in panels) + _FOOT_PT + acting_pt + _LINE_PT * len(key)
     figure = Figure(figsize=(_WIDTH_PT / 72, height_pt / 72), facecolor="white")
     least, most = _span(accuracy)
     down_pt = 0.0
     for panel in panels:
         panel.draw(figure, down_pt, height_pt, (least, most), last=panel is panels[-1])
         down_pt += panel.height_pt
+    if accuracy.acting:
+        _draw_acting(figure, accuracy, down_pt + _FOOT_PT - 6, height_pt)
     figure.text(
         4 / _WIDTH_PT,
         (_LINE_PT * len(key) + 4) / height_pt,
@@ -89,6 +92,81 @@ def _span(accuracy: Accuracy) -> tuple[float, float]:
     return min(times) / 2, max(*times, _BUDGET_NS) * 4
 
 
+_ACTING_TOP_PT: Final = 58.0
+_SAME_LABEL: Final = 1.3
+"""Points within this factor share a label."""
+
+
+def _draw_acting(figure: Figure, accuracy: Accuracy, down_pt: float, height_pt: float) -> None:
+    """Draw the error of the force on the hand against the time of a tick, by estimator and delay."""
+    _write_heading(
+        figure,
+        "Error of the force that acts on the hand, delay included",
+        f"{accuracy.acting_liquid}; a middle hand moves a handle of 0.2 kg at random, about 1.6 Hz with the power of "
+        "±20 mm. Numbers: ticks of delay. Bars: least error of any linear estimator.",
+        down_pt,
+        height_pt,
+    )
+    axes = _axes_at(figure, down_pt + _ACTING_TOP_PT, _PANEL_PT, height_pt)
+    axes.set_yscale("log")
+    axes.yaxis.set_major_locator(FixedLocator([1, 2, 5, 10, 20, 50, 100, 200, 500]))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.minorticks_off()
+    axes.tick_params(labelsize=_SMALL, pad=2)
+    axes.set_title("Error [% of the force]", fontsize=_SMALL, pad=4, x=-0.075)
+    axes.set_xlabel("Computation time of one tick [ns]", fontsize=_SMALL + 0.4, labelpad=2)
+    estimators = tuple(dict.fromkeys(it.estimator for it in accuracy.acting))  # cheapest first
+    times = [it.ns for it in accuracy.acting]
+    margin_ns = 0.25 * (max(times) - min(times)) + 5
+    axes.set_xlim(min(times) - margin_ns, max(times) + 2 * margin_ns)
+    offset: dict[str, Any] = {"textcoords": "offset points", "fontsize": _SMALL}
+    for k, name in enumerate(estimators):
+        points = sorted((it for it in accuracy.acting if it.estimator == name), key=lambda it: it.error)
+        ns = float(np.median([it.ns for it in points]))
+        axes.plot([ns] * len(points), [it.error for it in points], color=style.ZERO, linewidth=1.2, zorder=2)
+        near: list[list[ActingError]] = []
+        for it in points:
+            axes.scatter(ns, it.error, s=17, zorder=4, edgecolor=style.TEXT, linewidth=0.7, **_ESTIMATOR_LOOKS[k % 3])
+            axes.scatter(ns, it.least, s=60, marker="_", color=style.TEXT, linewidth=1.0, zorder=3)
+            if near and it.error < _SAME_LABEL * near[-1][0].error:
+                near[-1].append(it)
+            else:
+                near.append([it])
+        for group in near:
+            text = ", ".join(map(str, sorted(it.delay for it in group)))
+            height = math.sqrt(group[0].error * group[-1].error)
+            axes.annotate(text, (ns, height), (5, 0), va="center", **offset)
+        side = "right" if k == 0 else "left"
+        axes.annotate(name, (ns, points[-1].error), (3, 6), ha=side, va="bottom", fontweight="bold", **offset)
+    axes.set_ylim(*_acting_range(accuracy))
+
+
+def _acting_range(accuracy: Accuracy) -> tuple[float, float]:
+    values = [value for it in accuracy.acting for value in (it.error, it.least)]
+    return min(values) / 1.5, max(values) * 2
+
+
+_ESTIMATOR_LOOKS: Final[tuple[dict[str, Any], ...]] = (
+    {"marker": "o", "facecolor": "#0b65a3"},
+    {"marker": "D", "facecolor": "#f0a04b"},
+    {"marker": "s", "facecolor": "#ffffff"},
+)
+
+
+def _write_heading(figure: Figure, heading: str, text: str, down_pt: float, height_pt: float) -> None:
+    """Write a panel's heading, and its text in lines below."""
+    lines = "\n".join(textwrap.wrap(text, _LETTERS))
+    figure.text(4 / _WIDTH_PT, 1 - (down_pt + 6) / height_pt, heading, va="top", fontweight="bold")
+    below = 1 - (down_pt + 6 + _HEADING_PT) / height_pt
+    figure.text(4 / _WIDTH_PT, below, lines, va="top", fontsize=_SMALL, color=style.TEXT_SOFT)
+
+
+def _axes_at(figure: Figure, top_pt: float, tall_pt: float, height_pt: float) -> Axes:
+    """Return axes of the page's width, ``top_pt`` below its upper edge."""
+    width = (_WIDTH_PT - _LEFT_PT - _RIGHT_PT) / _WIDTH_PT
+    return figure.add_axes((_LEFT_PT / _WIDTH_PT, 1 - (top_pt + tall_pt) / height_pt, width, tall_pt / height_pt))
+
+
 class _Panel:
     """The plot of all candidates against one kind of reference."""
 
@@ -107,28 +185,20 @@ class _Panel:
         else:
             self._heading = "Physical error: compared with references"
             text = f"{rows[0].liquid}; {names}"
-        self._text = textwrap.wrap(text, _LETTERS)
-        self._top_pt = 6 + _HEADING_PT + _LINE_PT * len(self._text) + 13
+        self._text = text
+        self._top_pt = 6 + _HEADING_PT + _LINE_PT * len(textwrap.wrap(text, _LETTERS)) + 13
 
     @property
     def height_pt(self) -> float:
         return self._top_pt + _PANEL_PT + (_STRIP_PT + _BREAK_PT if self._strip else 0.0) + 12
 
     def draw(self, figure: Figure, down_pt: float, height_pt: float, span: tuple[float, float], *, last: bool) -> None:
-        def place(top_pt: float, tall_pt: float) -> Axes:
-            width = (_WIDTH_PT - _LEFT_PT - _RIGHT_PT) / _WIDTH_PT
-            return figure.add_axes(
-                (_LEFT_PT / _WIDTH_PT, 1 - (top_pt + tall_pt) / height_pt, width, tall_pt / height_pt)
-            )
-
-        figure.text(4 / _WIDTH_PT, 1 - (down_pt + 6) / height_pt, self._heading, va="top", fontweight="bold")
-        below = 1 - (down_pt + 6 + _HEADING_PT) / height_pt
-        figure.text(4 / _WIDTH_PT, below, "\n".join(self._text), va="top", fontsize=_SMALL, color=style.TEXT_SOFT)
+        _write_heading(figure, self._heading, self._text, down_pt, height_pt)
         top_pt = down_pt + self._top_pt
-        main = place(top_pt, _PANEL_PT)
+        main = _axes_at(figure, top_pt, _PANEL_PT, height_pt)
         axes = [main]
         if self._strip:
-            axes.append(place(top_pt + _PANEL_PT + _BREAK_PT, _STRIP_PT))
+            axes.append(_axes_at(figure, top_pt + _PANEL_PT + _BREAK_PT, _STRIP_PT, height_pt))
         for it in axes:
             self._axes(it, span, lowest=it is axes[-1], last=last)
         self._main(main)
@@ -287,6 +357,14 @@ def evidence(accuracy: Accuracy) -> Evidence:
     for truth in accuracy.truths:
         rows = [row for row in accuracy.rows if row.truth == truth.name]
         parts.append(f"## Against the {truth.name} ({rows[0].kind}), {rows[0].liquid}\n\n" + _markdown_table(rows))
+    if accuracy.acting:
+        acting = [
+            (it.estimator, it.delay, _count(it.ns), _digits(it.error), _digits(it.least)) for it in accuracy.acting
+        ]
+        headings = ("estimator", "ticks of delay", "ns per tick", "error [%]", "least error [%]")
+        parts.append(
+            f"## The force on the hand, {accuracy.acting_liquid}\n\n{Table(headings, acting, left=1).markdown()}"
+        )
     text = "\n\n".join(parts) + "\n"
     cells = [[f"{it:.6g}" if isinstance(it, float) else it for it in _values(row)] for row in accuracy.rows]
     files = {"accuracy.csv": Table(COLUMNS, cells).csv(), "accuracy.md": text}

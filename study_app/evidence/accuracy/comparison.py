@@ -1,5 +1,6 @@
 """Accuracy against computation time: every candidate against its reference, and all timed in one run."""
 
+import itertools
 import math
 import statistics
 import time
@@ -15,7 +16,19 @@ from study_app.evidence.accuracy import candidates as models
 from study_app.evidence.accuracy.candidates import Candidate, with_given_velocity
 from study_app.evidence.cfd.stored_flows import solver_truths
 from study_app.evidence.computer import machine
-from study_app.evidence.reference_solutions import ROUNDING, Error, Truth, error_of, with_velocity
+from study_app.evidence.cost import TickTimer
+from study_app.evidence.reference_solutions import (
+    COUNT_M,
+    ROUNDING,
+    Error,
+    Truth,
+    error_of,
+    with_velocity,
+    without_buoyancy,
+)
+from study_app.evidence.stability import delivered_force
+from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.estimators import ESTIMATORS as KINDS
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
 
@@ -68,15 +81,33 @@ class Row:
         return self.time.median_ns * self.candidate.rate_hz / 1000
 
 
+class ActingError(NamedTuple):
+    """One estimator at one delay [ticks]: time of a tick, error of the force on the hand, least error [% of the law].
+
+    `least` is the error of the best linear estimator on the same motion.
+    """
+
+    estimator: str
+    delay: int
+    ns: float
+    error: float
+    least: float
+
+
 @dataclass(frozen=True)
 class Accuracy:
-    """All results: rows, sources of the references, omitted candidates with reasons, machine and motion."""
+    """All results: rows, sources of the references, omitted candidates with reasons, machine and motion.
+
+    ``acting`` are the errors of the force on the hand in ``acting_liquid``.
+    """
 
     rows: tuple[Row, ...]
     truths: tuple[Truth, ...]
     notes: tuple[str, ...]
     machine: str
     motion: str
+    acting: tuple[ActingError, ...] = ()
+    acting_liquid: str = ""
 
     def of(self, kind: Kind) -> tuple[Row, ...]:
         return tuple(row for row in self.rows if row.kind == kind)
@@ -133,7 +164,34 @@ def accuracy(
     by_kind = [[row for row in measured if row.kind == kind] for kind in ("numerical", "physical")]
     fronts = {candidate for rows in by_kind for candidate in pareto_front(worst_rows(rows))}
     rows = tuple(replace(row, on_front=row.candidate in fronts) for row in measured)
-    return Accuracy(rows, tuple(found), tuple(said), machine(), named)
+    progress("force on the hand")
+    subject = physical or numerical
+    acting = () if subject is None else _acting_errors(subject, batches)
+    liquid = "" if subject is None else subject.liquids[0].id
+    return Accuracy(rows, tuple(found), tuple(said), machine(), named, acting, liquid)
+
+
+def _acting_errors(scene: Scene, batches: int) -> tuple[ActingError, ...]:
+    """Measure every estimator at each delay; ticks of all are timed in alternating batches."""
+    loops = list(itertools.product([kind for kind in KINDS if kind.of_device], delivered_force.DELAYS))
+    scenes = [without_buoyancy(scene.model_copy(update={"velocity": kind.model()})) for kind, _ in loops]
+    timers = [
+        TickTimer(it, Dynamics(delay_s=delay / it.rate_hz, count_m=COUNT_M))
+        for it, (_, delay) in zip(scenes, loops, strict=True)
+    ]
+    for _ in range(batches):
+        for timer in timers:
+            timer.batch()
+    errors = [
+        delivered_force.acting_on_random_motion(delivered_force.case_of(it, kind.name, delay), it)
+        for it, (kind, delay) in zip(scenes, loops, strict=True)
+    ]
+    return tuple(
+        ActingError(
+            estimator=kind.name, delay=delay, ns=statistics.median(timer.costs_ns), error=error.error, least=error.least
+        )
+        for (kind, delay), timer, error in zip(loops, timers, errors, strict=True)
+    )
 
 
 def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:

@@ -15,6 +15,7 @@ import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import cache
 from typing import Any, Final, NamedTuple
 
@@ -130,9 +131,34 @@ def delivered(
     liquid: str, estimator: str, hand: str, mass_kg: float, frequency_hz: float = WHOLE.frequency_hz, delay: int = 1
 ) -> Delivered:
     """Measure the acting force of one liquid in one loop."""
-    case = Case(
-        liquid=liquid,
-        scale=scenes()[liquid].scale,
+    case = case_of(scenes()[liquid], estimator, delay, hand=hand, mass_kg=mass_kg, frequency_hz=frequency_hz)
+    case = replace(case, liquid=liquid)
+    scene = without_buoyancy(scene_of(case))
+    sine, random = acting_on_sine(case, scene, frequency_hz), acting_on_random_motion(case, scene, frequency_hz)
+    return Delivered(
+        case=case,
+        frequency_hz=frequency_hz,
+        sine=sine.error,
+        random=random.error,
+        least=random.least,
+        parts=sine.parts,
+        withheld=sine.withheld,
+    )
+
+
+def case_of(
+    scene: Scene,
+    estimator: str,
+    delay: int,
+    *,
+    hand: str = _USUAL[0],
+    mass_kg: float = _USUAL[1],
+    frequency_hz: float = WHOLE.frequency_hz,
+) -> Case:
+    """Return the loop in which a hand follows a sine of ±20 mm in a scene, at its scale and rate."""
+    return Case(
+        scale=scene.scale,
+        rate_hz=scene.rate_hz,
         delay=delay,
         estimator=estimator,
         hand=hand,
@@ -144,19 +170,20 @@ def delivered(
         believed_kg=min(mass_kg, _REPORTED_KG),
         plant=SECOND,
     )
-    scene = without_buoyancy(scene_of(case))
-    sine = acting_on_sine(case, scene, frequency_hz)
+
+
+class OnRandomMotion(NamedTuple):
+    """Error of the acting force and least error of a linear estimator [%], on the same random motion."""
+
+    error: float
+    least: float
+
+
+def acting_on_random_motion(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequency_hz) -> OnRandomMotion:
+    """Return the error of the acting force of ``scene`` in the loop of ``case`` while the hand moves at random."""
     trace = Bench(case, scene=scene).follow(random_path(frequency_hz, case.rate_hz))
     law_n = law_along(scene, trace) @ DIRECTION
-    return Delivered(
-        case=case,
-        frequency_hz=frequency_hz,
-        sine=sine.error,
-        random=_error(trace, law_n),
-        least=_least_error(trace, law_n, case.delay),
-        parts=sine.parts,
-        withheld=sine.withheld,
-    )
+    return OnRandomMotion(error=_error(trace, law_n), least=_least_error(trace, law_n, case.delay))
 
 
 class Acting(NamedTuple):
@@ -167,7 +194,7 @@ class Acting(NamedTuple):
     withheld: float
 
 
-def acting_on_sine(case: Case, scene: Scene, frequency_hz: float) -> Acting:
+def acting_on_sine(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequency_hz) -> Acting:
     """Return the acting force of ``scene`` in the loop of ``case`` while the hand follows a sine of ±20 mm."""
     path_m = sine_path(WHOLE.amplitude_m, 2 * math.pi * frequency_hz, _LASTS_S, case.rate_hz)
     trace = Bench(case, scene=scene).follow(path_m)
