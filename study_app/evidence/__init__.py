@@ -4,5 +4,5 @@
 of forces) as examples.
 
 Reading order: appraisal, computer, cost, reference_model, table, thesis_figures; appraisal_measurement,
-reference_solutions, report_rates, soak, thresholds, timing; cfd, expected_error, outlets, stability; accuracy.
+reference_solutions, report_rates, soak, thresholds, timing; cfd, outlets, stability; expected_error; accuracy.
 """

@@ -94,7 +94,7 @@ class ActingError(NamedTuple):
     least: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Accuracy:
     """All results: rows, sources of the references, omitted candidates with reasons, machine and motion.
 
@@ -168,7 +168,15 @@ def accuracy(
     subject = physical or numerical
     acting = () if subject is None else _acting_errors(subject, batches)
     liquid = "" if subject is None else subject.liquids[0].id
-    return Accuracy(rows, tuple(found), tuple(said), machine(), named, acting, liquid)
+    return Accuracy(
+        rows=rows,
+        truths=tuple(found),
+        notes=tuple(said),
+        machine=machine(),
+        motion=named,
+        acting=acting,
+        acting_liquid=liquid,
+    )
 
 
 def _acting_errors(scene: Scene, batches: int) -> tuple[ActingError, ...]:
