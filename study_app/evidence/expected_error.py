@@ -100,9 +100,9 @@ def acting_report(scene: Scene) -> str:
     if scene.velocity.kind == "given":
         return ""
     for liquid in resolve(scene).liquids:
-        alone = scene.model_copy(update={"liquids": (_unbounded(liquid),)})
-        if not set(resolve(alone).liquids[0].effects) - {"buoyancy"}:
+        if not set(liquid.effects) - {"buoyancy", "current", "surface"}:
             continue
+        alone = _alone(scene, liquid)
         own, of_kalman = (_acting(alone, velocity) for velocity in (scene.velocity, Kalman()))
         better = [ticks for ticks in _LATE_TICKS if of_kalman[ticks].error < own[ticks].error]
         lines.append(
@@ -130,9 +130,12 @@ def _acting_text(by_ticks: Mapping[int, Acting]) -> str:
     )
 
 
-def _unbounded(liquid: Liquid) -> Liquid:
-    """Return the liquid as if it filled the scene without a current."""
-    return liquid.model_copy(update={"region": Everywhere(), "current": None})
+def _alone(scene: Scene, liquid: Liquid) -> Scene:
+    """Return a scene that the liquid fills, without a current and a surface."""
+    whole = liquid.model_copy(update={"region": Everywhere(), "current": None})
+    named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
+    kept = tuple(it for it in named if it not in {"current", "surface"})
+    return with_effects(scene.model_copy(update={"liquids": (whole,)}), *kept)
 
 
 def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
@@ -143,10 +146,9 @@ def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
 
 def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
     """Return the errors of one liquid, as if it filled the scene without a current."""
-    liquid = _unbounded(scene.liquids[index])
-    named: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
-    kept = tuple(it for it in named if it not in {"current", "surface"})
-    alone = with_effects(scene.model_copy(update={"liquids": (liquid,)}), *kept)
+    alone = _alone(scene, scene.liquids[index])
+    liquid = alone.liquids[0]
+    kept: tuple[Effect, ...] = () if liquid.effects == "auto" else liquid.effects
     box = alone.motion_in(liquid)
     speed_mps, rate_per_s = box.speed_mps or math.nan, reference_solutions.strokes_per_s(alone)
     motion = stroke_motion(speed_mps, rate_per_s, CYCLES, alone.rate_hz)

@@ -123,7 +123,7 @@ def test_a_device_that_cannot_be_opened_is_tried_again_or_examined(
         tried.append(name)
         raise DeviceNotFound("no Falcon is connected: plug it in")
 
-    monkeypatch.setattr(live_session, "open_rig", missing)
+    monkeypatch.setattr(live_session, "check_connected", missing)
     monkeypatch.setattr(visit.devices, "diagnose", examined.append)
     visit.window.place("home").session_asked.emit(replace(CHOSEN, device="falcon"))
     for count, words in ((1, "Try again"), (2, "Diagnose …")):
