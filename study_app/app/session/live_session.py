@@ -171,7 +171,8 @@ class LiveSession(QObject):
 
             study = self.chosen.read_protocol()
             check_choices(self.chosen, study)
-            check_connected(self.chosen.device)
+            if not self.chosen.device_options:  # which may name a port that the probe does not search
+                check_connected(self.chosen.device)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
             with following_compilation(self._compiled.emit):
                 rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
