@@ -8,8 +8,6 @@ Needs an environment with the extras ``analysis`` and ``bundle``. Prints the siz
 from __future__ import annotations
 
 import argparse
-import os
-import shutil
 import subprocess
 import sys
 import tarfile
@@ -18,6 +16,8 @@ import time
 import zipfile
 from collections import Counter
 from pathlib import Path
+
+from shipped_caches import ship_caches
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
@@ -50,21 +50,6 @@ def drop_twins(inside: Path) -> int:
             saved += path.stat().st_size
             path.unlink()
     return saved
-
-
-def fill_cache(bundle: Path) -> str:
-    """Let the program compile the force model for a generic processor into its own folder; return what it says."""
-    shipped = bundle / "_internal" / "study_app" / "compiled"
-    shutil.rmtree(shipped, ignore_errors=True)
-    with tempfile.TemporaryDirectory() as folder:
-        own = {"NUMBA_CACHE_DIR": folder, "LIQUID_STUDY_CONFIG": folder, "LIQUID_STUDY_WORKSPACE": folder}
-        environment = os.environ | own | {"NUMBA_CPU_NAME": "generic", "QT_QPA_PLATFORM": "offscreen"}
-        code = (HERE / "fill_cache.py").read_text("utf-8")
-        command = [str(bundle / PROGRAM), "-c", code]
-        said = subprocess.run(command, check=True, env=environment, stdout=subprocess.PIPE, text=True).stdout
-        (filled,) = [path for path in Path(folder).iterdir() if len(path.name) == 16 and path.is_dir()]
-        shutil.copytree(filled, shipped / filled.name)
-    return said.strip()
 
 
 def sizes(bundle: Path) -> Counter[str]:
@@ -114,7 +99,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as work:
         bundle = freeze(to, Path(work))
     drop_twins(bundle / "_internal")
-    print(fill_cache(bundle))
+    ship_caches(str(bundle / PROGRAM), bundle / "_internal" / "study_app")
     counted = sizes(bundle)
     print("\n| library | MB |\n| --- | --: |")
     shown = counted.most_common(LARGEST)

@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import runpy
 import sys
-
-# Its compile cache fits every processor of this architecture; NUMBA_CPU_NAME=host compiles for the one at hand.
-if os.environ.setdefault("NUMBA_CPU_NAME", "generic") == "host":
-    del os.environ["NUMBA_CPU_NAME"]
 
 
 def _as_interpreter(words: list[str]) -> None:

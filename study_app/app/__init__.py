@@ -4,7 +4,7 @@
 ``session.live_session`` begins or resumes a session and runs it to the closed journal, ``session.bridge`` between its
 two windows; read these first.
 
-Reading order: awake, timing; failures; lab_controller, session; delay_session, main_controller.
+Reading order: awake, compilation, timing; failures; lab_controller, session; delay_session, main_controller.
 """
 
 import gc

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QEventLoop, QObject, QTimer, Signal
 from PySide6.QtGui import QGuiApplication, QKeySequence, QShortcut
 
+from study_app.app.compilation import Compilation
 from study_app.app.failures import BY_SIGNAL_S, Patience, UncaughtExceptions, ending_on_signals, guard_painting
 from study_app.app.session.live_session import BUG, OPENING_PATIENCE_S, LiveSession
 from study_app.app.timing import collecting_in_this_thread
@@ -164,6 +165,7 @@ def run_home_window(
     uncaught = UncaughtExceptions(controller.show_bug)
     with collecting_in_this_thread(), ending_on_signals(controller.end_by_signal), uncaught:
         controller.open()
+        controller.compile_when_loaded()
         then(controller)
         controller.loop.exec()
     controller.end()
@@ -211,6 +213,7 @@ class MainController(QObject):
         self.playing: Playing | None = None
         self.lab: LabController | None = None
         self._loading = Background(self)
+        self.compilation = Compilation(self)
         self.help: HelpPlace | None = None
         self._called_off: list[LiveSession] = []
         self._bugs: set[str] = set()
@@ -272,6 +275,10 @@ class MainController(QObject):
     def preload(self) -> None:
         """Load the modules of lab and designer in the background, so that the first visit rarely waits."""
         self._loading.run(load_modules)
+
+    def compile_when_loaded(self) -> None:
+        """Compile the force model in the background, once the modules are loaded."""
+        self._loading.done.connect(self.compilation.start)
 
     def _make_lab_place(self) -> LabPlace:
         self._loading.wait()  # two threads that import modules of the same cycle may see them partially initialised
@@ -438,6 +445,7 @@ class MainController(QObject):
         """
         patience = Patience(BY_SIGNAL_S if self.code else OPENING_PATIENCE_S)
         self._opened.stop()  # a thread that it starts would outlive Python
+        self.compilation.close()
         self._home_place.end()
         for part in (self.playing, self.lab):
             if part is not None:
@@ -461,7 +469,7 @@ class MainController(QObject):
             return
         self.devices.end_diagnosis()  # the diagnosis would hold the device
         self.machine.remember_operator(chosen.operator)
-        self.live = LiveSession(chosen, self.window.theme, asks=True)
+        self.live = LiveSession(chosen, self.window.theme, asks=True, compilation=self.compilation)
         self.live.over.connect(self._return_from_session)
         self.window.hide_for_session()
         self.live.open()

@@ -4,6 +4,6 @@
 out; read these first. ``tasks`` says when a trial ends, ``trial`` records and measures it, and ``simulated`` runs whole
 sessions with simulated participants.
 
-Reading order: pages, preflight, replay, resume, tasks; ports, transitions; device_buttons, preflight_measurements,
-trial, watch; runner, start; simulated.
+Reading order: compile_worker, pages, preflight, replay, resume, tasks; ports, transitions; device_buttons,
+preflight_measurements, trial, watch; runner, start; simulated.
 """

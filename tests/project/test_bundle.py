@@ -18,8 +18,7 @@ PACKAGING = Path(__file__).resolve().parents[2] / "packaging"
 
 
 def started(*words: str, code: int = 0, send: bytes = b"", **variables: str) -> str:
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CPU_NAME"} | variables
-    environment |= {"PYTHONPATH": str(PACKAGING.parent)}
+    environment = os.environ | variables | {"PYTHONPATH": str(PACKAGING.parent)}
     command = [sys.executable, str(PACKAGING / "start.py"), *words]
     done = subprocess.run(command, env=environment, input=send, capture_output=True, check=False, timeout=120)
     assert done.returncode == code, done.stderr
@@ -27,8 +26,9 @@ def started(*words: str, code: int = 0, send: bytes = b"", **variables: str) -> 
 
 
 @pytest.fixture
-def bundle() -> dict[str, Any]:
+def bundle(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     """The functions of packaging/bundle.py."""
+    monkeypatch.syspath_prepend(PACKAGING)
     return runpy.run_path(str(PACKAGING / "bundle.py"))
 
 
@@ -43,13 +43,6 @@ def test_its_start_runs_modules_and_code_as_python_does() -> None:
     words = ("falcon", "study_app.devices.falcon.transport:end_torque", "falcon:NOWHERE")
     assert started("-P", "-m", guard, *words, send=b"done\n") == "ready\n"
     assert started("-S", "-c", "import sys; print(sys.argv[1:], __name__)", "a") == "['a'] __main__\n"
-
-
-def test_it_compiles_for_any_processor_unless_asked_otherwise() -> None:
-    code = "import numba; print(numba.config.CPU_NAME, repr(numba.config.CPU_FEATURES))"
-    assert started("-c", code) == "generic ''\n"
-    assert started("-c", code, NUMBA_CPU_NAME="host") == "None None\n"
-    assert started("-c", code, NUMBA_CPU_NAME="x86-64-v2").startswith("x86-64-v2 ")
 
 
 def test_only_equal_copies_of_a_library_are_dropped_and_links_are_kept(bundle: dict[str, Any], tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from PySide6.QtCore import QEventLoop, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QScreen
 from PySide6.QtWidgets import QApplication, QWidget
 
+from study_app.app.compilation import Compilation
 from study_app.app.failures import BY_SIGNAL_S, CrashTrace, ending_on_signals
 from study_app.app.timing import collecting_in_this_thread, unfreeze_garbage
 from study_app.devices import DEFAULT_DEVICE
@@ -86,7 +87,7 @@ class LiveSession(QObject):
     """One session from the operator's choices to the closed journal.
 
     ``over`` is emitted once; then ``code`` is the exit code and ``error`` the unhandled error, if any. With ``asks``
-    the operator sees the pre-flight results and decides whether to begin.
+    the operator sees the pre-flight results and decides whether to begin. The session waits for ``compilation``.
     """
 
     over = Signal()
@@ -94,12 +95,19 @@ class LiveSession(QObject):
     _compiled = Signal(float)
 
     def __init__(
-        self, chosen: NewSession, theme: Theme, progress: Callable[[str], object] | None = None, *, asks: bool = False
+        self,
+        chosen: NewSession,
+        theme: Theme,
+        progress: Callable[[str], object] | None = None,
+        *,
+        asks: bool = False,
+        compilation: Compilation | None = None,
     ) -> None:
         super().__init__()
         self.chosen = chosen
         self._progress = progress
         self._asks = asks
+        self._compilation = compilation
         self.preflight: Preflight | None = None
         self.theme = theme
         self.settings, self._unread = settings_here()
@@ -174,6 +182,8 @@ class LiveSession(QObject):
             if not self.chosen.device_options:  # which may name a port that the probe does not search
                 check_connected(self.chosen.device)
             settings = study_settings(study, self.chosen.tremor(), self.chosen.device_options)
+            if self._compilation is not None:
+                self._compilation.wait(self._compiled.emit, self._ending.is_set)
             with following_compilation(self._compiled.emit):
                 rig = open_rig(self.chosen.device, settings, progress=self._said.emit, cancelled=lambda: self._closed)
                 outlets = None if self.chosen.played else open_outlets(self.settings, rig.servo, study.study.blinding)

@@ -2,9 +2,10 @@
 
 numba keys its on-disk cache on the file of the outermost function alone, so it would miss a change in a function that
 it calls, or in a constant that it reads. The cache is therefore a folder named after a digest of every module that
-compiles a function and of what these modules import; old folders of other sources are removed. Within the folder a
-function is found by its path relative to the package, so that the package may be moved. A program that ships with a
-filled cache (see docs/install.md) starts with a copy of it.
+compiles a function and of what these modules import, of the versions of Python, numba and LLVM, and of the processor;
+old folders are removed. Within the folder a function is found by its path relative to the package, so that the package
+may be moved. A wheel or a bundle comes with filled caches for two kinds of processors (see docs/install.md), and starts
+with a copy of the one that fits.
 """
 
 from __future__ import annotations
@@ -16,13 +17,16 @@ import os
 import re
 import secrets
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
+import llvmlite
 import numba
+from llvmlite.binding import get_default_triple, get_host_cpu_features, get_host_cpu_name
 from llvmlite.binding.newpassmanagers import ModulePassManager, create_new_module_pass_manager
 from numba.core import event
 from numba.core.caching import FunctionCache, UserProvidedCacheLocator
@@ -39,8 +43,13 @@ log = logging.getLogger(__name__)
 _PACKAGE = Path(__file__).resolve().parents[2]
 KERNEL_FOLDERS = ("haptics", "devices", "evidence")
 """Compiled functions, and all constants that they read, are in these; `tests.haptics.kernels.test_compiled` checks."""
-_SHIPPED_CACHE = _PACKAGE / "compiled"
-"""Caches that came with the program; only the bundle has them."""
+_SHIPPED_CACHES = _PACKAGE / "compiled"
+"""Caches that came with the program; only wheels and bundles of one system have them."""
+CHECKSUM: Final = "sha256"
+"""The file of a shipped cache that holds the digest of its other files."""
+_X86_64_V3 = {"x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")}
+PROCESSORS: Final = (_X86_64_V3 if get_default_triple().startswith("x86_64") else {}) | {"generic": ()}
+"""LLVM's names of the processors of shipped caches, the best one first, each with the features that it needs."""
 
 _KEPT_FOLDERS = 8  # caches kept at any age
 _UNUSED_S = 86_400.0  # a program that started less than a day ago keeps its cache
@@ -83,13 +92,48 @@ def compiled_sources(package: Path) -> dict[str, bytes]:
     return {name: sources[name] for name in sorted(covered)}
 
 
-def digest_of(sources: dict[str, bytes]) -> str:
-    """Return the name of the cache of these modules."""
-    digest = hashlib.sha256()
+def versions() -> str:
+    """Return the versions that compiled code depends on, and the kind of machine."""
+    python = f"{sys.version_info.major}.{sys.version_info.minor}"
+    return f"Python {python}, numba {numba.__version__}, llvmlite {llvmlite.__version__}, {get_default_triple()}"
+
+
+def digest_of(sources: dict[str, bytes], processor: str, versions: str) -> str:
+    """Return the name of the cache of these modules, compiled for a processor with these versions."""
+    digest = hashlib.sha256(f"{processor} {versions}".encode())
     for name, source in sources.items():
         digest.update(name.encode())
         digest.update(source)
     return digest.hexdigest()[:16]
+
+
+def checksum_of(cache: Path) -> str:
+    """Return the digest of the names and contents of all files of a cache but its checksum."""
+    digest = hashlib.sha256()
+    for path in sorted(path for path in cache.rglob("*") if path.is_file() and path.name != CHECKSUM):
+        digest.update(path.relative_to(cache).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def _processor() -> str:
+    """Return the processor to compile for: NUMBA_CPU_NAME, or that of a shipped cache which fits, or the one here.
+
+    NUMBA_CPU_NAME=host ignores shipped caches.
+    """
+    wanted = os.environ.get("NUMBA_CPU_NAME")
+    if wanted is None:
+        features = get_host_cpu_features()
+        for name, needed in PROCESSORS.items():
+            is_shipped = (_SHIPPED_CACHES / digest_of(SOURCES, name, versions())).is_dir()
+            if is_shipped and all(features.get(feature) for feature in needed):
+                vars(numba.config).update(CPU_NAME=name, CPU_FEATURES="")
+                return name
+    if wanted in (None, "host"):
+        vars(numba.config)["CPU_NAME"] = None
+        return f"{get_host_cpu_name()} {get_host_cpu_features().flatten()}"
+    vars(numba.config)["CPU_FEATURES"] = vars(numba.config)["CPU_FEATURES"] or ""  # by default those of the one here
+    return wanted
 
 
 def _use_own_cache() -> Path | None:
@@ -98,7 +142,7 @@ def _use_own_cache() -> Path | None:
         *map(Path, filter(None, [os.environ.get("NUMBA_CACHE_DIR")])),
         user_cache_path("liquid-study", appauthor=False, opinion=False),
     ]
-    digest = digest_of(SOURCES)
+    digest = digest_of(SOURCES, _processor(), versions())
     for place in wanted:
         _copy_shipped(place / digest)
         if _writable(place / digest):
@@ -115,14 +159,17 @@ def _use_own_cache() -> Path | None:
 
 
 def _copy_shipped(own: Path) -> None:
-    """Copy the shipped cache of the same sources, if there is one, to ``own`` unless that exists."""
-    shipped = _SHIPPED_CACHE / own.name
+    """Copy the shipped cache of this name, if there is one and it is undamaged, to ``own`` unless that exists."""
+    shipped = _SHIPPED_CACHES / own.name
     if own.exists() or not shipped.is_dir():
         return
     making = own.with_name(f".{own.name}.{secrets.token_hex(4)}.gone")  # swept later if the program is killed here
     with contextlib.suppress(OSError):
         try:
             shutil.copytree(shipped, making, copy_function=shutil.copyfile)
+            if checksum_of(making) != (making / CHECKSUM).read_text(encoding="ascii"):
+                log.warning("%s is damaged and is not used: the force model is compiled here", shipped)
+                return
             making.rename(own)
         finally:
             shutil.rmtree(making, ignore_errors=True)

@@ -126,11 +126,16 @@ print(compiled.CACHE, hits)
 """
 
 
-def started(package: Path, variables: dict[str, str]) -> tuple[Path, int]:
-    """Run a copy of the package that computes a length; return its cache and the number of functions found there."""
+def started(package: Path, variables: dict[str, str], first: str = "") -> tuple[Path, int]:
+    """Run ``first``, then let a copy of the package compute a length; return its cache and its loaded functions."""
     environment = os.environ | {"PYTHONPATH": str(package.parent), "PYTHONSAFEPATH": "1"} | variables
     done = subprocess.run(
-        [sys.executable, "-c", ADDS], env=environment, capture_output=True, text=True, check=False, cwd=package.parent
+        [sys.executable, "-c", first + ADDS],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=package.parent,
     )
     assert done.returncode == 0, done.stderr
     cache, hits = done.stdout.rsplit(maxsplit=1)
@@ -142,20 +147,52 @@ def copy_of_package(to: Path) -> Path:
     return to / "study_app"
 
 
+def damage(cache: Path) -> None:
+    path = next(cache.rglob("*.nbc"))
+    path.write_bytes(path.read_bytes()[:-1] + b"\0")
+
+
 @pytest.mark.nightly
 @about_compiled_code
-def test_a_cache_that_came_with_the_program_is_begun_with_unless_it_is_for_another_processor(tmp_path: Path) -> None:
+def test_a_shipped_cache_is_used_only_if_sources_versions_and_processor_fit_and_it_is_undamaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)
     package = copy_of_package(tmp_path / "a")
-    generic = {"NUMBA_CPU_NAME": "generic"}
-    made, hits = started(package, generic | {"NUMBA_CACHE_DIR": str(tmp_path / "made")})
+    made, hits = started(package, {"NUMBA_CPU_NAME": "generic", "NUMBA_CACHE_DIR": str(tmp_path / "made")})
     assert hits == 0
-    shutil.copytree(made, package / "compiled" / made.name)
-    fresh = {"NUMBA_CACHE_DIR": str(tmp_path / "fresh")}
-    assert started(package, generic | fresh) == (tmp_path / "fresh" / made.name, 1)
-    other = fresh | {"NUMBA_CPU_NAME": "x86-64-v2"}
-    assert started(package, other)[1] == 0
-    assert started(package, other)[1] == 1
-    assert started(package, generic | fresh)[1] == 1
+    shipped = package / "compiled" / made.name
+    shutil.copytree(made, shipped)
+    (shipped / compiled.CHECKSUM).write_text(compiled.checksum_of(shipped), encoding="ascii", newline="\n")
+
+    assert started(package, {"NUMBA_CACHE_DIR": str(tmp_path / "fits")}) == (tmp_path / "fits" / made.name, 1)
+    host = {"NUMBA_CACHE_DIR": str(tmp_path / "fits"), "NUMBA_CPU_NAME": "host"}
+    assert started(package, host)[1] == 0
+    assert started(package, host)[1] == 1
+    assert started(package, {"NUMBA_CACHE_DIR": str(tmp_path / "fits")})[1] == 1
+
+    vector = package / "haptics" / "kernels" / "vector.py"
+    source = vector.read_bytes()
+    vector.write_bytes(source + b"# edited\n")
+    assert started(package, {"NUMBA_CACHE_DIR": str(tmp_path / "edited")})[1] == 0
+    vector.write_bytes(source)
+    older = {"NUMBA_CACHE_DIR": str(tmp_path / "older")}
+    assert started(package, older, first="import numba; numba.__version__ = '0.0.1'")[1] == 0
+    damage(shipped)
+    assert started(package, {"NUMBA_CACHE_DIR": str(tmp_path / "damaged")})[1] == 0
+
+
+def test_the_digest_depends_on_processor_and_versions() -> None:
+    digests = {
+        compiled.digest_of(compiled.SOURCES, processor, versions)
+        for processor in compiled.PROCESSORS
+        for versions in (compiled.versions(), "Python 3.12, numba 0.62.0, llvmlite 0.45.0, x86_64-pc-windows-msvc")
+    }
+    assert len(digests) == 4
+
+
+def digest_of(package: Path) -> str:
+    return compiled.digest_of(compiled.compiled_sources(package), "generic", "")
 
 
 def digest_with(package: Path, file: str, old: str, new: str) -> str:
@@ -164,15 +201,15 @@ def digest_with(package: Path, file: str, old: str, new: str) -> str:
     text = path.read_text(encoding="utf-8")
     assert old in text, (file, old)
     path.write_text(text.replace(old, new, 1), encoding="utf-8", newline="\n")
-    digest = compiled.digest_of(compiled.compiled_sources(package))
+    digest = digest_of(package)
     path.write_text(text, encoding="utf-8", newline="\n")
     return digest
 
 
 def test_a_changed_constant_of_a_kernel_changes_the_digest_and_a_word_elsewhere_does_not(tmp_path: Path) -> None:
     package = copy_of_package(tmp_path)
-    digest = compiled.digest_of(compiled.compiled_sources(package))
-    assert digest == compiled.digest_of(compiled.SOURCES)
+    digest = digest_of(package)
+    assert digest == compiled.digest_of(compiled.SOURCES, "generic", "")
     for file, old, new in (
         ("haptics/kernels/safety.py", '"""', '"""The '),  # its own file
         ("haptics/model/layout.py", "LIMITER_NORM = 1 << 3", "LIMITER_NORM = 1 << 13"),  # imported by it
@@ -183,7 +220,7 @@ def test_a_changed_constant_of_a_kernel_changes_the_digest_and_a_word_elsewhere_
     (package / "haptics/model/effects/unlisted.py").write_text(
         "", encoding="utf-8", newline="\n"
     )  # found by `iter_modules`
-    assert compiled.digest_of(compiled.compiled_sources(package)) != digest
+    assert digest_of(package) != digest
 
 
 def compiled_functions(tree: ast.Module) -> list[ast.FunctionDef]:

@@ -1,0 +1,74 @@
+"""Compilation in the background: a session that begins meanwhile waits for it, and shows how far it is."""
+
+import threading
+from typing import Any
+
+import pytest
+
+from study_app.app import compilation
+from study_app.app.compilation import Compilation
+from study_app.workers.server import Crashed
+
+
+class Client:
+    """A worker process that gives one answer at a time."""
+
+    def __init__(self, *answers: object) -> None:
+        self.left = list(answers)
+        self.closed = False
+
+    def answers(self) -> list[tuple[int, object]]:
+        return [(1, self.left.pop(0))] if self.left else []
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def begun(monkeypatch: pytest.MonkeyPatch, client: Client | None) -> Compilation:
+    monkeypatch.setattr(compilation, "start_compilation", lambda: client)
+    made = Compilation()
+    made.start()
+    return made
+
+
+@pytest.mark.parametrize("last", [None, Crashed(1)])
+def test_a_session_waits_until_the_process_ends_and_sees_its_progress(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, last: object
+) -> None:
+    client = Client(0.25, 0.75, last)
+    background = begun(monkeypatch, client)
+    shares: list[float] = []
+    session = threading.Thread(target=background.wait, args=(shares.append, lambda: False))
+    session.start()
+    qtbot.waitUntil(lambda: not session.is_alive(), timeout=10_000)
+    assert shares == sorted(shares)
+    assert background.share == 0.75
+    assert 0.75 in shares
+    assert client.closed
+
+
+def test_a_cancelled_session_waits_no_longer(qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    client = Client()
+    background = begun(monkeypatch, client)
+    background.wait(lambda _share: None, lambda: True)
+    assert not client.closed
+    background.close()
+    assert client.closed
+
+
+def test_nothing_is_waited_for_if_all_is_compiled_or_no_process_starts(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    shares: list[float] = []
+    begun(monkeypatch, None).wait(shares.append, lambda: False)
+
+    def refuse() -> None:
+        raise OSError(11, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(compilation, "start_compilation", refuse)
+    background = Compilation()
+    background.start()
+    background.wait(shares.append, lambda: False)
+    assert shares == []
+    assert "Resource temporarily unavailable" in caplog.text
+    caplog.clear()

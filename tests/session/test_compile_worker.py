@@ -1,0 +1,39 @@
+"""Compilation in a worker process: afterwards a session finds everything compiled, and no process starts again."""
+
+from pathlib import Path
+
+import pytest
+
+from study_app.haptics.kernels import compiled
+from study_app.session.compile_worker import start_compilation
+from tests.compiled import needs_servo
+
+
+def test_no_process_starts_if_nothing_can_be_stored_or_all_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(compiled, "CACHE", None)
+    assert start_compilation() is None
+    monkeypatch.setattr(compiled, "CACHE", tmp_path)
+    (tmp_path / "filled").touch()
+    assert start_compilation() is None
+
+
+@needs_servo
+@pytest.mark.nightly
+@pytest.mark.timeout(1200)  # it has the lowest priority
+def test_the_process_fills_the_cache_and_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiled, "CACHE", tmp_path / compiled.CACHE.name)
+    client = start_compilation(("scripted",))
+    assert client is not None
+    try:
+        answers: list[object] = [0.0]
+        while isinstance(answers[-1], float):
+            answers += [answer for _, answer in client.answers(wait_s=1.0)]
+        assert answers[-1] is None
+        shares = answers[:-1]
+        assert len(set(shares)) > 100
+        assert shares == sorted(shares)
+    finally:
+        client.close()
+        client.wait_until_ended()
+    assert start_compilation(("scripted",)) is None
