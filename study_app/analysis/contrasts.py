@@ -129,7 +129,7 @@ def contrast_results(
     """Test the contrasts of a study, with Holm's correction for differences and for equivalence; none while sealed."""
     alpha = study.decided.alpha
     tests = [_tested(study, contrast, answers, levels, alpha / len(study.contrasts)) for contrast in study.contrasts]
-    adjusted = holm([None if test.p is None else max(test.p, test.p_bootstrap or 0.0) for test in tests])
+    adjusted = holm([test.largest_p for test in tests])
     with_bound = [place for place, test in enumerate(tests) if test.contrast.bound is not None]
     of_equal = dict(zip(with_bound, holm([tests[place].p_equivalent for place in with_bound]), strict=True))
     return tuple(
@@ -329,7 +329,7 @@ def _tested(
     names = _side_names(study, contrast)
     is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction
     standardised = _standardised(compared, is_ordinal=is_ordinal)
-    effect = ends = p_equal = p = p_bootstrap = statistic = None
+    effect = ends = p_equal = p = p_bootstrap = p_skewed = statistic = None
     method, why = "none", _TOO_FEW if means is None else _ALIKE
     if means is not None:
         mean, (low, high) = float(means.mean[0]), (float(end[0]) for end in means.interval(0.95))
@@ -338,12 +338,15 @@ def _tested(
             reach, largest = equality_limits(contrast, contrast.bound, ratio=ratio)
             p_equal = float(p_equivalent(means, reach, compared.smallest, largest)[0])
         if means.error[0] > SAME:
-            p, p_bootstrap = (float(each[0]) for each in p_differs(means, SIDES[contrast.expected]))
+            ps = p_differs(means, SIDES[contrast.expected])
+            p, p_bootstrap, p_skewed = float(ps.t[0]), float(ps.bootstrap[0]), float(ps.skewed[0])
             statistic = float(means.t()[0])
             low, high = (math.exp(end) if ratio else end for end in (low, high))
             ends = Interval(low=low, high=high, level=0.95, method=f"t({means.freedom})")
             sides = "two-sided" if contrast.expected is None else f"one-sided ({contrast.expected})"
-            method = f"t({means.freedom}), {sides}; bootstrap {p_equals(p_bootstrap)}"
+            method = (
+                f"t({means.freedom}), {sides}; bootstrap {p_equals(p_bootstrap)}; for skewness {p_equals(p_skewed)}"
+            )
     return ContrastResult(
         test=(
             "contrast, t of two groups' differences"
@@ -371,6 +374,7 @@ def _tested(
         verdict="not tested",
         equivalent=None,
         p_bootstrap=p_bootstrap,
+        p_skewed=p_skewed,
         p_equivalent=p_equal,
         not_excluded=_not_excluded(contrast, compared, ratio=ratio),
         higher=None if contrast.groups else int((compared.values[0] > SAME).sum()),

@@ -286,6 +286,7 @@ class ContrastResult(Outcome):
     verdict: Verdict | Literal["equivalent"]
     equivalent: bool | None
     p_bootstrap: float | None
+    p_skewed: float | None
     p_equivalent: float | None
     not_excluded: float | None
     higher: int | None
@@ -295,6 +296,11 @@ class ContrastResult(Outcome):
     standardised: EffectSize | None = None
     ordinal: EffectSize | None = None
     bayes_factor: float | None = None
+
+    @property
+    def largest_p(self) -> float | None:
+        """The p before correction: all tests must show a difference. None if nothing could be tested."""
+        return max((p for p in (self.p, self.p_bootstrap, self.p_skewed) if p is not None), default=None)
 
 
 @dataclass(frozen=True, slots=True)

@@ -148,11 +148,12 @@ def _exponents(lines: Sequence[Numbers]) -> list[Numbers]:
 
 
 def compare_hypotheses(compared: Compared, trials: pd.DataFrame, study: Numbers) -> None:
-    """Recompute the hypotheses that the study's file states; p of the bootstrap is taken from the report."""
+    """Recompute the stated hypotheses; p of the bootstrap and p for skewness are taken from the report."""
     reported, contrasts = compared.results.get("contrasts", []), study["analysis"].get("contrasts", [])
     rows = compared.tests()
     tested = [_tested(compared, contrast, trials[trials["here"]]) for contrast in contrasts]
-    ps = adjusted([max(own["p"], one["p_bootstrap"]) for own, one in zip(tested, reported, strict=True)])
+    others = [max(one["p_bootstrap"], one["p_skewed"]) for one in reported]
+    ps = adjusted([max(own["p"], p) for own, p in zip(tested, others, strict=True)])
     for number, (own, p) in enumerate(zip(tested, ps, strict=True)):
         own |= {"p_adjusted": p, "members": len(contrasts)}
         compared.check(f"results.contrasts.{number}", own, 1e-4)

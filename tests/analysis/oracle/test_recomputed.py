@@ -35,6 +35,8 @@ PROVED = {
     "test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_told",
     r"results\.orders\..*": "tests/protocol/orders/test_balance.py::test_positions_and_what_follows_what_are_counted",
     r"results\.scores\..*": "tests/protocol/instruments/test_instruments.py::test_published_and_worked_scores",
+    r".*\.p_skewed": "tests/analysis/statistics/test_mean_tests.py::"
+    "test_the_p_for_skewness_is_that_of_halls_transformation",
     r".*\.p_bootstrap": PROPERTIES + "test_p_of_the_bootstrap_is_that_of_other_draws",
     r"results\.contrasts\.p_equivalent": "tests/analysis/test_contrasts.py::"
     "test_equality_is_corrected_over_the_hypotheses_that_state_a_bound",
