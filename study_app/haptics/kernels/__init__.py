@@ -1,5 +1,5 @@
 """The compiled force model and loop.
 
-Reading order: compiled; c_functions, plant, vector; effects, estimators, sample_validation; passivity, regions;
-safety; tick; loop.
+Reading order: compiled; c_functions, plant, vector; known_force; effects, estimators, sample_validation; passivity,
+regions; safety; tick; loop.
 """

@@ -21,6 +21,7 @@ import math
 from typing import Any, Final
 
 from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.known_force import begin_known_force, track_motion
 from study_app.haptics.kernels.vector import clear, copy, norm, square
 from study_app.haptics.model import estimators
 from study_app.haptics.model.layout import COMPRESSION_SQRT, COMPRESSION_SQUARE, Record
@@ -123,6 +124,7 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
         filtered.response_m[axis] = filtered.response_mps[axis] = filtered.response_mps2[axis] = 0.0
         filtered.estimate_mps[axis] = filtered.smoothed_mps[axis] = filtered.carried_mps[axis] = 0.0
     copy(filtered.force_n, filtered.before_n)
+    begin_known_force(parameters, filtered)
     filtered.covariance[0] = 0.5 * parameters.count_m * parameters.count_m
     filtered.covariance[1] = filtered.covariance[2] = filtered.covariance[4] = 0.0
     filtered.covariance[3] = FIRST_SPEED_MPS * FIRST_SPEED_MPS
@@ -140,10 +142,13 @@ def begin_filter(parameters: Record, filtered: Record) -> None:
 def take_force(state: Record, safety: Record) -> None:
     """Set the mean force that acted since the last sample, delayed by the assumed loop delay."""
     passivity, filtered = safety.passivity, state.kalman
+    sent_n = passivity.acted_n[passivity.row]
     late = passivity.row - safety.delay_ticks
     late_n = passivity.acted_n[late if late >= 0 else late + passivity.acted_n.shape[0]]
     lasted_s = passivity.impulse_s + safety.tick_s
     for axis in range(3):
+        filtered.sent_n[axis] = sent_n[axis]
+        filtered.asked_n[axis] = state.force_n[axis] - state.lift_n[axis]
         filtered.force_n[axis] = late_n[axis]
         if lasted_s > 0.0:
             filtered.force_n[axis] = (passivity.acted_impulse_ns[axis] + late_n[axis] * safety.tick_s) / lasted_s
@@ -157,6 +162,10 @@ def filter_velocity(parameters: Record, state: Record, interval_s: float) -> Non
     _filter_force(filtered, interval_s)
     ratio = _correct(parameters, state, filtered, interval_s)
     on_ewma = _needs_ewma(filtered, ratio, interval_s)
+    if filtered.assumed_ticks >= parameters.known_force_ticks:
+        track_motion(parameters, state, interval_s)
+        if on_ewma:
+            filtered.trust = min(filtered.trust, 0.0)
     share = interval_s / _CARRIED_S
     kept = 1.0 - share / (1.0 + share * (0.5 + share / 12.0))
     for axis in range(3):

@@ -32,9 +32,10 @@ counts. A delayed force belongs to an earlier velocity: a delayed balance may in
 
 Removal of force and damping bypass the slew limit. A debt is forgiven at 1 mW, less than a hand's own damping absorbs
 at 15 mm/s: without any force no debt could be repaid. A hand that shakes the handle causes debts, too, since the force
-lags. A debt that begins in fast motion, of 15 ms or more, is forgiven once the hand has been quiet for ``quiet_s``, and
-the gain returns within 0.3 s. One that begins otherwise, or after a gap in the samples, is not: its oscillation would
-return with the gain.
+lags, and so does a release, after which inertial forces are late until the filter has noticed it. A debt that begins in
+fast motion, of 15 ms or more, or within two seconds of a surprise (`known_force`), is forgiven once the hand has been
+quiet for ``quiet_s``, and the gain returns within 0.3 s. One that begins otherwise, or after a gap in the
+samples, is not: its oscillation would return with the gain.
 
 With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
 there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
@@ -313,10 +314,12 @@ def _forgive(balance_j: float, forgiven_j: float) -> float:
 
 
 @part
-def reduce_gain(parameters: layout.Record, passivity: layout.Record, sample: layout.Record) -> None:
+def reduce_gain(
+    parameters: layout.Record, state: layout.Record, passivity: layout.Record, sample: layout.Record
+) -> None:
     """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
-    left_j = _judge_debt(parameters, passivity, left_j)
+    left_j = _judge_debt(parameters, state, passivity, left_j)
     if passivity.debt == layout.DEBT_FORGIVEN:
         passivity.gain = min(passivity.gain + parameters.period_s / _REGAINED_S, 1.0)
     elif parameters.link.acts == 0:
@@ -333,10 +336,10 @@ def reduce_gain(parameters: layout.Record, passivity: layout.Record, sample: lay
 
 
 @part
-def _judge_debt(parameters: layout.Record, passivity: layout.Record, left_j: float) -> float:
-    """Classify the cause of a debt; forgive one caused by a push once the hand is quiet. Return the energy left [J]."""
+def _judge_debt(parameters: layout.Record, state: layout.Record, passivity: layout.Record, left_j: float) -> float:
+    """Classify a debt; forgive one of a push or a surprise once the hand is quiet. Return the energy left [J]."""
     if left_j < 0.0 and passivity.debt in (layout.DEBT_NONE, layout.DEBT_FORGIVEN):
-        pushed = passivity.fast_s > _LEAST_PUSH_S and passivity.gap_s > _PUSHED_S
+        pushed = (passivity.fast_s > _LEAST_PUSH_S or state.surprised != 0) and passivity.gap_s > _PUSHED_S
         passivity.debt = layout.DEBT_PUSHED if pushed else layout.DEBT_OWN
     elif left_j >= 0.0 and passivity.gain >= 1.0:
         passivity.debt = layout.DEBT_NONE

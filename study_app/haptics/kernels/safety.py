@@ -135,7 +135,7 @@ def guard(model: Any, safety: layout.Record, sample: layout.Record, interval_s: 
     _fade(force_n, lift_n, parameters, safety, sample)
     copy(force_n, safety.permitted_n)
     _log_request(parameters, state, safety, limit_n)
-    reduce_gain(parameters, passivity, sample)
+    reduce_gain(parameters, state, passivity, sample)
     _limit_slew(force_n, parameters, state, safety, sample)
     copy(force_n, safety.slewed_n)
     apply_controller(parameters, safety, sample)
@@ -172,7 +172,7 @@ def limit_slope(model: Any, safety: layout.Record, sample: layout.Record) -> Non
                 sample.limiters |= layout.LIMITER_SLOPE
                 for axis in range(3):
                     sample.device_force_n[axis] -= local.excess_n[axis]
-            most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.share / shares
+            most_nspm = parameters.slope_limit_nspm[safety.delay_ticks] * local.slope_factor * local.share / shares
             if square(local.damping_n) > most_nspm * most_nspm * square(local.relative_mps):
                 sample.limiters |= layout.LIMITER_SLOPE
                 excess = 1.0 - most_nspm * norm(local.relative_mps) / norm(local.damping_n)
@@ -192,7 +192,7 @@ def limit_inertia(model: Any, safety: layout.Record, sample: layout.Record) -> N
     """Reduce inertial forces to their stable share (`pack`): they also damp fast motion."""
     for i in range(model.parameters[0].liquids):
         local = model.liquid_states[i]
-        excess = 1.0 - model.liquids[i].inertia_share[safety.delay_ticks]
+        excess = 1.0 - local.inertia_share
         if excess > 0.0 and local.share > 0.0:
             sample.limiters |= layout.LIMITER_SLOPE
             for k in range(local.inertial):

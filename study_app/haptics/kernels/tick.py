@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
-from study_app.haptics.kernels.effects.added_mass import added_mass_force
+from study_app.haptics.kernels.effects.added_mass import added_mass_force, implicit_added_mass_force
 from study_app.haptics.kernels.effects.buoyancy import buoyancy_force
 from study_app.haptics.kernels.effects.current import current_velocity
 from study_app.haptics.kernels.effects.drag import drag_force
@@ -65,6 +65,7 @@ def step_model(model: Any, interval_s: float, delay_ticks: int) -> None:
     clear(state.drift_mps)
     state.returnable_j = 0.0
     state.growth = GROWS_AS_SQUARE
+    state.surprised = 0
     for i in range(parameters.liquids):
         if model.liquid_states[i].share > 0.0:
             apply_effects(model, i, interval_s, delay_ticks)
@@ -100,14 +101,23 @@ def apply_effects(model: Any, i: int, interval_s: float, delay_ticks: int) -> No
         wetted_fraction(local)
     if liquid.effects & effects.drag.BIT:
         drag_force(liquid, local, state)
-    if liquid.effects & effects.added_mass.BIT:
+    share, trust = liquid.inertia_share[delay_ticks], state.kalman.trust
+    may_know_force = state.kalman.on_ewma == 0 and liquid.known_force[delay_ticks] > 0.0
+    knows_force = may_know_force and trust > 0.0
+    if may_know_force and trust < 1.0:
+        state.surprised = 1
+    local.inertia_share = share + trust * (1.0 - share) if knows_force else share
+    local.slope_factor = 1.0 + trust * (liquid.known_force[delay_ticks] - 1.0) if knows_force else 1.0
+    if liquid.effects & effects.added_mass.BIT and not knows_force:
         added_mass_force(parameters, liquid, local, state, delay_ticks, interval_s)
     if liquid.effects & effects.history.BIT:
         basset_force(parameters, liquid, local, state, rows, delay_ticks, interval_s)
     if liquid.effects & effects.unsteady_drag.BIT:
-        unsteady_drag_force(parameters, liquid, local, state, delay_ticks, interval_s)
+        unsteady_drag_force(parameters, liquid, local, state, delay_ticks, interval_s, knows_force)
     if liquid.effects & effects.non_newtonian.BIT:
         non_newtonian_force(parameters, liquid, local, state, delay_ticks, interval_s)
+    if liquid.effects & effects.added_mass.BIT and knows_force:
+        implicit_added_mass_force(parameters, liquid, local, state, delay_ticks)
     if liquid.effects & effects.wake.BIT:
         update_wake(liquid, local, state, rows.elements, rows.segments, interval_s)
     if liquid.effects & effects.local_wake.BIT:

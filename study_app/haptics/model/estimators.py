@@ -116,6 +116,17 @@ _KALMAN_STATE: Fields = (
     ("surprise", FLOAT),  # mean of squared innovations over their variance
     ("quiet_s", FLOAT),  # time since the last fault
     ("repeated", INT),  # 1 if the last sample counted as a repeated one
+    ("hand_motion", FLOAT, (4, 3)),  # offset, velocity, acceleration, jerk of the handle by the hand (`known_force`)
+    ("response_motion", FLOAT, (4, 3)),  # response of these to the force on 1 kg
+    ("motion_covariance", FLOAT, (10,)),  # of these four on one axis, the same for all
+    ("gains", FLOAT, (4,)),  # of these four
+    ("late", FLOAT, (2, 3)),  # integrals of the fast part of ``force_n``, of the first and second order
+    ("ahead", FLOAT, (2, 3)),  # the same of the force last sent
+    ("compliance_per_kg", FLOAT),  # θ of `known_force`
+    ("compliance_variance", FLOAT),
+    ("trust", FLOAT),  # share of the known force in inertial forces; at most 0 after a surprise (`known_force`)
+    ("sent_n", FLOAT, (3,)),  # the force last sent
+    ("asked_n", FLOAT, (3,)),  # the force of the effects in the tick before
 )
 
 

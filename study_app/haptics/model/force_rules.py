@@ -30,6 +30,9 @@ class ForceRules(NamedTuple):
     (`sample_validation`), ``quiet_s`` how long a hand must be quiet for its energy debt to be forgiven (`passivity`).
     ``history_rs`` is the square root of the period of the oscillation whose inertia the history force may return as
     energy: with that of 1 Hz, a handle of 200 g let go in tar oscillated at 35 Hz on energy that 35 Hz do not store.
+    ``known_force_ticks`` is the shortest delay at which "kalman" computes inertial forces with the known force instead
+    of smoothing and limiting them (`kernels.known_force`), up to an inertia of ``most_known_inertia`` times the least
+    mass of the device and a scale of ``most_known_scale``: beyond, the force was noisy.
     """
 
     version: int
@@ -48,6 +51,9 @@ class ForceRules(NamedTuple):
     gap_ticks: float = math.inf
     quiet_s: float = math.inf
     history_rs: float = 1.0
+    known_force_ticks: int = 99
+    most_known_inertia: float = 7.0
+    most_known_scale: float = 3.0
 
 
 VERSIONS: Final = {
@@ -74,8 +80,9 @@ VERSIONS: Final = {
         ),
     )
 }
+VERSIONS[4] = VERSIONS[3]._replace(version=4, known_force_ticks=3)
 
-FORCE_RULES: Final = 3
+FORCE_RULES: Final = 4
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are
 a new version."""
 CURRENT: Final = VERSIONS[FORCE_RULES]

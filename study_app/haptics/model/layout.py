@@ -383,6 +383,7 @@ PARAMETERS = np.dtype(
         ("count_m", np.float64),  # one encoder count of the device, hand frame
         ("mass_kg", np.float64),  # the device's least effective mass
         ("smoothing_lead", np.float64),  # share of the lag of smoothed dw/dt that is compensated
+        ("known_force_ticks", np.int64),  # shortest delay at which inertial forces use the known force (`known_force`)
         ("link", _LINK),
         ("rules", _RULES),
     ],
@@ -403,6 +404,8 @@ LIQUID = np.dtype(
         ("effects", np.int64),  # bits of the effects it selects
         ("inertia_share", np.float64, (MOST_DELAY + 1,)),  # stable share of inertial forces, by the delay
         ("smoothing_rate", np.float64, (MOST_DELAY + 1,)),  # factor of the rates at which dw/dt is smoothed, likewise
+        # factor of the slope limit while inertial forces are those of the known force, likewise; 0: they never are
+        ("known_force", np.float64, (MOST_DELAY + 1,)),
         ("region", _REGION),
         *((effect.name, record_type(effect.parameters)) for effect in EFFECTS if effect.parameters is not None),
     ],
@@ -432,6 +435,7 @@ STATE = np.dtype(
         ("drift_mps", np.float64, (3,)),  # velocity of the current at the body, of the same liquid
         ("force_n", np.float64, (3,)),  # sum of the effects
         ("lift_n", np.float64, (3,)),  # buoyancy and weight within it
+        ("surprised", np.int64),  # 1: after a surprise, the known force is not or partly used (`known_force`)
         ("returnable_j", np.float64),  # the greatest energy that effects can return, times the scale
         ("growth", np.int64),  # GROWS_* of the force that depends least on the speed
         ("link", _LINK_STATE),
@@ -456,6 +460,8 @@ LIQUID_STATE = np.dtype(
         ("late_n", np.float64, (3,)),  # delayed drag, bounded by the rest of the slope limit
         ("late_mps", np.float64),  # the speed for its limit; 0: no delayed drag
         ("prompt_nspm", np.float64),  # the slope of the drag that acts at once
+        ("inertia_share", np.float64),  # stable share of inertial forces in this tick
+        ("slope_factor", np.float64),  # factor of the slope limit in this tick
         ("inertial", np.int64),  # number of reduced inertial forces
         ("inertia_n", np.float64, (_MOST_INERTIAL, 3)),  # these forces, in the order of their effects
         *((effect.name, record_type(effect.state)) for effect in EFFECTS if effect.state is not None),

@@ -24,13 +24,13 @@ _SLOWEST_HZ: Final = 500.0
 """Lowest rate for participants [Hz]: with slower servos they would feel the limits rather than the liquids."""
 INERTIA_SHARE: Final = 0.3
 """Share of the drag limit for added mass and history if they need not be exact."""
-_MEASURED_KG: Final = 0.1
+MEASURED_KG: Final = 0.1
 """Mass of the free handle in the measurement of the table."""
 LIGHTER: Final = 2.0
 """The limit of a lighter handle is lower by this power of the mass ratio: at 1.7, released handles of 50 g oscillated
 in honey if the delay was one tick longer than assumed; from 1.8 on none of 801 handles of 30 to 250 g did."""
 SLEW_N: Final = 1.5
-"""Greatest change of the force within a millisecond on a handle of `_MEASURED_KG` or more."""
+"""Greatest change of the force within a millisecond on a handle of `MEASURED_KG` or more."""
 KALMAN_SLEW: Final = 0.8
 """Factor on `SLEW_N` with "kalman": at 1, a released handle oscillated in tar if the delay was one tick longer."""
 SLEW_S: Final = 1e-3
@@ -96,14 +96,14 @@ def handle_limits(
     period_s: float,
     delay_ticks: int,
     velocity: Velocity | DeviceVelocity,
-    mass_kg: float = _MEASURED_KG,
+    mass_kg: float = MEASURED_KG,
     rules: ForceRules = CURRENT,
 ) -> DampingLimits:
     """Return the limits of `damping_limits` for a handle of this mass, by the rules of a version.
 
     With "kalman" and "ewma" at 1 kHz, the inertia limits follow from the drag limits (`ForceRules`).
     """
-    lighter = min(mass_kg / _MEASURED_KG, 1.0) ** LIGHTER
+    lighter = min(mass_kg / MEASURED_KG, 1.0) ** LIGHTER
     drag_nspm, inertia_nspm = damping_limits(period_s, delay_ticks, velocity)
     if rules.most_inertia_nspm > 0.0 and abs(period_s - _NOMINAL_S) < _SAME:
         of_drag_nspm = rules.most_inertia_nspm * min(drag_nspm / rules.inertia_drag_nspm, 1.0) ** 3
@@ -121,7 +121,7 @@ def slew_limit_n(period_s: float, dynamics: Dynamics, velocity: Velocity | Devic
     A loop slower than 1 kHz has the same change per millisecond. Without a measured delay "ewma" replaces "kalman".
     """
     share = KALMAN_SLEW if isinstance(velocity, Kalman) and dynamics.delay_s is not None else 1.0
-    return share * SLEW_N * min(dynamics.mass_kg / _MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
+    return share * SLEW_N * min(dynamics.mass_kg / MEASURED_KG, 1.0) * max(period_s / SLEW_S, 1.0)
 
 
 def _rows(velocity: Velocity | DeviceVelocity, period_s: float) -> tuple[tuple[str, float | None], ...]:

@@ -3,6 +3,7 @@
 Each liquid is converted into the record that its effects read, and into the rows of the effects' arrays.
 """
 
+import math
 from collections import namedtuple
 from collections.abc import Mapping, Sequence
 from typing import Any, Final, NamedTuple, TypeAlias
@@ -13,7 +14,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamics
 from study_app.haptics.model.effect import GRAVITY_MPS2, Rows
-from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.effects import EFFECTS, current, history, local_wake, non_newtonian, wake
 from study_app.haptics.model.estimators import MOST_LAG_TICKS, DeviceVelocity
 from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
@@ -31,9 +32,11 @@ from study_app.haptics.model.scene import (
     Scene,
     Withdrawn,
 )
-from study_app.haptics.model.slope_limits import DampingLimits, handle_limits, slew_limit_n
+from study_app.haptics.model.slope_limits import MEASURED_KG, DampingLimits, handle_limits, slew_limit_n
 
 KINDS: Final[tuple[Rows, ...]] = tuple(rows for effect in EFFECTS for rows in effect.rows)
+_EXPLICIT: Final = history.BIT | current.BIT | wake.BIT | local_wake.BIT
+_ELASTIC: Final = (non_newtonian.KIND_HERSCHEL_BULKLEY, non_newtonian.KIND_MAXWELL)
 _ARRAYS: Final = tuple(name for kind in KINDS for name in kind.arrays)
 EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
 EffectRows.__doc__ = "The arrays of a model that effects own, by name."
@@ -298,6 +301,7 @@ def _fill_constants(
     parameters.count_m = dynamics.count_m
     parameters.mass_kg = dynamics.mass_kg
     parameters.smoothing_lead = rules.smoothing_lead if isinstance(scene.velocity, Kalman) else 0.0
+    parameters.known_force_ticks = rules.known_force_ticks
     parameters.link.acts = scene.link.acts
     parameters.link.delay_ticks, parameters.link.jitter_ticks = scene.link.ticks(scene.rate_hz)
     parameters.link.loss, parameters.link.seed = scene.link.loss, scene.link.seed
@@ -305,10 +309,46 @@ def _fill_constants(
     first = _no_rows()
     for record, liquid in zip(model.liquids, scene.liquids, strict=False):
         fill(record, liquid, scene, first)
+        record.known_force = _known_force(record, limits, scene, dynamics, rules)
         fits = [_inertia_fit(record, limit, scene, rules) for limit in limits]
         record.smoothing_rate, record.inertia_share = zip(*fits, strict=True)
         first = _rows_after(first, liquid, scene.rate_hz)
         parameters.effects |= record.effects
+
+
+def _known_force(
+    record: layout.Record, limits: Sequence[DampingLimits], scene: Scene, dynamics: Dynamics, rules: ForceRules
+) -> list[float]:
+    """Return ``layout.LIQUID.known_force`` of a liquid.
+
+    The inertia in the force moves with the handle, so the stable damping grows with their sum, at most to that of one
+    tick of delay. [choice] The effect "history" has no implicit form, and in a current or a wake dw/dt is not that of
+    the handle. In toothpaste, whose force follows the position, handles of 50 and 100 g oscillated, and in tar, whose
+    history exceeds its added mass, and on lighter handles the force was noisy. These are left out, and so are forces
+    that a study delays.
+    """
+    mass_kg = record.added_mass.mass_kg + record.unsteady_drag.mass_kg
+    history_kg = 2.0 * record.unsteady_drag.factor_kg_rs / math.sqrt(scene.rate_hz)
+    ratio = scene.scale * (mass_kg + history_kg) / dynamics.mass_kg
+    elastic = record.effects & non_newtonian.BIT and record.non_newtonian.kind in _ELASTIC
+    is_permitted = (
+        isinstance(scene.velocity, Kalman)
+        and not scene.link.acts
+        and abs(scene.rate_hz - 1000.0) < 1.0
+        and scene.scale <= rules.most_known_scale
+        and history_kg <= mass_kg
+        and 0.0 < ratio <= rules.most_known_inertia
+        and dynamics.mass_kg >= MEASURED_KG
+        and not elastic
+        and not record.effects & _EXPLICIT
+    )
+    most_nspm = limits[1].drag_nspm
+    return [
+        max(min(1.0 + ratio, most_nspm / limit.drag_nspm), 1.0)
+        if is_permitted and ticks >= rules.known_force_ticks
+        else 0.0
+        for ticks, limit in enumerate(limits)
+    ]
 
 
 def _inertia_fit(record: layout.Record, limits: DampingLimits, scene: Scene, rules: ForceRules) -> tuple[float, float]:

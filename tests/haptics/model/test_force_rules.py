@@ -20,6 +20,9 @@ RELEASED = {
     "gap_ticks": math.inf,
     "quiet_s": math.inf,
     "history_rs": 1.0,
+    "known_force_ticks": 99,
+    "most_known_inertia": 7.0,
+    "most_known_scale": 3.0,
 }
 
 

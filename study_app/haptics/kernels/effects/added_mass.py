@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
+from study_app.haptics.kernels.known_force import STORAGE, solve_inertia
 from study_app.haptics.kernels.vector import clear, copy, square
 from study_app.haptics.model.estimators import KALMAN
 from study_app.haptics.model.layout import Record
@@ -39,6 +40,31 @@ def added_mass_force(
         state.force_n[axis] += force_n[axis]
     square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, rate_per_s)
     state.returnable_j += 0.5 * liquid.inertia_share[delay_ticks] * mass.mass_kg * local.share * square_m2ps2
+
+
+@part
+def implicit_added_mass_force(
+    parameters: Record, liquid: Record, local: Record, state: Record, delay_ticks: int
+) -> None:
+    """Add the same force, with dw/dt of the known force (`known_force.solve_inertia`)."""
+    mass, tracks = liquid.added_mass, local.added_mass
+    force_n = local.inertia_n[local.inertial]
+    local.inertial += 1
+    inertia_kg = mass.mass_kg * local.share
+    solve_inertia(parameters, state.kalman, state.force_n, inertia_kg, delay_ticks, tracks.acceleration_mps2)
+    follow_acceleration(tracks.smoothed_mps2, tracks.acceleration_mps2)
+    copy(local.relative_mps, tracks.previous_mps)
+    for axis in range(3):
+        force_n[axis] = -inertia_kg * tracks.acceleration_mps2[axis]
+        state.force_n[axis] += force_n[axis]
+    state.returnable_j += 0.5 * STORAGE * local.inertia_share * inertia_kg * square(local.motion_mps)
+
+
+@part
+def follow_acceleration(smoothed_mps2: Any, acceleration_mps2: Any) -> None:
+    """Let smoothed accelerations continue from this one if the filter has a fault."""
+    copy(acceleration_mps2, smoothed_mps2[0])
+    copy(acceleration_mps2, smoothed_mps2[1])
 
 
 @part

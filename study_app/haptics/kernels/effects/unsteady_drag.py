@@ -23,7 +23,8 @@ import math
 from typing import Any
 
 from study_app.haptics.kernels.compiled import part
-from study_app.haptics.kernels.effects.added_mass import accelerate, storing_square
+from study_app.haptics.kernels.effects.added_mass import accelerate, follow_acceleration, storing_square
+from study_app.haptics.kernels.known_force import STORAGE, solve_inertia
 from study_app.haptics.kernels.vector import clear, copy, dot, norm, square
 from study_app.haptics.model import laws
 from study_app.haptics.model.effects.unsteady_drag import EXPONENTIALS, LATE_SHARE
@@ -37,6 +38,7 @@ OVERTAKING = 2.96  # β
 OVERTAKING_REYNOLDS = 11.0  # R₀
 RATES_PER_S = (0.0212334, 0.257773, 1.39978, 7.11516, 36.0112, 182.242, 927.902)  # k_i
 WEIGHTS_RPS = (0.33973, 0.52101, 1.09144, 2.44114, 5.48942, 12.3529, 28.26937)  # b_i [1/√s]
+_SLOW = 4  # number of exponentials driven by the velocity itself
 _SHORT = 4.0  # `_mean` needs no exp up to this value
 _NOTHING = 1e-30
 
@@ -45,7 +47,13 @@ _over_stokes = part(laws.finite_reynolds)
 
 @part
 def unsteady_drag_force(
-    parameters: Record, liquid: Record, local: Record, state: Record, delay_ticks: int, interval_s: float
+    parameters: Record,
+    liquid: Record,
+    local: Record,
+    state: Record,
+    delay_ticks: int,
+    interval_s: float,
+    knows_force: bool,
 ) -> None:
     """Add F to the force, (3,) [N]; dw/dt is smoothed, as for the effects "added_mass" and "history".
 
@@ -59,32 +67,77 @@ def unsteady_drag_force(
     law, tracks, w = liquid.unsteady_drag, local.unsteady_drag, local.relative_mps
     if local.ticks == 0:
         _reset_tracks(law, tracks, w)
-    lead, rate = parameters.smoothing_lead, liquid.smoothing_rate[delay_ticks]
-    of_mass_per_s, of_history_per_s = rate * law.filter_per_s, rate * law.history_filter_per_s
-    previous_mps, once_and_twice = tracks.previous_mps, tracks.history_smoothed_mps2
-    accelerate(tracks.acceleration_mps2, tracks.smoothed_mps2, w, previous_mps, of_mass_per_s, lead, interval_s)
-    accelerate(tracks.remembered_mps2, once_and_twice, w, previous_mps, of_history_per_s, lead, interval_s)
-    copy(w, tracks.previous_mps)
     wake2 = square(tracks.wake_mps)
     u_mps = math.sqrt(square(w) + wake2)
+    if not knows_force:
+        _smooth_accelerations(parameters, liquid, tracks, w, delay_ticks, interval_s)
     _update_wakes(law, tracks, w, u_mps, wake2, interval_s)
+    for axis in range(3):
+        local.damping_n[axis] = -law.stokes_nspm * w[axis] * local.frontal
+        local.late_n[axis] = -law.stokes_nspm * tracks.excess_mps[axis] * local.frontal
     force_n = local.inertia_n[local.inertial]
     local.inertial += 1
-    _update_memory(law, tracks, u_mps, interval_s, force_n)
-    for axis in range(3):
-        inertial = law.factor_kg_rs * force_n[axis] + law.mass_kg * tracks.acceleration_mps2[axis]
-        force_n[axis] = -local.share * inertial
-        stokes_n = -law.stokes_nspm * w[axis] * local.frontal
-        local.damping_n[axis] += stokes_n
-        local.late_n[axis] = -law.stokes_nspm * tracks.excess_mps[axis] * local.frontal
-        state.force_n[axis] += stokes_n + local.late_n[axis] + force_n[axis]
+    if knows_force:
+        _add_implicit_inertia(parameters, law, local, state, u_mps, delay_ticks, interval_s, force_n)
+    else:
+        _update_memory(law, tracks, u_mps, interval_s, force_n)
+        for axis in range(3):
+            inertial = law.factor_kg_rs * force_n[axis] + law.mass_kg * tracks.acceleration_mps2[axis]
+            force_n[axis] = -local.share * inertial
+            state.force_n[axis] += local.damping_n[axis] + local.late_n[axis] + force_n[axis]
+    copy(w, tracks.previous_mps)
     local.late_mps = LATE_SHARE * u_mps
     local.prompt_nspm = law.stokes_nspm * local.frontal
     state.growth = max(state.growth, GROWS_AS_SPEED)
     of_history_kg = 0.5 * law.factor_kg_rs * parameters.rules.history_rs
-    inertia_kg = (law.mass_kg + of_history_kg) * local.share
-    square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, of_mass_per_s)
-    state.returnable_j += 0.5 * liquid.inertia_share[delay_ticks] * inertia_kg * square_m2ps2
+    stored_kg = (law.mass_kg + of_history_kg) * local.share
+    if knows_force:
+        state.returnable_j += 0.5 * STORAGE * local.inertia_share * stored_kg * square(local.motion_mps)
+        return
+    rate_per_s = liquid.smoothing_rate[delay_ticks] * law.filter_per_s
+    square_m2ps2 = storing_square(parameters, local, tracks.smoothed_mps2, rate_per_s)
+    state.returnable_j += 0.5 * liquid.inertia_share[delay_ticks] * stored_kg * square_m2ps2
+
+
+@part
+def _add_implicit_inertia(
+    parameters: Record,
+    law: Any,
+    local: Record,
+    state: Record,
+    u_mps: float,
+    delay_ticks: int,
+    interval_s: float,
+    force_n: Any,
+) -> None:
+    """Add drag and inertial forces with dw/dt of the known force; set ``force_n`` (3,) [N] to the inertial ones."""
+    tracks, factor = local.unsteady_drag, local.share * law.factor_kg_rs
+    _remember_velocity(law, tracks, local.relative_mps, u_mps, interval_s, tracks.remembered_mps2)
+    for axis in range(3):
+        force_n[axis] = -factor * tracks.remembered_mps2[axis]
+        state.force_n[axis] += local.damping_n[axis] + local.late_n[axis] + force_n[axis]
+    inertia_kg = local.share * law.mass_kg + factor * _young_weight(law, u_mps, interval_s)
+    solve_inertia(parameters, state.kalman, state.force_n, inertia_kg, delay_ticks, tracks.acceleration_mps2)
+    for axis in range(3):
+        young_n = -inertia_kg * tracks.acceleration_mps2[axis]
+        force_n[axis] += young_n
+        state.force_n[axis] += young_n
+    _remember_acceleration(law, tracks, u_mps, interval_s)
+    follow_acceleration(tracks.smoothed_mps2, tracks.acceleration_mps2)
+    follow_acceleration(tracks.history_smoothed_mps2, tracks.acceleration_mps2)
+
+
+@part
+def _smooth_accelerations(
+    parameters: Record, liquid: Record, tracks: Record, w: Any, delay_ticks: int, interval_s: float
+) -> None:
+    """Smooth dw/dt for the added mass and for the history."""
+    law, previous_mps = liquid.unsteady_drag, tracks.previous_mps
+    lead, rate = parameters.smoothing_lead, liquid.smoothing_rate[delay_ticks]
+    of_mass_per_s, of_history_per_s = rate * law.filter_per_s, rate * law.history_filter_per_s
+    once_and_twice = tracks.history_smoothed_mps2
+    accelerate(tracks.acceleration_mps2, tracks.smoothed_mps2, w, previous_mps, of_mass_per_s, lead, interval_s)
+    accelerate(tracks.remembered_mps2, once_and_twice, w, previous_mps, of_history_per_s, lead, interval_s)
 
 
 @part
@@ -150,6 +203,46 @@ def _update_memory(law: Any, tracks: Record, u_mps: float, interval_s: float, hi
     history[0] = hx + lacking * acceleration[0]
     history[1] = hy + lacking * acceleration[1]
     history[2] = hz + lacking * acceleration[2]
+
+
+@part
+def _remember_velocity(law: Any, tracks: Record, w: Any, u_mps: float, interval_s: float, history: Any) -> None:
+    """Let the exponentials decay and add Δw to the slow ones; set ``history`` to Σ b_i m_i [m/s/√s].
+
+    The slow ones integrate over so long that they need no smoothing, which would distort them.
+    """
+    loss_per_s = MEMORY_LOSS * u_mps * law.per_m
+    clear(history)
+    for i in range(EXPONENTIALS):
+        x = (RATES_PER_S[i] + loss_per_s) * interval_s
+        mean = _mean(x)
+        for axis in range(3):
+            memory_mps = (1.0 - x * mean) * tracks.memory_mps[i, axis]
+            if i < _SLOW:
+                memory_mps += mean * (w[axis] - tracks.previous_mps[axis])
+            memory_mps = _cleared(memory_mps)
+            tracks.memory_mps[i, axis] = memory_mps
+            history[axis] += WEIGHTS_RPS[i] * memory_mps
+
+
+@part
+def _young_weight(law: Any, u_mps: float, interval_s: float) -> float:
+    """Return the weight of the newest dw/dt in the history beside that of the slow exponentials [√s]."""
+    loss_per_s = MEMORY_LOSS * u_mps * law.per_m
+    weight_rs = 2.0 * math.sqrt(interval_s)
+    for i in range(_SLOW):
+        weight_rs -= WEIGHTS_RPS[i] * interval_s * _mean((RATES_PER_S[i] + loss_per_s) * interval_s)
+    return weight_rs
+
+
+@part
+def _remember_acceleration(law: Any, tracks: Record, u_mps: float, interval_s: float) -> None:
+    """Add the newest dw/dt to the fast exponentials."""
+    loss_per_s = MEMORY_LOSS * u_mps * law.per_m
+    for i in range(_SLOW, EXPONENTIALS):
+        gained_s = interval_s * _mean((RATES_PER_S[i] + loss_per_s) * interval_s)
+        for axis in range(3):
+            tracks.memory_mps[i, axis] += gained_s * tracks.acceleration_mps2[axis]
 
 
 @part
