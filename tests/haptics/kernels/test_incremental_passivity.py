@@ -14,7 +14,7 @@ from study_app.haptics.kernels.passivity import (
     reduce_gain,
     reset_observer,
 )
-from study_app.haptics.model.layout import LIMITER_ENERGY, PARAMETERS, PASSIVITY, SAMPLE, records
+from study_app.haptics.model.layout import LIMITER_ENERGY, PARAMETERS, PASSIVITY, SAMPLE, STATE, records
 from tests.haptics.scenes import HONEY, Hand
 
 
@@ -61,14 +61,15 @@ def test_a_swing_is_owed_for_although_the_motion_pays_more():
 
 
 def test_a_debt_beyond_the_allowance_lowers_the_gain():
-    parameters, passivity, sample = records(PARAMETERS, 1)[0], records(PASSIVITY, 1)[0], records(SAMPLE, 1)[0]
+    parameters, state = records(PARAMETERS, 1)[0], records(STATE, 1)[0]
+    passivity, sample = records(PASSIVITY, 1)[0], records(SAMPLE, 1)[0]
     reset_observer(passivity)
     sample.device_force_n[0] = 4.0
     passivity.fast.balance_j = -INCREMENTAL_ALLOWANCE_J
-    reduce_gain(parameters, passivity, sample)
+    reduce_gain(parameters, state, passivity, sample)
     assert (sample.device_force_n[0], sample.limiters) == (4.0, 0)
     passivity.fast.balance_j = -INCREMENTAL_ALLOWANCE_J - HALVING_J
-    reduce_gain(parameters, passivity, sample)
+    reduce_gain(parameters, state, passivity, sample)
     assert sample.device_force_n[0] == pytest.approx(2.0)
     assert sample.limiters == LIMITER_ENERGY
 
