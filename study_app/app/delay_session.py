@@ -57,7 +57,7 @@ _OPERATOR_PX: Final = (1600, 900)
 LEAST_S, MOST_S = 0.5, 600.0
 
 _STUDY: Final = """
-format = 1
+format = 2
 sequence = ["delays"]
 
 [study]

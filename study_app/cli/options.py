@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 EXIT_USER_ERROR = 2
 EXIT_FOUND = 3
 GROUPS: Final = {
-    "Study": "demo new edit check language design power preregister run resume rehearse studies sessions workspace",
+    "Study": "demo new edit check upgrade language design power preregister run resume rehearse studies sessions "
+    "workspace",
     "Data": "export plot report unblind exclude include withdraw merge verify proof rebuild reproduce replay",
     "Model": "scene simulate identify figures",
     "Evidence": "accuracy stability timing soak cfd validate validate-report delay-thresholds",
@@ -33,6 +34,7 @@ _SAMPLES: Final = {
     "name": "falcon",
     "NAME=RESULTS...": "Delft=results/rek2024 Utrecht=utrecht/rek2024",
     "DIR": "lab",
+    "PATH": "protocols",
     "--participant": "P007",
     "--participants": "12",
     "--by": "AK",

@@ -32,7 +32,7 @@ def kinds_markdown() -> str:
         ("Standard questionnaires", ("`instrument`", "texts", "scores", "source and comparison"), _instrument_rows()),
         ("Designs", ("`kind`", "question or answer"), _kind_descriptions(designs.KINDS)),
         ("Methods", ("`kind`", "next level"), _kind_descriptions(methods.KINDS)),
-        ("Effects", ("effect", "what it is", "format", "`auto`", "not with"), _effect_rows()),
+        ("Effects", ("effect", "what it is", "`auto`", "not with"), _effect_rows()),
         ("Limiters", ("bit", "limiter", "column", "what it says"), _limiter_rows()),
         ("Trigger codes", ("code", "event of the journal"), ((str(code), f"`{name}`") for name, code in CODES.items())),
         ("Devices", ("`--device`", "device", "kind", "options"), _device_rows()),
@@ -103,7 +103,7 @@ def _effect_rows() -> Iterator[tuple[str, ...]]:
     for effect in EFFECTS:
         description = sys.modules[effect.bound_n.__module__].__doc__ or ""
         excluded = ", ".join(f"`{name}`" for name in effect.excludes)
-        yield f"`{effect.name}`", description, str(effect.format), "yes" if effect.automatic else "no", excluded
+        yield f"`{effect.name}`", description, "yes" if effect.automatic else "no", excluded
 
 
 def _limiter_rows() -> Iterator[tuple[str, ...]]:

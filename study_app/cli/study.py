@@ -14,6 +14,7 @@ from study_app.cli.options import (
     DeviceName,
     TakesDeviceOptions,
     Target,
+    echo_files,
     keep_offered_workspace,
     study_at,
     takes_session,
@@ -85,6 +86,21 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
             click.echo(f"\nNote: {sentence}, predicted for a delay of {counted(delay_ticks, 'tick')}.")
         if missing:
             click.echo(f"\nNote: {missing}. Sessions of this study cannot start on this computer.")
+
+
+@click.command()
+@click.argument("path", metavar="PATH", type=click.Path(path_type=Path, exists=True))
+def upgrade(path: Path) -> None:
+    """Rewrite a study or liquid file of an earlier format, or all files in a folder, in the current format.
+
+    Forces and order of trials stay the same. The original is kept next to the file, as NAME.toml.format-1.
+    """
+    from study_app.store.upgrade import upgrade as upgrade_files
+
+    files = upgrade_files(path)
+    echo_files(files)
+    if not files:
+        click.echo(f"{path}: nothing to upgrade")
 
 
 @click.command()

@@ -60,7 +60,6 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted, duration
 from study_app.protocol.checks.cross_references import OWN
-from study_app.protocol.formats import TABLES, is_format_2
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import languages_of
@@ -218,10 +217,7 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
     document = study.document
     around = selected[:2] if len(selected) > 1 else ()
     lists = [row.path for row in rows(document, around) if row.kind == "list"] if around else []
-    second = is_format_2(document)
-    sections = [
-        row.path for row in rows(document, ()) if row.kind == "tables" and (second or row.path[0] not in TABLES)
-    ]
+    sections = [row.path for row in rows(document, ()) if row.kind == "tables"]
     sections.sort(key=lambda path: path[:1] != selected[:1])
     entries = [_addable_entry(study, path) for path in lists]
     entries += [
@@ -234,8 +230,7 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
         for path in sections
     ]
     entries += _addable_questions(study, around) if not any(path[0] == _QUESTIONNAIRES for path in lists) else ()
-    entries += (*_addable_liquids(study), *_addable_instruments()) if second else ()
-    return tuple(entries)
+    return (*entries, *_addable_liquids(study), *_addable_instruments())
 
 
 def _addable_liquids(study: Study) -> tuple[Addable, ...]:
@@ -280,7 +275,7 @@ def _addable_instruments() -> tuple[Addable, ...]:
 
 def _addable_entry(study: Study, path: Path) -> Addable:
     """Return the entry that adds to a list; a search finds it by each of its kinds."""
-    known = distinguishing_key(node_at(study.document, (*path, 0)))[1] if is_format_2(study.document) else ()
+    known = distinguishing_key(node_at(study.document, (*path, 0)))[1]
     kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
     to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
     return Addable(

@@ -6,5 +6,5 @@ stimuli and methods.
 
 Reading order: source, streams, table; groups, questions, raters, sequences, wording; blocks, questionnaires; trials;
 model; formats, quantities, tracks, without_force; json_schema, orders, scene_file; differences, presented; checks,
-simulated; load; warnings; describe.
+simulated; load; upgrade, warnings; describe.
 """

@@ -22,7 +22,7 @@ _LIQUID_FILE = "Path of a liquid file with one liquid, relative to this file; it
 
 _LINEAR_DRAG: Final = {"properties": {"law": {"const": "linear"}}, "required": ["law"]}
 _NEED_NO_DENSITY: Final = [{"required": ["file"]}, {"properties": {"drag": _LINEAR_DRAG}, "required": ["drag"]}]
-"""Liquids without a density: those of a file, and in format 2 dampers."""
+"""Liquids without a density: those of a file, and dampers."""
 
 
 class _Generator(GenerateJsonSchema):

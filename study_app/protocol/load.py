@@ -11,10 +11,10 @@ from pydantic import BaseModel, Field, ValidationError
 from study_app.errors import Problem, ProtocolError
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.scene import Liquid, RateHz, Scene, Withdrawn
-from study_app.protocol import formats
 from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import check_designs
 from study_app.protocol.checks.force_limits import check_paced, check_returned_energy
+from study_app.protocol.formats import format_fault, with_omitted_keys, with_scene_defaults
 from study_app.protocol.json_schema import schema
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
 from study_app.protocol.questionnaires import with_instruments
@@ -66,7 +66,7 @@ class _SceneTable(SceneDefaults):
 class SceneFile(Table):
     """A file of liquids without a study."""
 
-    format: Format = 1
+    format: Format
     scene: _SceneTable = _SceneTable()
     liquids: Named[Liquid] = Field(min_length=1)
 
@@ -106,17 +106,16 @@ def validate_document(
     """
     document, faults = _with_liquids_of_files(document)
     document, missing = _with_footage(document)
-    document, newer = formats.upgrade(document)
-    document, unfilled = (document, []) if newer else with_instruments(document)
+    if fault := format_fault(document):
+        return None, [fault]
+    document, unfilled = with_instruments(with_omitted_keys(document))
     faults += missing + unfilled
-    broken = [*(fault.path[:2] for fault in faults), *(fault.path for fault in newer)]
-    faults += newer
+    broken = [fault.path[:2] for fault in faults]
     protocol, wrong = _validate(Protocol, document)
     faults += _faults_outside(broken, wrong)
-    if not formats.is_unknown_format(document):
-        questionnaires = [path for path in broken if path[0] == "questionnaires"]
-        sound = None if faults else protocol
-        faults += _faults_outside(questionnaires, check(document, [fault.path for fault in faults], sound))
+    questionnaires = [path for path in broken if path[0] == "questionnaires"]
+    sound = None if faults else protocol
+    faults += _faults_outside(questionnaires, check(document, [fault.path for fault in faults], sound))
     if protocol is None or faults:
         return None, faults
     if faults := list(dict.fromkeys(check_designs(protocol))):
@@ -152,20 +151,15 @@ def load_scenes(name_or_path: str | File) -> dict[str, Scene]:
         protocol = parse(source, name)
         return {liquid: protocol.scene_of(liquid) for liquid in protocol.liquids}
     file = SceneFile.model_validate(_completed_scene(document, name, places), strict=True)
-    return {
-        name: Scene(**dict(file.scene), liquids=(liquid,), format=file.format) for name, liquid in file.liquids.items()
-    }
+    return {name: Scene(**dict(file.scene), liquids=(liquid,)) for name, liquid in file.liquids.items()}
 
 
 def _completed_scene(document: dict[str, Any], name: str, places: Places) -> dict[str, Any]:
     """Return the completed document of a scene file; raise ProtocolError if it is invalid."""
-    faults: list[Fault] = []
-    if formats.is_format_2(document):
-        document = formats.with_scene_defaults(document)
-    elif not formats.is_unknown_format(document):
-        faults = [fault for fault in formats.newer_keys(document) if fault.path[0] in SceneFile.model_fields]
-    _, wrong = _validate(SceneFile, document)
-    _raise_faults(name, faults + _faults_outside([fault.path for fault in faults], wrong), places)
+    if fault := format_fault({"format": 1, **document}):
+        _raise_faults(name, [fault], places)
+    document = with_scene_defaults(document)
+    _raise_faults(name, _validate(SceneFile, document)[1], places)
     return document
 
 
@@ -282,9 +276,6 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
 
 def _validate(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
     """Return the validated document, None if it is invalid, and the faults found by its models."""
-    if formats.is_unknown_format(document):
-        known = f"this program reads formats 1 to {formats.LATEST}"
-        return None, [Fault(("format",), f"is {document['format']}, {known}", "use a newer version of liquid-study")]
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
     faults = [Fault(path, "unknown key", "the name of the table is its ID") for path in named]
     try:

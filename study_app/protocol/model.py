@@ -60,13 +60,17 @@ HandForceN: TypeAlias = Annotated[
 ]
 
 
+FORMAT: Final = 2
+"""The format of study and scene files; `store.upgrade` rewrites files of earlier formats."""
+
+
 def _check_format_number(value: Any) -> Any:
     if type(value) is not int:
-        raise invalid("must be 1 or 2, the number of this format", use=("format", 1))
+        raise invalid(f"must be {FORMAT}, the number of this format", use=("format", FORMAT))
     return value
 
 
-Format: TypeAlias = Annotated[Literal[1, 2], BeforeValidator(_check_format_number)]
+Format: TypeAlias = Annotated[Literal[2], BeforeValidator(_check_format_number)]
 
 
 class Credits(Table):
@@ -237,14 +241,13 @@ class StudyLiquid(Liquid):
         )
 
 
-def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid], form: Literal[1, 2]) -> Scene:
-    """Return a scene with these liquids, in a file's format; they share one ball (`consistency.check_liquids`)."""
+def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[StudyLiquid]) -> Scene:
+    """Return a scene with these liquids; they share one ball (`consistency.check_liquids`)."""
     return Scene(
         **dict(scene) | {"body": liquids[0].body_in(scene)},
         rate_hz=device.rate_hz,
         liquids=tuple(liquid.alone for liquid in liquids),
         force_limit_n=device.force_limit_n,
-        format=form,
     )
 
 
@@ -705,7 +708,7 @@ class Protocol(Table):
 
     def scene_of(self, *liquid_ids: str) -> Scene:
         """Return a scene with some of the liquids, including unused ones."""
-        return scene_with(self.scene, self.device, [self.liquids[name] for name in liquid_ids], self.format)
+        return scene_with(self.scene, self.device, [self.liquids[name] for name in liquid_ids])
 
     def delay_s(self, condition_id: str) -> float:
         """Return the visual delay of a condition [s]."""

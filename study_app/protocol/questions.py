@@ -36,11 +36,7 @@ class Scale(Table):
     """The points of an answer, lowest first: seven for statements, 2 to 11 for other ratings."""
 
     labels: dict[str, Annotated[tuple[Printable, ...], Field(min_length=FEWEST_POINTS, max_length=MOST_POINTS)]] = (
-        Field(
-            description=(
-                "For each language the labels of the points, lowest first: 7 in format 1, 2 to 11 in format 2."
-            )
-        )
+        Field(description=("For each language the labels of the points, lowest first: 2 to 11."))
     )
     cannot_judge: Localised | None = Field(default=None, description="Label of an answer off the scale; default: none.")
 

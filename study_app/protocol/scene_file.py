@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.scene import FADE_S, Ewma, Given, Kalman, Liquid, Scene
-from study_app.protocol.formats import format_of_scene
+from study_app.protocol.model import FORMAT
 
 _Place: TypeAlias = tuple[str, ...]
 
@@ -23,8 +23,8 @@ def scene_text(scene: Scene, *, said: Sequence[str] = (), notes: Mapping[_Place,
     ``("liquids", "water", "density_kg_m3")``.
     """
     comments = [f"# {line}" for it in said for line in textwrap.wrap(it, _COMMENT_LETTERS)]
-    head = [*comments, *([""] if comments else []), f"format = {format_of_scene(scene)}"]
-    left_out = {"format", "liquids", "link"} | ({"velocity"} if isinstance(scene.velocity, Given) else set())
+    head = [*comments, *([""] if comments else []), f"format = {FORMAT}"]
+    left_out = {"liquids", "link"} | ({"velocity"} if isinstance(scene.velocity, Given) else set())
     left_out |= {"fade_s"} if scene.fade_s == FADE_S else set()
     of_scene = scene.model_dump(exclude_none=True, exclude=left_out)
     lines = [*head, *_table_lines(("scene",), of_scene, notes or {})]

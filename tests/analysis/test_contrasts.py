@@ -315,7 +315,7 @@ def test_power_tells_the_smallest_interaction() -> None:
     half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
     assert "the difference in threshold between late and prompt differs between a and b" in told
     assert f"| 20 | 18 | {spread:.0%} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
-    text, _, rest = source_bytes("rek2024").decode().replace("format = 1", "format = 2").partition("sequence = ")
+    text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
     sequence, _, rest = rest.partition("]")
     alone = grouped(text + rest, "different", "delays", f"{sequence}]")
     assert alone.analysis is not None
@@ -367,7 +367,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
     root = spread * math.sqrt(1 / 12 + 1 / 6)
     assert half == pytest.approx(math.exp(student.ppf(0.975, 5) * root))
     assert f"| 20 | 18 | {spread:.0%} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
-    text, _, rest = source_bytes("rek2024").decode().replace("format = 1", "format = 2").partition("sequence = ")
+    text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
     sequence, _, rest = rest.partition("]")
     protocol = grouped(text + rest, "different", "delays", f"{sequence}]")
     planned = plan(protocol, felt_in(protocol))
@@ -446,7 +446,7 @@ def test_power_plans_differences_and_equality_within_people(
 
 
 def test_power_counts_studies_of_statements_that_show_equality() -> None:
-    text = source_bytes("rek2024").decode().replace("format = 1", "format = 2")
+    text = source_bytes("rek2024").decode()
     contrast = (
         'contrasts = [{ measure = "different", blocks = ["delays"], conditions = ["delay_50", "delay_0"], bound = 1 }]'
     )

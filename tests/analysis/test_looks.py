@@ -33,7 +33,6 @@ CONTRAST = '{ measure = "different", blocks = ["delays"], conditions = ["delay_1
 LOOKED = (
     source_bytes("rek2024")
     .decode()
-    .replace("format = 1", "format = 2")
     .replace("[analysis]\n", f"[analysis]\nparticipants = 12\nlooks = [6, 12]\ncontrasts = [{CONTRAST}]\n")
 )
 

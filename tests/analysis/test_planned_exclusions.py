@@ -128,7 +128,7 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
 
 def study_with(tmp_path: Path, rules: str, name: str = "demo") -> Path:
     path = tmp_path / f"{name}.toml"
-    text = shipped_file(name).read_text("utf-8").replace("format = 1", "format = 2")
+    text = shipped_file(name).read_text("utf-8")
     path.write_text(f"{text}\n{rules}", encoding="utf-8", newline="\n")
     return path
 

@@ -47,7 +47,7 @@ def test_new_begins_a_study_in_the_designer_and_writes_nothing(visit: Visit, tmp
 
 def test_edit_opens_a_study_by_name_or_file(visit: Visit, tmp_path: Path) -> None:
     file = tmp_path / "other.toml"
-    file.write_text("format = 1\n", encoding="utf-8", newline="\n")
+    file.write_text("format = 2\n", encoding="utf-8", newline="\n")
     for words in ("demo", str(file)):
         assert CliRunner().invoke(commands, ["edit", words]).exit_code == 0
     assert visit.asked == [("open", "demo"), ("open", str(file))]

@@ -34,9 +34,9 @@ LABS = ("sites", "withdrawals")
 LONG = {"x5000": "x" * 5000, "9999": "9" * 6000}
 """Words that stand for long ones."""
 FILES = {
-    "bad.toml": "format = 1\n[study]\nname = 3\n",
-    "liquids.toml": "format = 1\n[liquids.tar]\ndensity_kg_m3 = 1153\n",
-    "half.toml": 'format = 1\n[liquids.tar]\ndensity_kg_m3 = 1153\n[study]\nname = "half"\n',
+    "bad.toml": "format = 2\n[study]\nname = 3\n",
+    "liquids.toml": "format = 2\n[liquids.tar]\ndensity_kg_m3 = 1153\n",
+    "half.toml": 'format = 2\n[liquids.tar]\ndensity_kg_m3 = 1153\n[study]\nname = "half"\n',
     "motion.csv": "t_s,x_m,y_m,z_m\n" + "".join(f"{k / 1000},{k / 5000},0,{k * k / 1e6}\n" for k in range(50)),
     "far.csv": "t_s,x_m,y_m,z_m\n0,0,0,0\n0.001,1e308,0,0\n0.002,-1e308,0,0\n",
     "fast.csv": "t_s,x_m,y_m,z_m,vx_mps,vy_mps,vz_mps\n0,0,0,0,0,0,0\n0.001,0,0,0,1e308,1e308,0\n",

@@ -41,7 +41,6 @@ REPETITIONS = ("blocks", "liquids", "repetitions")
 VERSION, TITLE = ("study", "version"), ("pages", "welcome", "title")
 ITEMS = ("questionnaires", "liquid", "items")
 LISTED = ("blocks", "liquids", "conditions")
-FORMAT_2 = DEMO.replace("format = 1", "format = 2", 1)
 NONE, LEFT = Qt.KeyboardModifier.NoModifier, Qt.MouseButton.LeftButton
 
 
@@ -65,7 +64,7 @@ def drafts(story: Story) -> None:
     story.expect("This study ships with the program. Make a copy to change it.", undo="", kept="saved")
     shipped = designer.text
     story.ask(SetValue(VERSION, "9"))
-    story.ask(RetypeFile("format = 1\n"))
+    story.ask(RetypeFile("format = 2\n"))
     story.play("ctrl+s")
     assert designer.text == shipped
     act("open", designer.open)
@@ -179,7 +178,7 @@ def others(story: Story) -> None:
     story.play("[Keep mine] ctrl+s")
     story.expect(kept="saved")
     other = designer.file.with_name("other.toml")
-    other.write_bytes(b"format = 1\n# \xff\n")
+    other.write_bytes(b"format = 2\n# \xff\n")
     story.act("open a file that is no text", lambda: designer.open(str(other)))
     story.expect("other.toml cannot be opened: line 2 is not UTF-8 text: save the file as UTF-8.")
     assert designer.editing.opened.file == designer.file
@@ -831,7 +830,7 @@ def hypotheses(story: Story) -> None:
     """A hypothesis is a sentence with choices; a bound that is not a number is refused."""
     designer, contrasts = story.designer, ("analysis", "contrasts")
     line = lambda: designer.field(*contrasts).lines[0]  # noqa: E731
-    story.ask(RetypeFile(FORMAT_2.replace("[limits]", "[analysis]\nparticipants = 11\n\n[limits]")))
+    story.ask(RetypeFile(DEMO.replace("[limits]", "[analysis]\nparticipants = 11\n\n[limits]")))
     for words in ("counterbalance", "block order"):
         story.play(f"ctrl+f '{words}' Return")
         story.expect(selected="sequence", at="Fixed")
@@ -861,7 +860,7 @@ def hypotheses(story: Story) -> None:
     story.expect(undo="Remove Hypotheses")
     assert not designer.value(*contrasts)
     thin = 'measure = "like_honey", blocks = ["liquids"], conditions = ["thin", "thick"], expected = "higher"'
-    written = FORMAT_2.replace("[limits]", f"[analysis]\ncontrasts = [{{ {thin} }}]\n\n[limits]")
+    written = DEMO.replace("[limits]", f"[analysis]\ncontrasts = [{{ {thin} }}]\n\n[limits]")
     fewer = written.replace('["thin", "thick"]\n', '["thin"]\n').replace('["prompt", "late"]', '["prompt"]')
     for text, box, words in (
         (fewer, "relation", "is lower than"),
@@ -874,7 +873,7 @@ def hypotheses(story: Story) -> None:
         stated("like_honey", "thin thick" if is_lower else "late prompt", expected="lower" if is_lower else "higher")
     own = 'sequence = ["welcome", "liquids", "reaching", "delays", "thanks"]\n'
     groups = f"[groups.a]\n{own}[groups.b]\n{own}[limits]"
-    story.ask(RetypeFile(FORMAT_2.replace(own, "", 1).replace("[limits]", groups)))
+    story.ask(RetypeFile(DEMO.replace(own, "", 1).replace("[limits]", groups)))
     story.play("ctrl+f 'order of blocks' Return")
     story.expect(selected="blocks.liquids")
     story.press("Add a hypothesis")
@@ -891,11 +890,11 @@ def hypotheses(story: Story) -> None:
         ('phase = "main" ', "phase = {} "),
         ('sequence = ["w', 'sequence = 5 # ["w'),
     ):
-        story.ask(RetypeFile(FORMAT_2.replace(before, after, 1)))
+        story.ask(RetypeFile(DEMO.replace(before, after, 1)))
         story.play("@blocks.liquids @blocks.delays")
         assert designer.study.faults
     for written in ("3", "[3]", "[{ blocks = 4, measure = 5, expected = 6, bound = 'x' }]"):
-        story.ask(RetypeFile(FORMAT_2.replace("[limits]", f"[analysis]\ncontrasts = {written}\n\n[limits]")))
+        story.ask(RetypeFile(DEMO.replace("[limits]", f"[analysis]\ncontrasts = {written}\n\n[limits]")))
         story.play("@sequence")
         assert designer.study.faults
 
@@ -940,7 +939,7 @@ STORIES: tuple[tuple[Callable[[Story], None], str], ...] = (
     *((tell, DEMO) for tell in (drafts, banner, never_saved, others, failing, versions, incomplete, names)),
     *((tell, DEMO) for tell in (one_instead, questions, adaptive, header, keys_without_a_field, typed_into_the_file)),
     *((tell, DEMO) for tell in (repairs, warnings, tab_key, entries, menu, new_study, two_conditions)),
-    *((tell, FORMAT_2) for tell in (fields, asked_when, hypotheses)),
+    *((tell, DEMO) for tell in (fields, asked_when, hypotheses)),
     (unreadable, BROKEN),
 )
 

@@ -49,9 +49,8 @@ def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_pat
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     liquid = shipped_file("demo").read_text("utf-8").split("[liquids.thick]")[1].split("\n\n")[0]
-    (elsewhere / "syrup.toml").write_text(f"[liquids.syrup]{liquid}\n", encoding="utf-8", newline="\n")
+    (elsewhere / "syrup.toml").write_text(f"format = 2\n[liquids.syrup]{liquid}\n", encoding="utf-8", newline="\n")
     text = designer.file.read_text("utf-8").replace(f"[liquids.thick]{liquid}", '[liquids.thick]\nfile = "syrup.toml"')
-    text = text.replace("format = 1", "format = 2", 1)
     for name in ("thin", "thick"):
         text = text.replace(f"[conditions.{name}]\n", f'[conditions.{name}]\nview = "sea/waves.mp4"\n')
     (elsewhere / "sea").mkdir()

@@ -150,9 +150,9 @@ def test_recent_protocols_are_remembered_newest_first_and_only_while_they_exist(
 def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
     start_folder(tmp_path / "start", monkeypatch, "protocols")
     Path("protocols/syrup.toml").write_text(
-        "format = 1\n[liquids.syrup]\ndensity_kg_m3 = 1300\neffects = ['drag']\n", encoding="utf-8", newline="\n"
+        "format = 2\n[liquids.syrup]\ndensity_kg_m3 = 1300\neffects = ['drag']\n", encoding="utf-8", newline="\n"
     )
-    Path("protocols/broken.toml").write_text("format = 1\n[study]\n", encoding="utf-8", newline="\n")
+    Path("protocols/broken.toml").write_text("format = 2\n[study]\n", encoding="utf-8", newline="\n")
     assert "syrup" not in known_sources()
     assert "broken" in known_sources()
 

@@ -19,7 +19,7 @@ from study_app.haptics.model.effects.current import Uniform
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.estimators import Given, Kalman
 from study_app.haptics.model.motion import Motion
-from study_app.haptics.model.scene import Box, Liquid, MotionBox, Scene
+from study_app.haptics.model.scene import Accuracy, Box, Liquid, MotionBox, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.load import load, load_scene, load_scenes
 from study_app.protocol.trials.tasks import Explore, Reach, Stroke
@@ -173,7 +173,8 @@ RIVER = Liquid(
     current=Uniform(velocity_mps=(1, 0, 0)),
 )
 POOL = Liquid(id="pool", density_kg_m3=900, region=Box(size_m=(1, 1, 1)), effects="auto")
-BOTH = Scene(scale=3, liquids=(RIVER, POOL))
+STEADY = Accuracy(without=("unsteady_drag",))
+BOTH = Scene(accuracy=STEADY, scale=3, liquids=(RIVER, POOL))
 
 
 class Clock:
@@ -212,7 +213,7 @@ def test_each_effect_costs_what_it_adds(monkeypatch):
 
 def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
     Clock(monkeypatch, lambda scene: 20 + sum(PRICES[it] for liquid in scene.liquids for it in liquid.effects))
-    lines = report(Scene(liquids=(RIVER,)), batches=1).splitlines()
+    lines = report(Scene(accuracy=STEADY, liquids=(RIVER,)), batches=1).splitlines()
     assert lines[0].startswith("river: effects named")
     assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
     assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; 20 ns of it without liquids"

@@ -24,7 +24,6 @@ BASIN = Liquid(
     region=Cylinder(centre_m=(0.0, -0.5, 0.0), radius_m=0.5, height_m=1.0),
 )
 EMPTY = Scene(
-    format=2,
     scale=1.0,
     knee=UNBENT,
     body=Body(density_kg_m3=800),

@@ -20,7 +20,7 @@ def tank(name, **fields):
     """Return a scene of one liquid with unsteady drag, at scale 1."""
     density_kg_m3, viscosity_pa_s = FLUIDS[name]
     one = liquid(density_kg_m3, viscosity_pa_s=viscosity_pa_s, effects=("unsteady_drag",))
-    return scene(one.model_copy(update=fields), knee=UNBENT, scale=1.0, format=2)
+    return scene(one.model_copy(update=fields), knee=UNBENT, scale=1.0)
 
 
 def force(felt, velocity_mps, interval_s=1e-3):

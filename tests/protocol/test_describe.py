@@ -3,14 +3,9 @@
 import json
 from pathlib import Path
 
-import pytest
-
-from study_app.errors import ProtocolError
-from study_app.protocol.load import parse
 from study_app.protocol.streams import stream
 from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
 from study_app.store.receipt import without_conditions
-from tests.protocol.sound import SOUND
 from tests.protocol.trials.level_studies import study
 
 PLANNED = """
@@ -39,11 +34,7 @@ def test_published_values_are_in_the_key_and_not_in_the_receipt(tmp_path: Path) 
     assert whole.analysis == protocol.analysis
 
 
-def test_a_plan_of_format_1_keeps_its_bytes() -> None:
+def test_omitted_keys_of_a_plan_are_not_written() -> None:
     plan = study(more="\n[analysis]\nalpha = 0.01\n").analysis
     assert plan is not None
     assert set(plan.model_dump(mode="json")).isdisjoint({"participants", "precision", "published"})
-    with pytest.raises(ProtocolError) as refused:
-        parse(f"{SOUND}\n[analysis]\nparticipants = 20\nprecision = 0.1\n".encode(), "small")
-    later = [str(one) for one in refused.value.problems if "belongs to format 2" in str(one)]
-    assert ["participants" in later[0], "precision" in later[1]] == [True, True]

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from study_app.errors import Problem, ProtocolError
 from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.estimators import Ewma, Kalman, Raw
+from study_app.haptics.model.estimators import Kalman, Raw
 from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override_value, value_of
 from study_app.haptics.model.scene import Liquid, Scene
@@ -75,23 +75,25 @@ def test_a_scene_is_one_liquid_of_a_protocol():
 def test_a_scene_file_needs_no_study(tmp_path: Path):
     path = tmp_path / "scene.toml"
     path.write_text(
-        "[scene]\nscale = 3\nrate_hz = 500\n[liquids.tar]\ndensity_kg_m3 = 1153\n", encoding="utf-8", newline="\n"
+        "format = 2\n[scene]\nscale = 3\nrate_hz = 500\n[liquids.tar]\ndensity_kg_m3 = 1153\n",
+        encoding="utf-8",
+        newline="\n",
     )
     scene = load_scene(path, "tar")
     assert (scene.scale, scene.rate_hz, scene.liquids[0].density_kg_m3) == (3, 500, 1153)
-    path.write_text("[liquids.tar]\ndensity_kg_m3 = 1153\n", encoding="utf-8", newline="\n")
+    path.write_text("format = 2\n[liquids.tar]\ndensity_kg_m3 = 1153\n", encoding="utf-8", newline="\n")
     assert load_scene(path, "tar").scale == 10
 
 
 def test_problems_of_a_scene_file_are_its_own(tmp_path: Path):
     path = tmp_path / "scene.toml"
-    path.write_text("[scene]\nscael = 3\n\n[liquids.tar]\ndensity = 1153\n", encoding="utf-8", newline="\n")
+    path.write_text("format = 2\n[scene]\nscael = 3\n\n[liquids.tar]\ndensity = 1153\n", encoding="utf-8", newline="\n")
     with pytest.raises(ProtocolError) as caught:
         load_scene(path, "tar")
     assert [(problem.line, problem.place) for problem in caught.value.problems] == [
-        (2, "scene.scael"),
-        (4, "liquids.tar.density_kg_m3"),
-        (5, "liquids.tar.density"),
+        (3, "scene.scael"),
+        (5, "liquids.tar.density_kg_m3"),
+        (6, "liquids.tar.density"),
     ]
 
 
@@ -159,19 +161,16 @@ def written(path: Path, text: str) -> Path:
     return path
 
 
-def test_a_damper_in_format_2_needs_no_density(tmp_path: Path) -> None:
+def test_a_damper_needs_no_density(tmp_path: Path) -> None:
     scene = load_scene(written(tmp_path / "damper.toml", f"format = 2\n{DAMPER}"), "damper")
     assert scene.liquids[0].drag == Drag(law="linear", damping_nspm=12)
     assert value_of(override_value(scene, "damping_nspm", "20"), "damping_nspm") == 20
     assert steady_force(scene).force_n == pytest.approx(1.2)
 
 
-@pytest.mark.parametrize(("number", "velocity"), [(1, Ewma()), (2, Kalman())])
-def test_the_estimator_of_a_scene_file_is_that_of_its_format(
-    tmp_path: Path, number: int, velocity: Ewma | Kalman
-) -> None:
-    text = f"format = {number}\n[scene]\nscale = 3\n[liquids.water]\ndensity_kg_m3 = 1000\n"
-    assert load_scene(written(tmp_path / "water.toml", text), "water").velocity == velocity
+def test_the_estimator_of_a_scene_file_is_kalman_unless_it_states_one(tmp_path: Path) -> None:
+    text = "format = 2\n[scene]\nscale = 3\n[liquids.water]\ndensity_kg_m3 = 1000\n"
+    assert load_scene(written(tmp_path / "water.toml", text), "water").velocity == Kalman()
     named = text.replace("scale = 3", 'scale = 3\nvelocity = { kind = "raw" }')
     assert load_scene(written(tmp_path / "water.toml", named), "water").velocity == Raw()
 
@@ -194,33 +193,34 @@ def test_the_density_counts_where_effects_are_chosen(tmp_path: Path) -> None:
     assert "linear law, as stated in the file" in "\n".join(describe_gate(scene))
 
 
-def test_only_a_scene_that_needs_it_is_written_in_format_2(tmp_path: Path) -> None:
-    water = Scene(liquids=(Liquid(id="water", density_kg_m3=1000),))
-    assert "format = 1\n" in scene_text(water)
-    assert "damping_nspm" not in scene_text(water)
+def test_a_scene_with_a_damper_is_read_as_it_was_written(tmp_path: Path) -> None:
     damper = Scene(liquids=(Liquid(id="damper", density_kg_m3=1000, drag=Drag(law="linear", damping_nspm=3)),))
-    read = load_scene(written(tmp_path / "damper.toml", scene_text(damper)), "damper")
-    assert read == damper.model_copy(update={"format": 2})
-    assert "format = 2\n" in scene_text(read)
+    assert load_scene(written(tmp_path / "damper.toml", scene_text(damper)), "damper") == damper
+    assert "damping_nspm" not in scene_text(Scene(liquids=(Liquid(id="water", density_kg_m3=1000),)))
 
 
-UNSTEADY = '[liquids.honey]\ndensity_kg_m3 = 1420\nviscosity_pa_s = 10\neffects = ["unsteady_drag"]\n'
-
-
-def test_the_format_decides_what_auto_chooses_among(tmp_path: Path) -> None:
-    text = UNSTEADY.replace('["unsteady_drag"]', '"auto"') + "[scene]\nscale = 3\n"
+def test_effects_that_accuracy_excludes_are_not_chosen(tmp_path: Path) -> None:
+    liquid = '[liquids.honey]\ndensity_kg_m3 = 1420\nviscosity_pa_s = 10\neffects = "auto"\n[scene]\nscale = 3\n'
     chosen = {}
-    for number in (1, 2):
-        scene = load_scene(written(tmp_path / "honey.toml", f"format = {number}\n{text}"), "honey")
+    for without in ("[]", '["unsteady_drag"]'):
+        text = f"format = 2\n{liquid}accuracy.without = {without}\n"
+        scene = load_scene(written(tmp_path / "honey.toml", text), "honey")
         assert load_scene(written(tmp_path / "again.toml", scene_text(scene)), "honey") == scene
-        chosen[number] = resolve(scene).liquids[0].effects
-    assert chosen == {1: ("drag", "buoyancy", "added_mass", "history"), 2: ("buoyancy", "unsteady_drag")}
+        chosen[without] = resolve(scene).liquids[0].effects
+    assert chosen == {
+        "[]": ("buoyancy", "unsteady_drag"),
+        '["unsteady_drag"]': ("drag", "buoyancy", "added_mass", "history"),
+    }
 
 
-def test_the_fade_belongs_to_format_2(tmp_path: Path) -> None:
+@pytest.mark.parametrize("head", ["", "format = 1\n"])
+def test_a_scene_file_of_an_earlier_format_is_to_be_upgraded(tmp_path: Path, head: str) -> None:
+    with pytest.raises(ProtocolError, match=r"format: is 1, .*run liquid-study upgrade FILE"):
+        load_scene(written(tmp_path / "water.toml", f"{head}[liquids.water]\ndensity_kg_m3 = 1000\n"), "water")
+
+
+def test_a_scene_file_states_the_fade(tmp_path: Path) -> None:
     text = "[scene]\nfade_s = 0.3\n[liquids.water]\ndensity_kg_m3 = 1000\n"
-    with pytest.raises(ProtocolError, match=r"scene\.fade_s: belongs to format 2"):
-        load_scene(written(tmp_path / "water.toml", text), "water")
     scene = load_scene(written(tmp_path / "water.toml", f"format = 2\n{text}"), "water")
     assert scene.fade_s == 0.3
     assert load_scene(written(tmp_path / "again.toml", scene_text(scene)), "water") == scene

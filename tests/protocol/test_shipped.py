@@ -54,7 +54,8 @@ def test_the_second_edition_of_the_physical_liquids_differs_in_estimator_and_in_
     first, second = (load(name) for name in ("physical_liquids", "physical2"))
     assert (first.liquids, first.conditions) == (second.liquids, second.conditions)
     assert (first.scene.velocity, second.scene.velocity) == (Ewma(), Kalman())
-    assert first.scene.model_copy(update={"velocity": Kalman()}) == second.scene
+    assert first.scene.model_copy(update={"velocity": Kalman(), "accuracy": second.scene.accuracy}) == second.scene
+    assert (first.scene.accuracy.without, second.scene.accuracy.without) == (("unsteady_drag",), ())
     chosen = {name: resolve(second.scene_of(name)).liquids[0].effects for name in second.liquids}
     assert chosen.pop("water") == ("drag", "added_mass")
     assert all("unsteady_drag" in effects and "drag" not in effects for effects in chosen.values())
@@ -73,7 +74,7 @@ def test_the_scene_of_a_liquid_has_all_that_the_file_says():
 def test_a_scene_file_may_say_auto_and_give_its_motion(tmp_path):
     file = tmp_path / "oil.toml"
     file.write_text(
-        "format = 1\n[scene]\nscale = 2\nmotion = { speed_mps = 1, depth_m = [-0.1, 0.2] }\n"
+        "format = 2\n[scene]\nscale = 2\nmotion = { speed_mps = 1, depth_m = [-0.1, 0.2] }\n"
         "accuracy = { relative = 0.1 }\n"
         '[liquids.oil]\ndensity_kg_m3 = 900\nviscosity_pa_s = 0.1\neffects = "auto"\n'
         'region = { kind = "box", size_m = [1, 1, 1] }\n',

@@ -16,8 +16,8 @@ SEEN = '[conditions.{name}]\nliquid = "thin"\ndelay_ms = {delay}\n{keys}\n\n'
 
 @pytest.fixture
 def study(tmp_path: Path) -> Path:
-    """Return demo in format 2, with conditions that show a camera and footage."""
-    text = source_bytes("demo").decode().replace("format = 1", "format = 2", 1)
+    """Return demo with conditions that show a camera and footage."""
+    text = source_bytes("demo").decode()
     first = text.index("[conditions.")
     live = SEEN.format(name="live", delay=11, keys='view = "camera"')
     clip = SEEN.format(name="clip", delay=12, keys='view = "waves/sea.mp4"\noverlay = "hidden"')
@@ -62,12 +62,7 @@ def test_footage_and_liquid_files_come_back_from_one_source() -> None:
 
 @pytest.mark.parametrize(
     ("old", "new", "problem"),
-    [
-        ('view = "waves/sea.mp4"', 'view = "lost.mp4"', 'conditions.clip.view: there is no file "lost.mp4"'),
-        ("format = 2", "format = 1", "conditions.clip.view: belongs to format 2"),
-        ("format = 2", "format = 1", "conditions.clip.overlay: belongs to format 2"),
-        ("format = 2", "format = 1", "conditions.live.view: belongs to format 2"),
-    ],
+    [('view = "waves/sea.mp4"', 'view = "lost.mp4"', 'conditions.clip.view: there is no file "lost.mp4"')],
 )
 def test_a_view_that_cannot_be_is_named(study: Path, old: str, new: str, problem: str) -> None:
     study.write_text(study.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8", newline="\n")

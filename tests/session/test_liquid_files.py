@@ -33,7 +33,7 @@ from tests.studies import begun
 
 EARLIER = Path(__file__).parents[1] / "store" / "releases" / "0.1"
 THICK = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]\n'
-SYRUP = """format = 1
+SYRUP = """format = 2
 
 [scene]
 scale = 3
@@ -92,15 +92,15 @@ def test_a_file_without_liquid_files_is_its_own_source(name: str) -> None:
 
 
 def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that_were_left_out(tmp_path: Path) -> None:
-    protocol = load(EARLIER / "rek2024.toml")
-    open_or_draw_key(tmp_path, protocol, stream(1, "blinding").random)
+    open_or_draw_key(tmp_path, load("rek2024"), stream(1, "blinding").random)
     drawn, earlier = (
         json.loads(base64.b64decode(StudyFolder(folder).key.read_bytes())) for folder in (tmp_path, EARLIER / "rek2024")
     )
     for key in (drawn, earlier):
-        for liquid in key["tables"]["liquids"].values():
+        for name, liquid in key["tables"]["liquids"].items():
             liquid["added_mass"].pop("filter_s")
             liquid["history"].pop("smoothing_s")
+            key["tables"]["liquids"][name] = {field: value for field, value in liquid.items() if value is not None}
     assert drawn == earlier
 
 
@@ -114,7 +114,7 @@ def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that
         ('file = "liquids/syrup.toml"\ndensity_kg_m3 = 1', SYRUP, "liquids.thick.density_kg_m3"),
         ('file = "liquids/syrup.toml"', SYRUP.replace("1387.25", "0"), "density_kg_m3: is 0, must be"),
         ('file = "liquids/syrup.toml"', SYRUP + "\n[liquids.more]\ndensity_kg_m3 = 1000\n", "holds 2 liquids"),
-        ('file = "liquids/syrup.toml"', "format = 1\n[liquids", "not TOML"),
+        ('file = "liquids/syrup.toml"', "format = 2\n[liquids", "not TOML"),
         ('file = "liquids/syrup.toml"', SYRUP.replace("[liquids.from", "[study]\n[liquids.from"), "study"),
     ],
 )

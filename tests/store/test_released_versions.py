@@ -17,6 +17,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.unblinding import unblind
+from study_app.store.upgrade import upgrade
 from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
@@ -46,6 +47,12 @@ def test_every_released_version_is_recorded() -> None:
     released = {version.rpartition(".")[0] for version in re.findall(r"^## \[(\d+\.\d+\.\d+)\]", log, re.MULTILINE)}
     assert __version__.rpartition(".")[0] in released
     assert {version for version, _ in STUDIES} == released
+
+
+def upgraded(study: Path, folder: Path) -> Path:
+    """Return an upgraded copy of a study's file."""
+    (file,) = upgrade(Path(shutil.copy(study, folder)))
+    return file
 
 
 def written_by(folder: Path) -> list[str]:
@@ -96,7 +103,7 @@ def test_an_unfinished_session_is_resumed_to_its_end(tmp_path: Path) -> None:
     folder = StudyFolder(Path(shutil.copytree(RELEASES / "0.2" / "demo", tmp_path / "demo")))
     session = folder.session("P002", 1)
     before = session.journal.read_bytes()
-    rehearsal.resume_rehearsal(session.path, protocol=RELEASES / "0.2" / "demo.toml")
+    rehearsal.resume_rehearsal(session.path, protocol=upgraded(RELEASES / "0.2" / "demo.toml", tmp_path))
     assert session.journal.read_bytes().startswith(before)
     assert raw(journal.read(session.journal))[-1]["status"] == "completed"
     assert verify_study(folder.path).errors == ()
@@ -131,10 +138,10 @@ def test_it_verifies_with_a_note(study: Path) -> None:
 
 
 @needs_servo
-def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path) -> None:
+def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path, tmp_path: Path) -> None:
     folder = StudyFolder(study).session("P002", 1)
     before = folder.journal.read_bytes()
-    rehearsal.resume_rehearsal(folder.path, protocol=HELD / "rek2024.toml")
+    rehearsal.resume_rehearsal(folder.path, protocol=upgraded(HELD / "rek2024.toml", tmp_path))
     assert folder.journal.read_bytes().startswith(before)
     lines = raw(journal.read(folder.journal))
     assert lines[-1]["status"] == "completed"

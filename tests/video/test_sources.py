@@ -59,7 +59,7 @@ def camera(monkeypatch: pytest.MonkeyPatch) -> type[FakeCamera]:
 
 def with_camera() -> bytes:
     """Return the demo in format 2, with a condition that shows the camera."""
-    text = source_bytes("demo").decode().replace("format = 1", "format = 2", 1)
+    text = source_bytes("demo").decode()
     head = '[conditions.thick]\nliquid = "thick"'
     assert head in text
     return text.replace(head, '[conditions.thick]\nliquid = "thin"\nview = "camera"').encode()

@@ -21,7 +21,6 @@ from study_app.designer.document.fields import (
 )
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
-from study_app.protocol.formats import is_format_2
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.source.document import Path, entries, has, value_at
 from study_app.protocol.wording.languages import languages_of
@@ -143,9 +142,7 @@ def rows_of_blocks(document: Mapping[str, Any]) -> tuple[Row, ...]:
     blocks = [block for _, block in entries(document, "blocks.*") if isinstance(block, Mapping)]
     several = sum(block.get("phase", "main") == "main" for block in blocks) > 1
     places = [("study", "block_order")] * several + [("analysis", "contrasts")]
-    return (
-        tuple(row for place in places if (row := row_at(document, place)) is not None) if is_format_2(document) else ()
-    )
+    return tuple(row for place in places if (row := row_at(document, place)) is not None)
 
 
 def _all_texts(value: Any) -> Iterator[str]:

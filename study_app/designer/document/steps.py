@@ -41,7 +41,6 @@ from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unse
 from study_app.designer.document.toml_text import Refused, with_own_line_ends
 from study_app.ids import free_id
 from study_app.number_text import counted
-from study_app.protocol.formats import is_format_2
 from study_app.protocol.load import read_document, shipped, source_bytes
 from study_app.protocol.model import SceneDefaults
 from study_app.protocol.questionnaires import instrument_tables
@@ -255,12 +254,11 @@ def _shipped_documents() -> dict[str, Mapping[str, Any]]:
 
 @cache
 def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
-    """Return the shipped studies' liquids that have the same meaning in format 2, by study and id."""
+    """Return the shipped studies' liquids by study and id."""
     return {
         (study, name): table
         for study, document in _shipped_documents().items()
         for name, table in document.get("liquids", {}).items()
-        if is_format_2(document) or table.get("effects", "auto") != "auto"
     }
 
 
@@ -405,8 +403,6 @@ class AddToSession(Request):
     places: tuple[Path, ...]
 
     def step(self, at: Situation) -> Step:
-        if not is_format_2(at.study.document):
-            raise Refused("a questionnaire outside a block requires format 2: write format = 2 in the tab File")
         title, places = title_of(at.study.document, self.path), sorted(self.places, key=index_of, reverse=True)
         said = f"{title}, now step {index_of(places[-1]) + 1}"
         return Step(f"Add {title} to the session", tuple(Insert(place, self.path[1]) for place in places), said=said)

@@ -43,7 +43,6 @@ from study_app.designer.form.rows import (
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
-from study_app.protocol.formats import is_format_2
 from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
 from study_app.protocol.warnings.untranslated import untranslated_at
@@ -129,7 +128,7 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
 
     def as_step(sentence: str, places: Iterable[Path]) -> Iterator[tuple[str, Request]]:
         new = tuple(place for place in places if place not in asked_after)
-        if new and is_format_2(document):
+        if new:
             yield sentence, AddToSession(path, new)
 
     firsts = {place[:-1]: place for place, _ in reversed(blocks)}

@@ -109,12 +109,10 @@ class Effect:
         The force [N] if the liquid's velocity along the body's path changes by Δv [m/s] at a [m/s²].
     flow : callable, optional
         The speed and shear of the liquid's own flow, from the table.
-    format : int
-        The first format of files that has it.
     automatic : bool
         Whether the gate may choose it.
     bars : callable, optional
-        Effects that the gate may not choose in a scene of its format, with reasons.
+        Effects that the gate may not choose, with reasons.
     choose : callable, optional
         The table that the gate gives it, and why, in words.
     note : callable, optional
@@ -166,7 +164,6 @@ class Effect:
     extent: Literal["area", "volume", ""] = ""
     accelerated_n: Callable[[Extremes, float, float], float] | None = None
     flow: Callable[[Any], Flow] | None = None
-    format: int = 1
     automatic: bool = True
     bars: Callable[[Extremes], tuple[tuple[str, ...], str]] | None = None
     choose: Callable[[Extremes], tuple[Any, str]] | None = None

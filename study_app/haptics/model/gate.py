@@ -5,7 +5,7 @@ omitted as long as the *sum* of the omitted bounds stays within the scene's accu
 bounds or 0.05 N, whichever is greater. That is below the difference threshold of force, 7 %; the sum of all bounds is
 capped at the force limit. [choice] Drag uses the least expensive law of C_d that stays within the same target of the
 reference law at every speed. A wake is never selected automatically: density and viscosity do not determine its
-parameters.
+parameters; nor are the effects that ``scene.accuracy.without`` lists.
 
 The motion box of a scene allows every motion with |v| ≤ v_max, |a| ≤ a_max and a depth of the body's centre within its
 range. A bound is the greatest change of the force [N] if the effect is omitted, over all these motions; each effect's
@@ -41,8 +41,8 @@ class Extremes:
 
     @cached_property
     def bounds_n(self) -> Mapping[Effect, float]:
-        """The bound [N] of every effect of the scene's format that the liquid has parameters for, by name."""
-        known = [it for it in EFFECTS if it.format <= self.scene.format or it.name in self.liquid.effects]
+        """The bound [N] of every effect that the scene permits and the liquid has parameters for, by name."""
+        known = [it for it in EFFECTS if it.name not in self.scene.accuracy.without or it.name in self.liquid.effects]
         bounds = {effect.name: effect.bound_n(self) for effect in known}
         return {name: bound_n for name, bound_n in bounds.items() if bound_n is not None}
 

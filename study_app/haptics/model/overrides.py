@@ -91,6 +91,7 @@ def _reason(place: tuple[int | str, ...], message: str) -> str:
 def _tree(scene: Scene) -> dict[str, Any]:
     """Return a scene as tables, with every table that a liquid may have."""
     tree = scene.model_dump()
+    tree["accuracy"].setdefault("without", ())
     for liquid in tree["liquids"]:
         for name in _OF_A_LIQUID:
             liquid.setdefault(name, None)

@@ -15,7 +15,7 @@ class Frozen(BaseModel):
 
 
 def later(default: Any = None, **about: Any) -> Any:
-    """Return a field that format 1 lacks; its default is not written, so that older files keep their bytes."""
+    """Return a field whose default is not written, so that files and hashes from before it keep their bytes."""
     usual = {} if "default_factory" in about else {"default": default}
     return Field(**usual, **about, exclude_if=lambda value: value == usual.get("default", {}))
 

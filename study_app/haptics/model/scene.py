@@ -137,7 +137,7 @@ else:
         **{
             effect.name: (
                 effect.model if effect.default is not None else effect.model | None,
-                effect.default if effect.format == 1 else later(),
+                later() if effect.default is None else effect.default,
             )
             for effect in EFFECTS
             if effect.model is not None
@@ -275,6 +275,7 @@ class Accuracy(Frozen):
     absolute_n: Annotated[
         float, within(0, 20, "the force limit is at most 20 N", what="Largest omitted force, if that is greater [N].")
     ] = 0.05
+    without: tuple[Effect, ...] = later(default=(), description='Effects that "auto" never selects.')
 
 
 class MotionBox(Frozen):
@@ -306,8 +307,7 @@ class Scene(Frozen):
 
     ``scale`` and ``origin_m`` map the hand into the scene; ``rate_hz`` is the nominal tick rate; ``force_limit_n`` the
     greatest permitted force; ``fade_s`` the fade-in time; ``link`` the delay of the force, which scene files cannot
-    set. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``, which selects among the effects of the
-    file's ``format``.
+    set. ``accuracy`` and ``motion`` are for liquids with ``effects = "auto"``.
     """
 
     scale: SceneScale = 10.0
@@ -321,7 +321,6 @@ class Scene(Frozen):
     fade_s: FadeS = FADE_S
     accuracy: Accuracy = Accuracy()
     motion: MotionBox = MotionBox()
-    format: Literal[1, 2] = 1
     link: ForceLink = PROMPT_LINK
 
     @model_validator(mode="after")

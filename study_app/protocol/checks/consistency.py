@@ -25,7 +25,6 @@ from study_app.protocol.model import (
     Condition,
     DeviceNeeds,
     Follow,
-    Format,
     Named,
     PageText,
     Protocol,
@@ -55,7 +54,6 @@ class Draft(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
 
-    format: Format = 1
     device: DeviceNeeds | None = None
     scene: SceneDefaults | None = None
     liquids: Named[StudyLiquid] = {}
@@ -76,7 +74,7 @@ class Draft(BaseModel):
             or not 0 < len(liquids) == len(set(condition.liquid_ids)) <= MAX_LIQUIDS
         ):
             return None
-        return scene_with(self.scene, self.device, liquids, self.format)
+        return scene_with(self.scene, self.device, liquids)
 
 
 def _sound_draft(document: Mapping[str, Any], broken: Iterable[Path], valid: Protocol | None) -> Draft:

@@ -243,7 +243,7 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
             f"analysis.equivalence_bound: {decided.equivalence_bound:g} points are more than half the scale "
             f"({half:g}), so almost any answers would count as equivalent"
         )
-    if protocol.format > 1 and decided is not None and decided.participants is None:
+    if decided is not None and decided.participants is None:
         yield (
             "analysis.participants is missing: a study that ends at the first significant result has more "
             "false positives than alpha"
@@ -372,8 +372,8 @@ def _unbracketed_value(protocol: Protocol, number: int, published: Published) ->
 
 
 def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
-    """Yield reaching tasks whose trials are valid without a reached target; format 1 is frozen."""
-    if protocol.format == 1 or protocol.limits.targets_percent is not None:
+    """Yield reaching tasks whose trials are valid without a reached target."""
+    if protocol.limits.targets_percent is not None:
         return
     for name in dict.fromkeys(block.task for block in protocol.main_blocks):
         if isinstance(protocol.tasks[name], Reach):

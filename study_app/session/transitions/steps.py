@@ -253,7 +253,7 @@ def record_choice(state: SessionState, event: Chosen) -> Result:
         raise SessionError(problem)
     answer = state.answers.get(event.item, Answer()).chosen(event.at_s, event.value)
     line = journal.Choice(
-        **_page_fields(state), item=event.item, kind=_question_kind(state, event.item), value=event.value
+        **_page_fields(state), item=event.item, kind=state.questionnaire.item(event.item).kind_id, value=event.value
     )
     return _without_hidden(_with_answer(state, event.item, answer), (Write(line, waits=True),))
 
@@ -274,7 +274,7 @@ def submit_answers(state: SessionState, event: Submitted) -> Result:
         listed = ", ".join(map(str, missing))
         raise SessionError(f"not every required statement is answered: answer {listed} first")
     items = tuple(
-        Response(item=item, number=number, kind=_question_kind(state, item), **asdict(answers[item]))
+        Response(item=item, number=number, kind=state.questionnaire.item(item).kind_id, **asdict(answers[item]))
         for number, item in numbered
     )
     line: journal.Event = (
@@ -316,11 +316,6 @@ def _with_answer(state: SessionState, item: str, answer: Answer) -> SessionState
 def _page_fields(state: SessionState) -> dict[str, Any]:
     """Return the event fields for the page: those of a trial, or the form."""
     return {"form": state.step.form} if isinstance(state.step, FormStep) else {"trial": state.trial.number}
-
-
-def _question_kind(state: SessionState, item: str) -> str | None:
-    """Return the kind of a question; format 1 has one kind and no such field."""
-    return state.questionnaire.item(item).kind_id if state.plan.protocol.format > 1 else None
 
 
 def _check_item(state: SessionState, item: str) -> None:

@@ -35,6 +35,7 @@ from study_app.protocol.orders.schedule import block_codes, draw_key
 from study_app.protocol.sequences import enrolment_number
 from study_app.protocol.streams import draw_secret, group_of, own_code, place_in_group
 from study_app.protocol.table import RECORDED
+from study_app.protocol.upgrade import needs_upgrade, upgraded_tables
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.blinded.sealing import TASK_BYTES, open_text, seal_values
@@ -376,6 +377,8 @@ def complete_protocol(published: Mapping[str, Any], key: Key) -> Protocol:
     if "analysis" in tables:
         tables["analysis"] = {**published["analysis"], **tables["analysis"]}
     whole = {**published, **tables, "questionnaires": questionnaires, "blocks": blocks}
+    if needs_upgrade(whole):
+        whole = upgraded_tables(whole)
     if not whole.get("sequence"):  # each group has its own, or each session
         whole.pop("sequence", None)
     return Protocol.model_validate(whole, context=RECORDED)

@@ -20,9 +20,18 @@ from study_app.protocol.differences import CONDITIONS_DIFFER, differences
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.source.files import bundle, has_hash, hashes_in, unbundle
+from study_app.protocol.upgrade import needs_upgrade
 from study_app.store import receipt
 from study_app.store.atomic import is_there, paths_in, read_own, remove_temporary_files, write_file
-from study_app.store.blinded.blinding import Key, has_same_conditions, open_or_draw_key, opened_key, read_key
+from study_app.store.blinded.blinding import (
+    Key,
+    complete_protocol,
+    has_same_conditions,
+    open_or_draw_key,
+    opened_key,
+    protocol_errors,
+    read_key,
+)
 from study_app.store.checksums import (
     fingerprint,
     note_fingerprint,
@@ -148,7 +157,8 @@ def reopen_store(
             store.append(event)
         store.note_resumed(entry)
         store.write_tables()
-        write_description(study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions))
+        form = left.start.protocol_format or 1
+        write_description(study_folder, protocol.study, form, intervals=bool(protocol.design_questions))
         update_participants(study_folder, left.place.study)
         failing.pop_all()
     return store
@@ -334,9 +344,17 @@ def _same_protocol(
     """Raise an error that lists the differences if the protocol differs from that of the session's start."""
     if has_hash(source, start.protocol_hash):
         return
-    changes = list(differences(first["protocol"], json.loads(json.dumps(receipt.without_conditions(protocol)))))
+    recorded, is_upgraded = first["protocol"], needs_upgrade(first["protocol"])
+    if is_upgraded:
+        with protocol_errors(place.folder.receipt):
+            key = read_key(place.study_folder.path)
+            recorded = receipt.without_conditions(complete_protocol(recorded, key))
+    sides = (json.loads(json.dumps(it)) for it in (recorded, receipt.without_conditions(protocol)))
+    changes = list(differences(*sides))
     if not has_same_conditions(place.study_folder.path, protocol):
         changes.append(CONDITIONS_DIFFER)
+    if is_upgraded and not changes:
+        return
     if not changes:
         changes.append("only comments, order or notation")
     listed = "; ".join(changes[:_SHOWN_DIFFERENCES])

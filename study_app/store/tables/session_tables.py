@@ -40,6 +40,7 @@ class SessionRows:
         self._start = events.start_of(lines)
         self._session = _session_cells(self._start)
         self._group = _group_cells(self._start)
+        self._answer_columns = header(tables_of(self._start.protocol_format or 1)["responses"])
         self._measured_names = (*_MEASURED, *header(VIDEO)) if self._group else _MEASURED
         self._limits = self._start.limits
         self._started: dict[tuple[int, int], events.TrialStarted] = {}
@@ -75,10 +76,14 @@ class SessionRows:
                 if (trial := self._started.get((line.trial, line.attempt))) is None:
                     raise _never_started(line)
                 about = {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
-                self.responses += [_response_row(self._session, about, answer, line.at) for answer in line.items]
+                self.responses += [
+                    _response_row(self._session, about, answer, line.at, self._answer_columns) for answer in line.items
+                ]
             case events.FormAnswered():
                 about = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line.form, "after_block": line.after}
-                self.responses += [_response_row(self._session, about, answer, line.at) for answer in line.items]
+                self.responses += [
+                    _response_row(self._session, about, answer, line.at, self._answer_columns) for answer in line.items
+                ]
             case events.SessionEnded() | events.SessionResumed():
                 self._interrupt()
             case events.IntervalStarted():
@@ -236,7 +241,7 @@ def _group_cells(start: events.SessionStarted) -> Row:
     return {"group": start.group} if (start.protocol_format or 1) > 1 else {}
 
 
-def _response_row(session: Row, about: Row, answer: events.Response, answered_at: str) -> Row:
+def _response_row(session: Row, about: Row, answer: events.Response, answered_at: str, columns: Sequence[str]) -> Row:
     """Return the row of an answer; format 2 adds its kind, and the answer as text and as number."""
     value = answer.value
     plain = answer.kind is None or value is None
@@ -257,7 +262,7 @@ def _response_row(session: Row, about: Row, answer: events.Response, answered_at
         "changes": answer.changes,
         "answered_at": answered_at,
     }
-    return {name: row[name] for name in header(tables_of(2 if answer.kind else 1)["responses"])}
+    return {name: row[name] for name in columns}
 
 
 def _trial_row(session: Row, line: events.TrialStarted) -> Row:

@@ -69,7 +69,7 @@ to = 3
 text = { nl = "Hoe vaak?", en = "How often?" }
 short = { nl = "Vaak", en = "Often" }
 """
-    text = SMALL.replace("format = 1", "format = 2").replace('"try", "feel"]', '"try", "feel", "smooth"]')
+    text = SMALL.replace('"try", "feel"]', '"try", "feel", "smooth"]')
     text = text.replace("[blocks.try]", f"{form}[blocks.try]", 1)
     text = text.replace("smooth", item).replace("heavyzembla", heavy).replace("lightquorn", light)
     (tmp_path / "small.toml").write_text(text, encoding="utf-8", newline="\n")

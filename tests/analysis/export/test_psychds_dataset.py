@@ -37,7 +37,7 @@ FOOTAGE = b"waves"
 def kitchen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Results of a study with footage in the workspace, whose file states authors and licence; the key is open."""
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    text = shipped_file("demo").read_text(encoding="utf-8").replace("format = 1", "format = 2", 1)
+    text = shipped_file("demo").read_text(encoding="utf-8")
     file = tmp_path / "protocols" / "kitchen.toml"
     file.parent.mkdir()
     text = text.replace("[study]\n", f"[study]\n{CREDITS}", 1).replace('"demo"', '"kitchen"', 1)

@@ -32,7 +32,6 @@ from tests.analysis.conftest import SMALL
 TEXT = (
     SMALL.replace('"smooth"', '"like_honey"')
     .replace('id = "warm"', 'id = "like_tar"')
-    .replace("format = 1", "format = 2")
     .replace("repetitions = 2", "repetitions = 1")
 )
 """Two liquids, once each, and two statements, of which one is planned."""
@@ -145,11 +144,6 @@ def test_power_falls_with_noise_and_with_the_spread_of_slopes(key: str, seed: in
 def test_values_beyond_their_range_are_refused(values: tuple[float, ...], said: str) -> None:
     with pytest.raises(ProtocolError, match=said):
         parse((TEXT + TABLE.format(*values)).encode(), "small.toml")
-
-
-def test_format_1_has_no_simulated_participants() -> None:
-    with pytest.raises(ProtocolError, match="simulated_participants"):
-        parse((TEXT.replace("format = 2", "format = 1") + TABLE.format(1, 1, 1, 0)).encode(), "small.toml")
 
 
 def test_typical_people_are_the_default_of_the_table() -> None:

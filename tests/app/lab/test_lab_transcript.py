@@ -167,7 +167,7 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
     monkeypatch.setattr(lab_controller, "STARTS_AFTER_MS", 0)
     at_hand = "study_app.app.lab_controller.available_liquids"
     monkeypatch.setattr(at_hand, lambda saved: (Choice(source=saved[-1], liquid="new", title="New"),))
-    (tmp_path / "broken.toml").write_text("format = 1", encoding="utf-8", newline="\n")
+    (tmp_path / "broken.toml").write_text("format = 2", encoding="utf-8", newline="\n")
     done: list[str] = []
     lives = [Recorded(done)]
 

@@ -20,7 +20,7 @@ from faults import CIRCLES, ROOT, durations
 
 LIST = ROOT / "tests" / "circles.txt"
 SAFETY = re.compile(
-    r"tests/(faults|end_to_end|project|session/sealed|haptics/runtime|devices/test_c|store/test_released|store/test_format_1)"
+    r"tests/(faults|end_to_end|project|session/sealed|haptics/runtime|devices/test_c|store/test_released)"
     r"|zero_force|stops_the_force|force_stop|lost_device|killed|sealed|blind|hidden"
 )
 SHORTEST_S = 0.003

@@ -11,7 +11,7 @@ from study_app.protocol.load import is_scene_file, load, load_scenes, protocol_h
 from study_app.protocol.source.files import shipped_file
 
 MARK = "\ufeff"
-LIQUID = '[liquids.oil]\ndensity_kg_m3 = 900\nviscosity_pa_s = 0.1\neffects = ["drag"]\n'
+LIQUID = 'format = 2\n[liquids.oil]\ndensity_kg_m3 = 900\nviscosity_pa_s = 0.1\neffects = ["drag"]\n'
 
 
 def studies(folder: Path, mark: str) -> Path:

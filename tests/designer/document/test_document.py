@@ -36,7 +36,7 @@ def test_a_study_is_what_check_reads(name: str) -> None:
     assert study.problems == ()
 
 
-@pytest.mark.parametrize(("old", "new"), [('liquid = "thin"', 'liquid = "thn"'), ("format = 1", "format = ")])
+@pytest.mark.parametrize(("old", "new"), [('liquid = "thin"', 'liquid = "thn"'), ("format = 2", "format = ")])
 def test_problems_are_those_of_check(old: str, new: str) -> None:
     source = DEMO.text.replace(old, new).encode()
     with pytest.raises(ProtocolError) as raised:
@@ -58,12 +58,14 @@ def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.Monk
 
 def test_a_step_that_changes_nothing_is_none() -> None:
     same = Document(DEMO, ())
-    same.edit("Same", Set(("format",), 1), select=("study",))
+    same.edit("Same", Set(("format",), 2), select=("study",))
     assert (same.done, same.selected) == ([], ("study",))
 
 
 def test_a_study_with_a_liquid_file_shows_its_own_text_alone(tmp_path: Path) -> None:
-    (tmp_path / "thick.toml").write_text("[liquids.any]\ndensity_kg_m3 = 1400\n", encoding="utf-8", newline="\n")
+    (tmp_path / "thick.toml").write_text(
+        "format = 2\n[liquids.any]\ndensity_kg_m3 = 1400\n", encoding="utf-8", newline="\n"
+    )
     own = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]'
     text = DEMO.text.replace(own, '[liquids.thick]\nfile = "thick.toml"')
     study = read_study(text.encode(), tmp_path)

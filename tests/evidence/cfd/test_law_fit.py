@@ -33,7 +33,7 @@ def planted(table):
     liquid = Liquid(
         id="any", density_kg_m3=case.density_kg_m3, viscosity_pa_s=case.viscosity_pa_s, effects=("unsteady_drag",)
     )
-    scene = Scene(format=2, body={"diameter_m": case.diameter_m}, liquids=(liquid,))
+    scene = Scene(body={"diameter_m": case.diameter_m}, liquids=(liquid,))
     even_s = np.arange(0, case.profile.end, law_fit.STEP) * case.unit_s
     dw = case.profile.acceleration(even_s / case.unit_s) * case.speed_mps / case.unit_s
     w = case.speed_mps * case.profile.speed(even_s / case.unit_s)

@@ -56,7 +56,7 @@ def changes_of_studies(home, folder, chooses):
     yield "nothing has changed", home.enter
     assert home.grid.cards is cards
     yield "it has the title of another one", come_back(lambda: own_study(folder, "A first look"))
-    yield "it is damaged", come_back(lambda: file.write_text("format = 1\n", encoding="utf-8", newline="\n"))
+    yield "it is damaged", come_back(lambda: file.write_text("format = 2\n", encoding="utf-8", newline="\n"))
     yield pen("own")
     yield "it is deleted", come_back(file.unlink)
     text = own_study(folder).read_text(encoding="utf-8")
@@ -75,7 +75,7 @@ def changes_of_studies(home, folder, chooses):
     elsewhere.write_text(text.replace('name = "own"', 'name = "elsewhere"'), encoding="utf-8", newline="\n")
     for chosen in (elsewhere, folder / "broken.toml"):
         chosen.write_text(
-            chosen.read_text(encoding="utf-8") if chosen.exists() else "format = 1\n", encoding="utf-8", newline="\n"
+            chosen.read_text(encoding="utf-8") if chosen.exists() else "format = 2\n", encoding="utf-8", newline="\n"
         )
         chooses.setattr(QFileDialog, "getOpenFileName", lambda *_, chosen=chosen: (str(chosen), ""))
         yield f"open {chosen.name}", home.open_protocol.click

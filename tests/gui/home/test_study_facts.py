@@ -138,7 +138,7 @@ def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):
 
 def test_studies_state_extent_languages_needs_and_the_first_problem(tmp_path, pytestconfig):
     lines = []
-    for name, text in {"grouped": STUDY + GROUPS, "cut": "format = 1\nsequence = [", "bare": "format = 1\n"}.items():
+    for name, text in {"grouped": STUDY + GROUPS, "cut": "format = 2\nsequence = [", "bare": "format = 2\n"}.items():
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8", newline="\n")
     assert known_sources()[-1] == "demo"
     for source in ("rek2024", "viscosityjnd", *(str(tmp_path / f"{name}.toml") for name in ("grouped", "cut", "bare"))):
@@ -155,7 +155,7 @@ def test_a_session_of_a_study_whose_liquid_file_is_lost_is_offered(tmp_path):
     text = source_bytes("demo").decode()
     assert table in text
     source.write_text(text.replace(table, '[liquids.thick]\nfile = "thick.toml"\n'), encoding="utf-8", newline="\n")
-    liquid.write_text(f"format = 1\n{table}", encoding="utf-8", newline="\n")
+    liquid.write_text(f"format = 2\n{table}", encoding="utf-8", newline="\n")
     results, now = tmp_path / "results", datetime.now().astimezone()
     stop_at(results, "P001", 2, source=source)
     whole = interrupted_session(sessions(results, {}), [study_facts("demo"), study_facts(str(source))], now)
@@ -204,7 +204,7 @@ def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_p
 
 def test_a_file_of_liquids_that_becomes_a_study_is_noticed(tmp_path: Path) -> None:
     file = tmp_path / "liquids.toml"
-    file.write_text("format = 1\n[liquids.water]\ndensity_kg_m3 = 1000\n", encoding="utf-8", newline="\n")
+    file.write_text("format = 2\n[liquids.water]\ndensity_kg_m3 = 1000\n", encoding="utf-8", newline="\n")
     assert holds_liquids_alone(str(file))
     file.write_text(f"{file.read_text('utf-8')}[study]\nname = 'mine'\n", encoding="utf-8", newline="\n")
     assert not holds_liquids_alone(str(file))

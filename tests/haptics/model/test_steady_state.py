@@ -53,7 +53,7 @@ def test_the_predicted_force_is_what_the_servo_sends(name, scale, hand_mps):
 @pytest.mark.parametrize("name", ["gear_oil", "honey", "tar"])
 def test_unsteady_drag_reaches_the_predicted_force_once_its_history_is_over(name):
     liquid = Liquid(id=name, density_kg_m3=890, viscosity_pa_s={"gear_oil": 0.35, "honey": 10, "tar": 100}[name])
-    scene = Scene(scale=3, liquids=(liquid.model_copy(update={"effects": ("unsteady_drag",)}),), format=2)
+    scene = Scene(scale=3, liquids=(liquid.model_copy(update={"effects": ("unsteady_drag",)}),))
     predicted = steady_force(scene)
     force_n, limiters = sent(scene, 0.1, lasting_s=30)
     assert predicted.force_n == pytest.approx(force_n, rel=0.01)

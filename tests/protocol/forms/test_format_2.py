@@ -1,10 +1,9 @@
-"""Format 2: what it may leave out, what a file of format 1 may not hold, and what questions need of each other."""
+"""What a study may omit, and what questions need of each other."""
 
 from typing import Any
 
 import pytest
 
-from study_app.haptics.model.estimators import Ewma, Kalman
 from study_app.protocol.load import parse
 from study_app.protocol.questionnaires import (
     Questionnaire,
@@ -21,7 +20,7 @@ from tests.protocol.forms.mixed import MIXED
 from tests.protocol.sound import SOUND
 
 
-def test_what_format_2_leaves_out_has_its_default() -> None:
+def test_an_omitted_key_has_its_default() -> None:
     study = parse(MIXED.encode(), "mixed")
     assert (study.format, study.study.version, study.study.title) == (2, "1", {"en": "mixed"})
     assert study.study.languages == ("en",)
@@ -35,17 +34,9 @@ def test_what_format_2_leaves_out_has_its_default() -> None:
 
 
 def test_names_of_trials_are_in_every_language_of_the_study() -> None:
-    text = SOUND.replace("format = 1", "format = 2")
-    text = "\n".join(line for line in text.splitlines() if not line.startswith("setting_label"))
+    text = "\n".join(line for line in SOUND.splitlines() if not line.startswith("setting_label"))
     label = parse(text.encode(), "small").blocks["feel"].setting_label
     assert label == {"en": "Trial", "nl": "Ronde"}
-
-
-def test_file_of_format_1_means_the_same_in_format_2_but_for_an_estimator_that_it_leaves_out() -> None:
-    one, two = (parse(SOUND.replace("format = 1", f"format = {n}").encode(), "small") for n in (1, 2))
-    assert (one.scene.velocity, two.scene.velocity) == (Ewma(), Kalman())
-    scene = one.scene.model_copy(update={"velocity": Kalman()})
-    assert one.model_copy(update={"format": 2, "scene": scene}) == two
 
 
 def bare(name: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:

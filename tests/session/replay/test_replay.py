@@ -16,7 +16,6 @@ from study_app.haptics.model.force_rules import FORCE_RULES, VERSIONS
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, LIMITER_SLOPE
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
-from study_app.protocol import formats
 from study_app.session import replay as replay_module
 from study_app.session.replay import Replayed, replay
 from study_app.session.simulated.rehearsal import rehearse
@@ -140,7 +139,7 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
 ) -> None:
     """Replay uses the recorded effects where this program would choose others, and the recorded estimator."""
     file = short.write(tmp_path)
-    text = file.read_text(encoding="utf-8").replace("format = 1", "format = 2", 1)
+    text = file.read_text(encoding="utf-8")
     file.write_text(
         re.sub(r"^effects = \[.*?\]", 'effects = "auto"', text, flags=re.MULTILINE), encoding="utf-8", newline="\n"
     )
@@ -150,7 +149,7 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
         "kind": "kalman"
     }
     monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
-    monkeypatch.setattr(formats, "ESTIMATOR", "ewma")
+    monkeypatch.setattr("study_app.protocol.formats.ESTIMATOR", "ewma")
     comes_out(place, 4)
     monkeypatch.setattr(replay_module, "recorded_protocol", lambda protocol, _receipt, _key: protocol)
     assert replay(place).differences

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 
 def held(folder: Path, codes: str) -> Path:
-    text = source_bytes("demo").decode().replace("format = 1", "format = 2", 1)
+    text = source_bytes("demo").decode()
     study = folder / f"{codes}.toml"
     study.write_text(text.replace("[study]", f'[study]\ncodes = "{codes}"', 1), encoding="utf-8", newline="\n")
     return rehearse_answers(study, participants=PEOPLE, seed=3, results=folder / codes, features=made_up("demo"))

@@ -129,7 +129,6 @@ EFFECT = Effect(
     bound_n=_bound_n,
     exerted_n=_exerted_n,
     extent="area",
-    format=2,
     bars=lambda extremes: (_REPLACES, "non-Newtonian drag instead: the liquid has the parameters of a flow curve"),
     note=lambda liquid: f"; {liquid.non_newtonian.kind}, {_NOT_MODELLED}",
     model=laws.Rheology,

@@ -93,7 +93,6 @@ EFFECT = Effect(
     bit=BIT,
     bound_n=_bound_n,
     exerted_n=_bound_n,
-    format=2,
     bars=_bars,
     excludes=(*(it.name for it in _IN_PLACE_OF), "wake", "local_wake"),
     problem=_problem,

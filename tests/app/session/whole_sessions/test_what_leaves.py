@@ -131,7 +131,6 @@ def test_what_was_typed_leaves_only_where_it_must(
 ) -> None:
     text = Path(short_demo).read_text("utf-8")
     edits = (
-        ("format = 1", "format = 2"),
         ('title = "A first look"', 'title = "zq_title"'),
         ('description = "', 'credits.authors = ["zq_author"]\ndescription = "zq_description '),
         ('"delays", "thanks"]', '"delays", "last", "thanks"]'),

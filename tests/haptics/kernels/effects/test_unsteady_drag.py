@@ -185,9 +185,9 @@ def test_under_a_surface_drag_goes_by_the_area_and_inertia_by_the_volume():
     velocity[1:, 0] = 0.3
     motion = moving(velocity)
     motion.position_m[:, 1] = shallow_m - np.array([0.034, 0.0, 0.0])
-    part = vectors(simulate(scene(pool, knee=UNBENT, format=2), motion), "force")
+    part = vectors(simulate(scene(pool, knee=UNBENT), motion), "force")
     motion.position_m[:, 1] = 0.0
-    deep = vectors(simulate(scene(whole, knee=UNBENT, format=2), motion), "force")
+    deep = vectors(simulate(scene(whole, knee=UNBENT), motion), "force")
     stokes_n = 3 * np.pi * 1.41 * 0.068 * 0.3
     area, volume = (np.arccos(0.5) - 0.5 * np.sqrt(0.75)) / np.pi, 0.25 * 0.5**2 * 2.5
     inertial_n = -deep[1, 0] - stokes_n

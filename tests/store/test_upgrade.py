@@ -1,0 +1,87 @@
+"""Study and liquid files of format 1 are rewritten with the same meaning, and nothing is lost."""
+
+from pathlib import Path
+
+import pytest
+
+from study_app.errors import ProtocolError, StoreError
+from study_app.haptics.model.estimators import Ewma
+from study_app.protocol.load import load, load_scene, parse
+from study_app.protocol.source.files import shipped_file
+from study_app.store.upgrade import upgrade
+
+RELEASES = Path(__file__).parent / "releases"
+LIQUID = "[liquids.honey] # the only one\ndensity_kg_m3 = 1420\nviscosity_pa_s = 10\neffects = 'auto'\n"
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8", newline="")
+    return path
+
+
+@pytest.mark.parametrize(("version", "name"), [("0.1", "rek2024"), ("0.2", "demo")])
+def test_a_released_study_means_what_its_shipped_successor_does(version: str, name: str, tmp_path: Path) -> None:
+    original = (RELEASES / version / f"{name}.toml").read_bytes()
+    file = tmp_path / f"{name}.toml"
+    file.write_bytes(original)
+    with pytest.raises(ProtocolError, match=r"format: is 1, .*run liquid-study upgrade FILE"):
+        load(file)
+    assert upgrade(tmp_path) == [file]
+    assert file.with_name(f"{name}.toml.format-1").read_bytes() == original
+    assert load(file) == load(name)
+    assert load(file).scene.velocity == Ewma()
+    assert upgrade(tmp_path) == []
+
+
+@pytest.mark.parametrize("line_end", ["\n", "\r\n"])
+@pytest.mark.parametrize("scene", ["", "[scene]\nscale = 3\n", "[scene.accuracy] # few\nrelative = 0.1\n"])
+@pytest.mark.parametrize("head", ["", "format = 1 # the first\n"])
+def test_defaults_of_format_1_are_stated_and_comments_stay(
+    head: str, scene: str, line_end: str, tmp_path: Path
+) -> None:
+    text = (head + scene + LIQUID).replace("\n", line_end)
+    file = written(tmp_path / "honey.toml", text)
+    upgrade(file)
+    honey = load_scene(file, "honey")
+    assert (honey.velocity, honey.accuracy.without) == (Ewma(), ("unsteady_drag",))
+    lines = file.read_bytes().decode().split(line_end)
+    kept = [line for line in text.split(line_end) if line and not line.startswith("format")]
+    assert [line for line in lines if line in kept] == kept
+    assert [line for line in lines if line.startswith("format")] == ["format = 2 # the first" if head else "format = 2"]
+
+
+def test_a_study_excludes_unsteady_drag_for_its_liquid_files(tmp_path: Path) -> None:
+    study = shipped_file("demo").read_text("utf-8").replace("format = 2", "format = 1")
+    before, thick, after = study.partition("[liquids.thick]\n")
+    rest = after[after.index("\n# ---") :]
+    file = written(tmp_path / "mine.toml", f'{before}{thick}file = "honey.toml"\n{rest}')
+    liquid = written(tmp_path / "honey.toml", LIQUID)
+    assert upgrade(tmp_path) == [liquid, file]
+    assert load(file).scene.accuracy.without == ("unsteady_drag",)
+    assert load(file).liquids["thick"].density_kg_m3 == 1420
+
+
+@pytest.mark.parametrize(
+    ("scene", "place"), [("scene = { scale = 3 }\n", "scene"), ("[scene]\naccuracy = { relative = 0.1 }\n", "scene")]
+)
+def test_an_inline_table_is_refused_and_nothing_is_written(scene: str, place: str, tmp_path: Path) -> None:
+    other = written(tmp_path / "a.toml", LIQUID)
+    file = written(tmp_path / "b.toml", scene + LIQUID)
+    with pytest.raises(ProtocolError, match=f"{place}: is an inline table, which cannot be upgraded"):
+        upgrade(tmp_path)
+    assert (other.read_text("utf-8"), file.read_text("utf-8")) == (LIQUID, scene + LIQUID)
+    assert sorted(tmp_path.iterdir()) == [other, file]
+
+
+def test_another_file_with_the_name_of_the_copy_is_kept(tmp_path: Path) -> None:
+    file, other = written(tmp_path / "a.toml", LIQUID), written(tmp_path / "a.toml.format-1", "mine")
+    with pytest.raises(StoreError, match=r"a\.toml\.format-1 is not a copy of a\.toml"):
+        upgrade(file)
+    assert (file.read_text("utf-8"), other.read_text("utf-8")) == (LIQUID, "mine")
+
+
+def test_other_files_are_left_alone(tmp_path: Path) -> None:
+    written(tmp_path / "pyproject.toml", "[project]\nname = 'x'\n")
+    written(tmp_path / "new.toml", f"format = 2\n{LIQUID}")
+    assert upgrade(tmp_path) == []
+    assert parse(shipped_file("thickness").read_bytes(), "thickness").format == 2
