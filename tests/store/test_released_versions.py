@@ -109,6 +109,19 @@ def test_an_unfinished_session_is_resumed_to_its_end(tmp_path: Path) -> None:
     assert verify_study(folder.path).errors == ()
 
 
+@needs_servo
+def test_a_new_session_of_the_upgraded_study_joins_the_earlier_ones(tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(RELEASES / "0.1" / "rek2024", tmp_path / "rek2024"))
+    file = upgraded(RELEASES / "0.1" / "rek2024.toml", tmp_path)
+    rehearsal.finish_session(file, "P003", seed=1, device="scripted", results=folder)
+    assert verify_study(folder).errors == ()
+    export(folder, tmp_path / "tables")
+    (path,) = (tmp_path / "tables").glob("*responses_data.csv")
+    answers = pd.read_csv(path, dtype=str)
+    counts = answers[answers["response"].notna()].groupby("participant").size()
+    assert counts["P001"] == counts["P003"] == 62
+
+
 HELD = Path(__file__).parent / "releases" / "0.1"
 ENDED = "data/sub-P001/ses-01"
 KILLED = "data/sub-P002/ses-01"

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -22,6 +22,7 @@ from study_app.analysis.data.blocks import (
     other_questions,
 )
 from study_app.errors import AnalysisError, StoreError
+from study_app.protocol.questions import STATEMENT
 from study_app.protocol.table import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
@@ -256,10 +257,18 @@ def _masking(answer: Mapping[str, Any] | None) -> str | None:
 def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
     """Read table ``name`` of sessions with the same questionnaire, with rows in session order.
 
-    The columns ``session_status`` and ``trials_missing`` are added.
+    The columns ``session_status`` and ``trials_missing`` are added. Tables of format 1, which have answers to
+    statements alone, are read with the columns of later sessions if a study has both.
     """
     paths = [session.folder.table(session.study, name) for session in sessions]
-    table, lengths = tables(paths, tables_of(sessions[0].protocol_format)[name])
+    formats = {session.protocol_format for session in sessions}
+    columns = tables_of(max(formats))[name]
+    if len(formats) > 1:
+        columns = tuple(replace(column, later=True, may_miss=True) for column in columns)
+    table, lengths = tables(paths, columns)
+    if len(formats) > 1 and name == "responses":
+        value = table["value"].where(table["kind"].notna(), pd.to_numeric(table["response"], errors="coerce"))
+        table = table.assign(kind=table["kind"].fillna(STATEMENT), value=value)
     _check_own(sessions, paths, table, lengths)
     if name == "responses":
         _check_answers(sessions, paths, table, lengths)

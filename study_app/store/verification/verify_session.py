@@ -21,6 +21,7 @@ from typing import Any
 import study_app
 from study_app.errors import PlugInError, StoreError
 from study_app.number_text import counted
+from study_app.protocol.upgrade import needs_upgrade
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporary_files
 from study_app.store.blinded.blinding import Key, complete_protocol, open_events, opened_key
@@ -333,11 +334,12 @@ def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key
     """Return whether a receipt's protocol, completed from the key, is valid and as this version writes it."""
     try:
         whole = receipt.without_conditions(complete_protocol(held["protocol"], key))
+        is_earlier = start.version != study_app.__version__ or needs_upgrade(held["protocol"])
     except PlugInError:  # the plug-in is missing; `verify` reports it
         return True
     except (KeyError, TypeError, AttributeError, ValueError):
         return False
-    return start.version != study_app.__version__ or parse_json(json.dumps(whole)) == held["protocol"]
+    return is_earlier or parse_json(json.dumps(whole)) == held["protocol"]
 
 
 def _unconfirmed_answers(lines: Sequence[events.Event]) -> Iterator[str]:
