@@ -46,6 +46,7 @@ from study_app.store.journals import journal_events as events
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import rebuild_session, reopen_store
 from study_app.store.sites.merge import merge_sites
+from study_app.store.upgrade import upgrade
 from study_app.store.verification.proofs import write_proof
 from study_app.store.verification.verify_study import verify_study
 from study_app.workspace import Workspace
@@ -305,6 +306,14 @@ WRITERS: Final = {
     ),
     "session": Writer(hold_session, remedy="rebuild"),
 }
+
+
+def upgrade_liquid(folder: Path) -> None:
+    """Upgrade a liquid file of format 1."""
+    (folder / "liquid.toml").write_text("[liquids.water]\ndensity_kg_m3 = 1000\n", encoding="utf-8", newline="\n")
+    upgrade(folder / "liquid.toml")
+
+
 OTHERS: Final = {
     "edits": Writer(
         save_edits, lambda folder: (folder / "edited.toml").write_text("[study]", encoding="utf-8", newline="\n")
@@ -317,6 +326,7 @@ OTHERS: Final = {
     "session of a group": Writer(hold_grouped_session),
     "simulated sessions": Writer(rehearse),
     "proof": Writer(keep_proof),
+    "upgrade": Writer(upgrade_liquid),
 }
 """Further writers, of which it is only recorded which functions change the disk."""
 

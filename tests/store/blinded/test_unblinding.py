@@ -10,7 +10,7 @@ from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import unblinding as module
 from study_app.store.blinded.blinding import open_events, open_or_draw_key, reveal
 from study_app.store.checksums import replace_checksums
-from study_app.store.columns import SEALED, TRIALS
+from study_app.store.columns import SEALED, TRIALS_2
 from study_app.store.csv_files import csv_bytes, header, read_table, unsealed_columns
 from study_app.store.folders import REBUILT, StudyFolder
 from study_app.store.journals import journal, journal_events
@@ -42,7 +42,7 @@ def sound(folder: Path) -> bool:
 def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, finished: Start) -> None:
     store = finished()
     folder = tmp_path / "study"
-    assert names(store.folder.table("brackish", "trials")) == set(header(unsealed_columns(TRIALS)))
+    assert names(store.folder.table("brackish", "trials")) == set(header(unsealed_columns(TRIALS_2)))
     for path in folder.rglob("*.*"):
         if path.is_file():
             held = path.read_bytes()
@@ -79,7 +79,7 @@ def test_unblinding_gives_what_an_open_study_would_have_held(
     assert set(found.codes) == {"practice", "liquids", "delays"}
     assert tables_in(folders[1]) == before
     assert b",0.9," in before["data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv"]
-    assert b",invalid\n" in before["data/study-brackish_description-participants_data.csv"]
+    assert b",invalid,n/a\n" in before["data/study-brackish_description-participants_data.csv"]
     description, ours = (StudyFolder(folder).description.read_bytes() for folder in folders)
     assert ours == description
     assert sound(folders[0])
@@ -156,7 +156,7 @@ def in_clear(store: SessionStore, study: StudyHead) -> None:
 
     forge(store.folder.journal, clear)
     cover_up(store.place.study_folder.path)
-    store.place.study_folder.description.write_bytes(description_bytes(study, sealed=False))
+    store.place.study_folder.description.write_bytes(description_bytes(study, sealed=False, protocol_format=2))
 
 
 @pytest.mark.slow
@@ -166,7 +166,7 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     store = finished()
     in_clear(store, protocol.study)
     folder = tmp_path / "study"
-    assert names(store.folder.table("brackish", "trials")) == set(header(TRIALS))
+    assert names(store.folder.table("brackish", "trials")) == set(header(TRIALS_2))
     assert sound(folder)
     assert rebuild_session(store.folder.path).rewritten == ()
     later = finished("P008")
@@ -175,14 +175,14 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     held = store.folder.table("brackish", "trials").read_bytes()
     assert unblind(folder, "AB", "done").left == ()
     assert store.folder.table("brackish", "trials").read_bytes() == held
-    assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS))
+    assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS_2))
     assert sound(folder)
 
 
 def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(finished: Start) -> None:
     store = finished()
     folder, path = store.place.study_folder.path, store.folder.table(store.place.study, "trials")
-    earlier = tuple(column for column in unsealed_columns(TRIALS) if column.name != "recording_lost")
+    earlier = tuple(column for column in unsealed_columns(TRIALS_2) if column.name != "recording_lost")
     sealed = path.read_bytes()
     path.write_bytes(csv_bytes(earlier, read_table(sealed, earlier)))
     replace_checksums(
@@ -190,5 +190,5 @@ def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_
     )
     for _ in range(2):
         assert unblind(folder, by="AB", reason="a test").left == ()
-        assert names(path) == set(header(TRIALS)) - {"recording_lost"}
+        assert names(path) == set(header(TRIALS_2)) - {"recording_lost"}
     assert verify_study(folder).errors == ()
