@@ -12,7 +12,7 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from study_app.store.columns import RESPONSES, TRIALS
+from study_app.store.columns import RESPONSES_2, TRIALS
 from study_app.store.csv_files import csv_bytes, read_table, table_problems
 from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
@@ -147,24 +147,27 @@ def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        (",immersive,2,4,", ",immersive,2,8,", "column response: '8' is not a whole number from 1 to 7 or n/a"),
-        (",immersive,2,4,", ",immersive,2,good,", "column response: 'good'"),
-        (",immersive,2,4,", ",immersive,2, 4,", "column response: ' 4'"),
-        (",immersive,2,4,", ",immersive,2,4_0,", "column response: '4_0'"),
-        (",immersive,2,4,", f",immersive,{'9' * 20},4,", f"column number: '{'9' * 20}' is not a whole number"),
+        (",immersive,statement,2,4,4,", ",immersive,statement,2,4,good,", "column value: 'good'"),
+        (",immersive,statement,2,4,4,", ",immersive,statement,2,4, 4,", "column value: ' 4'"),
+        (",immersive,statement,2,4,4,", ",immersive,statement,2,4,4_0,", "column value: '4_0'"),
+        (
+            ",immersive,statement,2,4,4,",
+            f",immersive,statement,{'9' * 20},4,4,",
+            f"column number: '{'9' * 20}' is not a whole number",
+        ),
         (",12.25,", ",-5,", "column first_choice_s: '-5' is not a number of at least 0 or n/a"),
         (",12.25,", ",nan,", "column first_choice_s: 'nan' is not"),
         (",12.25,", ",1e999,", "column first_choice_s: '1e999' is not"),
         ("2026-01-05T", "٢٠٢٦-01-05T", "column answered_at: '٢٠٢٦-01-05T10:00:00.000+01:00' is not a time with zone"),
         ("2026-01-05T10:00:00.000+01:00", "yesterday", "column answered_at: 'yesterday' is not a time with zone"),
-        (",false,false,2,", ",maybe,false,2,", "column simulated: 'maybe' is not true or false"),
-        (",false,false,2,", ",False,false,2,", "column simulated: 'False' is not true or false"),
+        (",false,false,n/a,", ",maybe,false,n/a,", "column simulated: 'maybe' is not true or false"),
+        (",false,false,n/a,", ",False,false,n/a,", "column simulated: 'False' is not true or false"),
         (",main,", ",mian,", "column phase: 'mian' is not one of main, practice, baseline"),
-        (",immersive,2,4,", ",immersive,", "cells, not"),
-        (",immersive,2,4,", ",immersive,2,4,,", "cells, not"),
-        (",immersive,2,4,", "\n,immersive,2,4,", "cells, not"),
-        (",immersive,2,4,", ',"immersive"x,2,4,', "is not CSV in UTF-8"),
-        (",immersive,2,4,", ",imersive,2,4,", "does not contain statement 'imersive'"),
+        (",immersive,statement,2,4,4,", ",immersive,", "cells, not"),
+        (",immersive,statement,2,4,4,", ",immersive,statement,2,4,4,,", "cells, not"),
+        (",immersive,statement,2,4,4,", "\n,immersive,statement,2,4,4,", "cells, not"),
+        (",immersive,statement,2,4,4,", ',"immersive"x,statement,2,4,4,', "is not CSV in UTF-8"),
+        (",immersive,statement,2,4,4,", ",imersive,statement,2,4,4,", "does not contain statement 'imersive'"),
         (",L1,immersive,", ",L9,immersive,", "for code 'L9'"),
         (",L1,immersive,", ",L1,feels_liquid,", "occurs twice"),
         ("study,participant", "study,person", "does not begin with the columns"),
@@ -183,7 +186,7 @@ def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: 
     assert str(path) in message
     found = re.search(r"(row \d+), column (\w+: '.*?' is .*?);", message)
     if found:  # `verify` refuses the same cell in the same row
-        assert list(table_problems(path.read_bytes(), RESPONSES)) == [", ".join(found.groups())]
+        assert list(table_problems(path.read_bytes(), RESPONSES_2)) == [", ".join(found.groups())]
 
 
 def test_quotes_change_nothing(real: Results) -> None:
