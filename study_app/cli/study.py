@@ -91,9 +91,10 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
 @click.command()
 @click.argument("path", metavar="PATH", type=click.Path(path_type=Path, exists=True))
 def upgrade(path: Path) -> None:
-    """Rewrite a study or liquid file of an earlier format, or all files in a folder, in the current format.
+    """Write study files, liquid files and results of earlier versions in the current format.
 
-    Forces and order of trials stay the same. The original is kept next to the file, as NAME.toml.format-1.
+    PATH is a file or a folder. Forces and order of trials stay the same; the original of a file is kept next to it, as
+    NAME.toml.format-1. Results get tables with the current columns; journals and receipts are not changed.
     """
     from study_app.store.upgrade import upgrade as upgrade_files
 

@@ -4,8 +4,8 @@
 ``columns`` what a table has; read these first. ``sessions`` begins, reopens and rebuilds a session, ``progress``
 computes how far one is, ``verification`` proves that files were not changed, ``blinded`` controls the conditions.
 
-Reading order: atomic, delivered, folders, missing_trials, program_log; csv_files, output_files, upgrade, workstation;
+Reading order: atomic, delivered, folders, missing_trials, program_log; csv_files, output_files, workstation;
 columns; journals; checksums, progress, receipt; blinded, folder_lock, support; exclusions, recordings,
 study_versions; drafts, merged, recorder, study_settings; study_runs, tables; withdrawals; sessions, sites;
-unblinding, verification.
+unblinding, upgrade, verification.
 """

@@ -67,7 +67,12 @@ PARTICIPANTS: tuple[Column, ...] = (
     optional("device", "text", "The haptic device."),
     Column("language", "text", "Language of the participant's pages."),
     Column("trials", "integer", "Number of completed main trials.", minimum=0),
-    Column("responses", "integer", "Number of answers in main trials, including answers off the scale.", minimum=0),
+    Column(
+        "responses",
+        "integer",
+        "Number of answers in main trials and forms, including answers off the scale.",
+        minimum=0,
+    ),
     optional(
         "validity",
         "text",
@@ -80,21 +85,10 @@ TRIALS_MISSING = optional(
     "integer",
     "Number of main trials that were not answered because no presentation was delivered within the protocol's limits.",
     minimum=0,
-    later=True,
 )
 """A column of sessions in a study with trials of intervals."""
 _INCOMPLETE = ("incomplete", "it reached its last page, but more trials are missing than the study permits")
-GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True, later=True)
-PARTICIPANTS_2: tuple[Column, ...] = (
-    *(
-        replace(column, description="Number of answers in main trials and forms, including answers off the scale.")
-        if column.name == "responses"
-        else column
-        for column in PARTICIPANTS
-    ),
-    GROUP,
-)
-"""Columns of sessions in a study whose protocol has format 2."""
+GROUP = optional("group", "text", "The participant's group; n/a in a study without groups.", sealed=True)
 
 
 def with_missing_trials(columns: tuple[Column, ...]) -> tuple[Column, ...]:
@@ -113,7 +107,7 @@ EXCLUSIONS: tuple[Column, ...] = (
     Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person."),
     Column("reason", "text", "Reason for the exclusion."),
     Column("excluded_at", "time", "Time of the decision."),
-    optional("key_open", "flag", "Whether the study's key was open at the decision.", later=True),
+    optional("key_open", "flag", "Whether the study's key was open at the decision."),
 )
 
 
@@ -122,7 +116,7 @@ def _measure(name: str, description: str, unit: str = "", **more: Any) -> Column
 
 
 def _signed(name: str, description: str, unit: str = "", **more: Any) -> Column:
-    return optional(name, "number", description, unit=unit, sealed=True, later=True, **more)
+    return optional(name, "number", description, unit=unit, sealed=True, **more)
 
 
 def _count(name: str, description: str, **more: Any) -> Column:
@@ -136,17 +130,20 @@ def _delay_error(name: str, which: str, of_trial: Literal["sum", "max", "mean"])
 
 RESPONSES: tuple[Column, ...] = (
     *_SESSION_COLUMNS,
-    *_TRIAL_COLUMNS,
-    CODE,
-    Column("item", "text", "ID of the statement; its text is in the session's receipt."),
-    Column("number", "integer", "Position of the statement on its page, from 1.", minimum=1),
+    optional("form", "text", "ID of the questionnaire that was presented on its own; n/a after a trial."),
+    optional(
+        "after_block", "text", "Block after which the form was shown; n/a before the first block and after a trial."
+    ),
+    *(replace(column, may_miss=True) for column in (*_TRIAL_COLUMNS, CODE)),
+    Column("item", "text", "ID of the question; its text is in the session's receipt."),
+    Column("kind", "text", f"Kind of the question: {', '.join(KINDS.own)}."),
+    Column("number", "integer", "Position of the question on its page as shown, from 1.", minimum=1),
     optional(
         "response",
-        "integer",
-        "The answer on the scale, from 1 (completely disagree) to 7 (completely agree).",
-        minimum=1,
-        maximum=7,
+        "text",
+        "The answer: a point of the scale, a number, the ID of an option (several are separated by spaces), or a text.",
     ),
+    optional("value", "number", "The answer as a number, if it is a number."),
     Column("cannot_judge", "flag", "true if the participant chose the answer off the scale."),
     _measure("onset_s", "Time at which the statement was shown, on the session's clock.", "s"),
     _measure("first_choice_s", "Time at which an answer was first chosen, on the session's clock.", "s"),
@@ -156,35 +153,7 @@ RESPONSES: tuple[Column, ...] = (
 )
 
 
-_RESPONSES_BY_NAME = {column.name: column for column in RESPONSES}
-
-
-RESPONSES_2: tuple[Column, ...] = (
-    *_SESSION_COLUMNS,
-    optional("form", "text", "ID of the questionnaire that was presented on its own; n/a after a trial."),
-    optional(
-        "after_block",
-        "text",
-        ("Block after which the form was shown; n/a before the first block and after a trial."),
-        later=True,
-    ),
-    *(replace(column, may_miss=True) for column in (*_TRIAL_COLUMNS, CODE)),
-    replace(_RESPONSES_BY_NAME["item"], description="ID of the question; its text is in the session's receipt."),
-    Column("kind", "text", f"Kind of the question: {', '.join(KINDS.own)}."),
-    replace(_RESPONSES_BY_NAME["number"], description="Position of the question on its page as shown, from 1."),
-    optional(
-        "response",
-        "text",
-        "The answer: a point of the scale, a number, the ID of an option (several are separated by spaces), or a text.",
-    ),
-    optional("value", "number", "The answer as a number, if it is a number."),
-    *(_RESPONSES_BY_NAME[name] for name in ("cannot_judge", "onset_s", "first_choice_s", "last_change_s", "changes")),
-    _RESPONSES_BY_NAME["answered_at"],
-)
-"""Responses of a study of format 2."""
-
-
-TRIALS: tuple[Column, ...] = (
+_TRIALS: tuple[Column, ...] = (
     *_SESSION_COLUMNS,
     *_TRIAL_COLUMNS,
     Column("of", "integer", "Number of trials in the block.", minimum=1),
@@ -223,7 +192,6 @@ TRIALS: tuple[Column, ...] = (
         "withheld_share",
         "Proportion of the force that limits, passivity controller and device held back during the task; 0.05 is 5 %.",
         sealed=True,
-        later=True,
         of_trial="mean",
     ),
     _measure(
@@ -234,23 +202,16 @@ TRIALS: tuple[Column, ...] = (
             "N."
         ),
         sealed=True,
-        later=True,
         of_trial="mean",
     ),
     _count(
         "loop_delay_ticks",
         "Largest number of ticks during the task from a command of the servo until its force acts.",
-        later=True,
         of_trial="max",
     ),
-    _count("loop_delay_changes", "How often that delay changed during the task.", later=True),
+    _count("loop_delay_changes", "How often that delay changed during the task."),
     *(
-        _count(
-            f"limiter_{limiter.name}",
-            f"Ticks of the servo in which {limiter.meaning}.",
-            sealed=True,
-            later=limiter.later,
-        )
+        _count(f"limiter_{limiter.name}", f"Ticks of the servo in which {limiter.meaning}.", sealed=True)
         for limiter in sorted(LIMITERS)
     ),
     _count("frames", "Frames shown to the participant.", sealed=True),
@@ -262,7 +223,6 @@ TRIALS: tuple[Column, ...] = (
         "first_frame_gap_ms",
         "Time from the start of the trial to its first painted frame, when force and task begin.",
         "ms",
-        later=True,
         of_trial="max",
     ),
     _measure(
@@ -284,10 +244,7 @@ TRIALS: tuple[Column, ...] = (
     _count("samples_recorded", "Number of samples in the recording; n/a until unblinding."),
     _count("samples_unrecorded", "Number of samples missing from the recording because the disk was too slow."),
     optional(
-        "recording_lost",
-        "text",
-        "Reason why the recording could not be stored; n/a if it was stored or not requested.",
-        later=True,
+        "recording_lost", "text", "Reason why the recording could not be stored; n/a if it was stored or not requested."
     ),
     Column("marked", "flag", "true if the operator marked the trial."),
     optional(
@@ -299,13 +256,7 @@ TRIALS: tuple[Column, ...] = (
 )
 
 
-_TRIALS_BY_NAME = {
-    column.name: replace(column, levels=(*column.levels, _INVALID)) if column.name == "outcome" else column
-    for column in TRIALS
-}
-
-
-_OUTCOME = [column.name for column in TRIALS].index("outcome")
+_OUTCOME = [column.name for column in _TRIALS].index("outcome")
 
 
 DELIVERED: tuple[Column, ...] = (
@@ -320,25 +271,19 @@ DELIVERED: tuple[Column, ...] = (
         "Proportion of the model's force that was sent to the hand, after the lead and any lag; 1 is all of it.",
     ),
     _signed("apparent_mass_kg", "Apparent mass of the fitted force, in addition to its damping.", "kg"),
-    _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True, later=True),
+    _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True),
     _signed("setting", "The level that the participant set; n/a in intervals that were not adjusted."),
 )
 """Columns of the stimulus that each interval delivered."""
 
 
 VIDEO: tuple[Column, ...] = (
-    _count("video_frames", "Frames of the video that were shown; n/a without a video.", sealed=True, later=True),
+    _count("video_frames", "Frames of the video that were shown; n/a without a video.", sealed=True),
     _count(
-        "video_frames_late",
-        "Frames of the video shown more than one of its frames later than requested.",
-        sealed=True,
-        later=True,
+        "video_frames_late", "Frames of the video shown more than one of its frames later than requested.", sealed=True
     ),
     _count(
-        "video_frames_lost",
-        "Number of video frames skipped between the first and the last frame shown.",
-        sealed=True,
-        later=True,
+        "video_frames_lost", "Number of video frames skipped between the first and the last frame shown.", sealed=True
     ),
     _signed(
         "video_delay_error_max_ms",
@@ -358,7 +303,7 @@ VIDEO: tuple[Column, ...] = (
 
 
 INTERVALS: tuple[Column, ...] = (
-    *(column for column in TRIALS[: TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
+    *(column for column in _TRIALS[: _TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
     Column("interval", "integer", "Number of the interval in the trial, from 1.", minimum=1),
     Column("interval_started_s", "number", "When the interval began, on the session's clock.", unit="s", minimum=0),
     _measure("gap_s", "Time from the end of the previous interval to the start of this one; n/a for the first.", "s"),
@@ -371,57 +316,40 @@ INTERVALS: tuple[Column, ...] = (
     ),
     optional("standard", "number", "The trial's standard, in the unit of the varied number.", sealed=True),
     optional("level", "number", f"The trial's level: {_LEVEL}.", sealed=True),
-    optional("catch", "flag", "true in a catch trial, which presents the largest level.", sealed=True, later=True),
+    optional("catch", "flag", "true in a catch trial, which presents the largest level.", sealed=True),
     optional(
         "invalid_reasons",
         "text",
         "Keys of the protocol's limits that the interval violates, separated by spaces; n/a if it was delivered as "
         "requested.",
-        later=True,
     ),
     *DELIVERED,
-    *(column for column in TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
+    *(column for column in _TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
     *VIDEO,
 )
 """Intervals of the trials of a study with designs."""
 
 
-TRIALS_2: tuple[Column, ...] = (
-    *_TRIALS_BY_NAME.values(),
+TRIALS: tuple[Column, ...] = (
+    *(replace(column, levels=(*column.levels, _INVALID)) if column.name == "outcome" else column for column in _TRIALS),
     *VIDEO,
-    _count(
-        "intervals",
-        "Number of intervals that this attempt presented; n/a if its block does not have a design.",
-        later=True,
-    ),
+    _count("intervals", "Number of intervals that this attempt presented; n/a if its block does not have a design."),
     GROUP,
 )
-"""Columns of trials in a study whose protocol has format 2."""
 
 
-TABLES: dict[str, tuple[Column, ...]] = {"responses": RESPONSES, "trials": TRIALS, "participants": PARTICIPANTS}
+_TABLES = {"responses": RESPONSES, "trials": TRIALS, "intervals": INTERVALS, "participants": (*PARTICIPANTS, GROUP)}
 
 
-def tables_of(protocol_format: int) -> dict[str, tuple[Column, ...]]:
-    """Return the tables of a study by name, for this format of its protocol."""
-    if protocol_format < 2:
-        return TABLES
-    return {"responses": RESPONSES_2, "trials": TRIALS_2, "intervals": INTERVALS, "participants": PARTICIPANTS_2}
-
-
-LATER = frozenset(column.name for column in (*RESPONSES_2, *TRIALS_2, *INTERVALS, TRIALS_MISSING) if column.later)
-"""Columns that earlier versions did not write."""
-
-
-SEALED = frozenset(column.name for column in (*TRIALS_2, *DELIVERED) if column.sealed)
+SEALED = frozenset(column.name for column in (*TRIALS, *DELIVERED) if column.sealed)
 """Columns of a trial that no table has before the key was opened (see ``blinding``)."""
 
 
-def every_column(protocol_format: int = 1, *, intervals: bool = False) -> tuple[Column, ...]:
+def every_column(*, intervals: bool = False) -> tuple[Column, ...]:
     """Return every column of all tables once, in order of use; ``intervals`` adds those of studies with designs."""
-    tables = tables_of(protocol_format)
+    tables = dict(_TABLES)
     if intervals:
-        tables = tables | {"participants": with_missing_trials(tables["participants"])}
+        tables["participants"] = with_missing_trials(tables["participants"])
     by_name: dict[str, Column] = {}
     for name, columns in tables.items():
         for column in columns if name != "intervals" or intervals else ():

@@ -65,9 +65,8 @@ class Column:
 
     ``kind``: flags are ``true`` or ``false``, times ISO 8601 with zone. ``levels`` are all permitted values, if they
     are few, each with its meaning. With ``may_miss``, a cell can be ``n/a``. A ``sealed`` column can reveal the
-    condition: no table has it before the study's key is opened. Earlier versions did not write a ``later`` column: a
-    table without it is read as if it contained ``n/a``. For a trial of intervals ``of_trial`` is the sum, maximum or
-    mean of its intervals.
+    condition: no table has it before the study's key is opened. For a trial of intervals ``of_trial`` is the sum,
+    maximum or mean of its intervals.
     """
 
     name: str
@@ -80,7 +79,6 @@ class Column:
     maximum: float | None = None
     may_miss: bool = False
     sealed: bool = False
-    later: bool = False
     of_trial: Literal["sum", "max", "mean"] = "sum"
 
     def value(self, cell: str) -> Any:
@@ -166,10 +164,6 @@ def _quote_cell(text: str) -> str:
     return text
 
 
-def _lines(rows: Iterable[Iterable[str]]) -> bytes:
-    return "".join(f"{','.join(map(_quote_cell, row))}\n" for row in rows).encode()
-
-
 def read_cells(table: bytes) -> list[list[str]]:
     """Return the records of a table as texts, the header first.
 
@@ -224,21 +218,21 @@ def table_problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
                 break
 
 
-def align_columns(held: bytes, table: bytes, columns: Sequence[Column]) -> tuple[bytes, tuple[Column, ...]]:
-    """Return ``table`` limited to the columns that the existing table ``held`` must have, and these columns.
+def has_same_cells(held: bytes, table: bytes) -> bool:
+    """Return whether ``table`` has the columns of the table ``held`` with the same cells.
 
-    ``held`` may lack later columns, which its version did not write, and ``table`` the sealed ones. If ``held`` has the
-    same texts without apostrophes, as earlier versions wrote them, ``held`` is returned.
+    Cells that a spreadsheet would evaluate may lack the apostrophe of `guard_formula`, as in tables of 0.1.
     """
-    names, ours = (content.partition(b"\n")[0].decode("utf-8", "replace").split(",") for content in (held, table))
-    present = tuple(column for column in columns if column.name in ours)
-    kept = tuple(column for column in present if column.name in names or not column.later)
-    if kept != present:
-        places = [ours.index(column.name) for column in kept]
-        table = _lines([row[place] for place in places] for row in read_cells(table))
-    if b"'" in table and held == _lines(map(unguard_formula, row) for row in read_cells(table)):
-        return held, kept
-    return table, kept
+    try:
+        (held_names, *held_rows), (names, *rows) = read_cells(held), read_cells(table)
+    except ValueError:
+        return False
+    if not set(held_names) <= set(names):
+        return False
+    places = [names.index(name) for name in held_names]
+    return [[unguard_formula(row[place]) for place in places] for row in rows] == [
+        [unguard_formula(cell) for cell in row] for row in held_rows
+    ]
 
 
 def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:

@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Final
 
 from study_app.errors import StoreError
-from study_app.protocol.model import StudyHead
 from study_app.store import receipt
 from study_app.store.atomic import (
     is_there,
@@ -36,7 +35,6 @@ from study_app.store.blinded.blinding import (
     verified_key,
 )
 from study_app.store.checksums import replace_checksums
-from study_app.store.csv_files import Column, align_columns
 from study_app.store.exclusions import (
     MISSING_RULE,
     Exclusion,
@@ -53,14 +51,7 @@ from study_app.store.journals.journal_events import Event, Recorded, SessionEnde
 from study_app.store.merged import folders_of
 from study_app.store.progress import trial_results
 from study_app.store.sessions.open_session import Place, table_files
-from study_app.store.tables.session_tables import table_columns
-from study_app.store.tables.study_files import (
-    described_study,
-    has_intervals,
-    has_sealed_columns,
-    write_description,
-    write_participants,
-)
+from study_app.store.tables.study_files import has_sealed_columns, refuse_earlier_columns, write_study_files
 
 RULE: Final = "catch"
 RULES: Final = (RULE, MISSING_RULE)
@@ -98,6 +89,7 @@ def unblind(folder: Path, by: str, reason: str, progress: ReportProgress | None 
         As for `blinding.reveal`, or another program writes to the folder; nothing has changed.
     """
     study = StudyFolder(folder)
+    refuse_earlier_columns(study)
     with lock_folder(folder) if is_there(study.key) else contextlib.nullcontext():
         codes = reveal(folder, by, reason)
         key = read_key(folder)
@@ -113,7 +105,7 @@ def unblind(folder: Path, by: str, reason: str, progress: ReportProgress | None 
             except StoreError as error:
                 left.append(f"{error}; then unblind again")
         try:
-            _open_study(study)
+            write_study_files(study)
         except StoreError as error:
             left.append(f"{error}; then unblind again")
     excluded: tuple[Exclusion, ...] = ()
@@ -261,18 +253,16 @@ def _open_tables(study: StudyFolder, session: SessionFolder, key: Key) -> list[s
 
 
 def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
-    """Write the sealed columns and open the recordings; a table gets no columns that its version did not have.
+    """Write the sealed columns and open the recordings.
 
     A table of a session without an end may be behind its journal, and is then written whole.
     """
     left: list[str] = []
     ours: dict[str, tuple[str, str]] = {}
     before, after = (dict(table_files(place, lines, reader)) for reader in (None, key))
-    for path, columns in zip(after, table_columns(lines, opened=True).values(), strict=True):
-        held = read_if_there(path) or b""
-        written = [replace(column, later=False) if column.sealed else column for column in columns]
-        sealed, content = (align_columns(held, whole[path], written)[0] for whole in (before, after))
-        if held not in (sealed, content) and not _is_behind(held, path, place, lines, key, written):
+    for path, content in after.items():
+        held, sealed = read_if_there(path) or b"", before[path]
+        if held not in (sealed, content) and not _is_behind(held, path, place, lines, key):
             left.append(
                 f"{path} differs from the journal, so it was not changed: "
                 f"rebuild it with liquid-study rebuild {place.folder.path}"
@@ -292,13 +282,13 @@ def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
     return left
 
 
-def _is_behind(held: bytes, path: Path, place: Place, lines: list[Event], key: Key, columns: Sequence[Column]) -> bool:
+def _is_behind(held: bytes, path: Path, place: Place, lines: list[Event], key: Key) -> bool:
     """Return whether a table of a session without an end begins as after some line of its journal."""
     if isinstance(lines[-1], SessionEnded):
         return False
     whole_lines = held[: held.rfind(b"\n") + 1]
     return any(
-        align_columns(held, dict(table_files(place, lines[:count], reader))[path], columns)[0].startswith(whole_lines)
+        dict(table_files(place, lines[:count], reader))[path].startswith(whole_lines)
         for count in range(len(lines), 0, -1)
         for reader in (None, key)
     )
@@ -322,19 +312,3 @@ def _open_recording(path: Path, hashes: tuple[str, str], key: Key) -> None:
         raise StoreError(f"{path} has changed since it was recorded, so it was not opened: restore it from a copy")
     if content_hash == hashes[0]:
         write_file(path, opened_content(path, content, key.nonce))
-
-
-def _open_study(study: StudyFolder) -> None:
-    """Update the participants table and the description."""
-    name = described_study(study)
-    if name is not None:
-        write_participants(study, name)
-    for session in study.sessions():
-        try:
-            protocol = receipt.read(session.receipt)["protocol"]
-            head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
-            intervals = has_intervals(protocol)
-        except (StoreError, KeyError, TypeError, ValueError):  # another receipt is used instead
-            continue
-        write_description(study, head, number, intervals=intervals)
-        return

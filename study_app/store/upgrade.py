@@ -1,21 +1,38 @@
-"""Upgrade of study and scene files of earlier formats in place; readers know only the current format."""
+"""Upgrade of study files and results of earlier versions in place; readers know only the current format.
 
+Journals and receipts are evidence and stay as they were written. Tables are functions of the journal: they are
+compared with it in the columns that they have, and are written again with the current columns.
+"""
+
+import contextlib
+import hashlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.protocol.load import read_document
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.upgrade import needs_upgrade, upgraded_file
-from study_app.store.atomic import read_regular, write_file
+from study_app.store.atomic import is_there, read_if_there, read_regular, write_file
+from study_app.store.blinded.blinding import opened_key
+from study_app.store.checksums import replace_checksums
+from study_app.store.csv_files import has_same_cells
+from study_app.store.folder_lock import is_never_begun, lock_folder
+from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.journals import journal
+from study_app.store.journals.journal_events import SessionEnded, start_of
+from study_app.store.sessions.open_session import Place, table_files
+from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
+from study_app.store.tables.study_files import has_earlier_columns, write_study_files
 
 _SECTIONS = frozenset({"study", "scene", "liquids"})
 
 
 def upgrade(path: Path) -> list[Path]:
-    """Rewrite a study or scene file of format 1, or all of them in a folder, in the current format.
+    """Write a study or scene file of format 1, or all of them and the results in a folder, in the current format.
 
-    The original is copied next to the file, as ``NAME.toml.format-1``, and the copy is compared with it first. All
-    files are read before one is written.
+    The original of a study file is copied next to it, as ``NAME.toml.format-1``, and the copy is compared with it. All
+    files are read and checked before one is written.
 
     Parameters
     ----------
@@ -32,7 +49,8 @@ def upgrade(path: Path) -> list[Path]:
     ProtocolError
         A file is not TOML, or cannot be extended (`protocol.upgrade.upgraded_file`).
     StoreError
-        A copy of another original exists, or a file cannot be written.
+        A copy of another original exists, a table differs from its journal, a session is open in another program, its
+        journal is damaged, or a file cannot be written.
     """
     files = [path] if path.is_file() else sorted(path.rglob("*.toml"))
     upgraded: dict[Path, bytes] = {}
@@ -41,11 +59,54 @@ def upgrade(path: Path) -> list[Path]:
         document, _ = read_document(source, str(file))
         if needs_upgrade(document) and _SECTIONS & document.keys():
             upgraded[file] = upgraded_file(source, str(file))
-    for file, content in upgraded.items():
-        original, copy = file.read_bytes(), file.with_name(f"{file.name}.format-1")
-        if not copy.exists():
-            write_file(copy, original)
-        if read_regular(copy) != original:
-            raise StoreError(f"{copy} is not a copy of {file.name}, which was not changed: rename it, and try again")
-        write_file(file, content)
-    return list(upgraded)
+    with contextlib.ExitStack() as locks:
+        tables = {study: list(_earlier_tables(study, locks)) for study in _earlier_studies(path)}
+        for file, content in upgraded.items():
+            original, copy = file.read_bytes(), file.with_name(f"{file.name}.format-1")
+            if not copy.exists():
+                write_file(copy, original)
+            if read_regular(copy) != original:
+                raise StoreError(
+                    f"{copy} is not a copy of {file.name}, which was not changed: rename it, and try again"
+                )
+            write_file(file, content)
+        for study, of_sessions in tables.items():
+            for session, table, held, content in of_sessions:
+                if is_there(session.checksums):  # first, so that an interrupted upgrade can be repeated
+                    hashes = hashlib.sha256(held).hexdigest(), hashlib.sha256(content).hexdigest()
+                    replace_checksums(session, {table.name: hashes})
+                write_file(table, content)
+            write_study_files(study)
+    rewritten = [table for of_sessions in tables.values() for _, table, _, _ in of_sessions]
+    return sorted([*upgraded, *rewritten, *(study.description for study in tables)])
+
+
+def _earlier_studies(path: Path) -> Iterator[StudyFolder]:
+    """Yield the studies in a folder whose tables an earlier version wrote."""
+    studies = (StudyFolder(key.parent.parent) for key in sorted(path.rglob("blinding/key.sealed")))
+    yield from filter(has_earlier_columns, studies)
+
+
+def _earlier_tables(
+    study: StudyFolder, locks: contextlib.ExitStack
+) -> Iterator[tuple[SessionFolder, Path, bytes, bytes]]:
+    """Lock each session and yield it with path, content and new content of each table that lacks columns."""
+    key = opened_key(study)
+    for session in study.sessions():
+        if is_never_begun(session.path):
+            continue
+        locks.callback(lock_folder(session.path).release)
+        lines = journal.read(session.journal)
+        place = Place(study, session, start_of(lines).study)
+        for file, what in files_beyond_journal(place, lines):
+            raise StoreError(f"{file} {what}: {RESTORE}")
+        for table, content in table_files(place, lines, key):
+            held = read_if_there(table)
+            if held is None or held == content:
+                continue
+            if isinstance(lines[-1], SessionEnded) and not has_same_cells(held, content):
+                raise StoreError(
+                    f"{table} differs from its journal, so nothing was upgraded: liquid-study rebuild {session.path} "
+                    "creates it again"
+                )
+            yield session, table, held, content

@@ -15,7 +15,7 @@ from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
-from study_app.store.columns import RESPONSES_2, TRIALS_2
+from study_app.store.columns import RESPONSES, TRIALS
 from study_app.store.csv_files import Column, csv_bytes
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
 from study_app.store.folders import SessionFolder, StudyFolder
@@ -63,16 +63,16 @@ class Results:
             attempts = [(repeated or {})[trial.code]] if trial.code in (repeated or {}) else []
             for attempt, given in enumerate([*attempts, answer], start=1):
                 place = self._place(participant, session, trial, attempt)
-                presented.append({**_blank(TRIALS_2), **place, "of": trial.of, **(changes or {})})
+                presented.append({**_blank(TRIALS), **place, "of": trial.of, **(changes or {})})
                 condition = self.key.condition(trial.block, trial.code)
                 responses += [
-                    {**_blank(RESPONSES_2), **place, **_answered(given(condition, item), item, number)}
+                    {**_blank(RESPONSES), **place, **_answered(given(condition, item), item, number)}
                     for number, item in enumerate(trial.items, start=1)
                 ]
         folder = StudyFolder(self.folder).session(participant, session)
         folder.path.mkdir(parents=True)
-        folder.table(self.protocol.study.name, "responses").write_bytes(csv_bytes(RESPONSES_2, responses))
-        folder.table(self.protocol.study.name, "trials").write_bytes(csv_bytes(TRIALS_2, presented))
+        folder.table(self.protocol.study.name, "responses").write_bytes(csv_bytes(RESPONSES, responses))
+        folder.table(self.protocol.study.name, "trials").write_bytes(csv_bytes(TRIALS, presented))
         receipt.write(folder.receipt, self._receipt(participant, session, status))
         return folder
 

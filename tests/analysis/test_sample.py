@@ -9,7 +9,6 @@ import pytest
 
 from study_app.store import receipt
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.columns import LATER
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduce_session
@@ -37,7 +36,7 @@ def known(session: SessionFolder, folder: Path) -> list[dict[str, float]]:
     """Return what was measured of each trial: forces, motion, and how often each limiter acted."""
     measured = ("limiter_", "force_", "path_", "mean_speed", "duration_")
     return [
-        {name: it for name, it in line.items() if name.startswith(measured) and it is not None and name not in LATER}
+        {name: it for name, it in line.items() if name.startswith(measured) and it is not None}
         for line in raw(open_events(journal.read(session.journal), read_key(folder)))
         if line["event"] == "trial_ended"
     ]

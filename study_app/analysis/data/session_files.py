@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeAlias
 
@@ -22,11 +22,10 @@ from study_app.analysis.data.blocks import (
     other_questions,
 )
 from study_app.errors import AnalysisError, StoreError
-from study_app.protocol.questions import STATEMENT
 from study_app.protocol.table import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
-from study_app.store.columns import TRIALS_MISSING, tables_of
+from study_app.store.columns import INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING
 from study_app.store.csv_files import MISSING, Column, header, read_cells
 from study_app.store.exclusions import Exclusion, describe_exclusion
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
@@ -49,7 +48,7 @@ _Whole: TypeAlias = NDArray[np.int64]
 def tables(paths: Sequence[Path], columns: tuple[Column, ...]) -> tuple[pd.DataFrame, _Whole]:
     """Read one table of many sessions, typed by the dictionary, and the number of rows of each file.
 
-    Columns that are sealed, or that the program version of a file did not have, are missing, as are cells with ``n/a``.
+    Sealed columns are missing, as are cells with ``n/a``.
     """
     values: dict[str, list[Any]] = {column.name: [] for column in columns}
     known: dict[str, dict[str, Any]] = {column.name: {} for column in columns}
@@ -72,7 +71,7 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
         raise unreadable_error(path, error, _again(path)) from error
     except ValueError as error:
         raise AnalysisError(f"{path} {error}: it was cut off or changed; {_again(path)}") from error
-    held = tuple(column for column in columns if column.name in names or not (column.later or column.sealed))
+    held = tuple(column for column in columns if column.name in names or not column.sealed)
     if tuple(names) != header(held):
         raise AnalysisError(
             f"{path} does not begin with the columns of this table: it was changed, or written by another version of "
@@ -153,11 +152,6 @@ class Session:
             (question.where.id, (question.id,), (question.question.kind_id,)) for question in self.others.questions
         )
         return (*blocks, *others)
-
-    @property
-    def protocol_format(self) -> int:
-        """The format of the study's protocol."""
-        return int(self.protocol.get("format", 1))
 
 
 def read_session(folder: SessionFolder, key: Key | None, like: Session | None = None) -> Session:
@@ -257,18 +251,10 @@ def _masking(answer: Mapping[str, Any] | None) -> str | None:
 def read_tables(sessions: Sequence[Session], name: str) -> pd.DataFrame:
     """Read table ``name`` of sessions with the same questionnaire, with rows in session order.
 
-    The columns ``session_status`` and ``trials_missing`` are added. Tables of format 1, which have answers to
-    statements alone, are read with the columns of later sessions if a study has both.
+    The columns ``session_status`` and ``trials_missing`` are added.
     """
     paths = [session.folder.table(session.study, name) for session in sessions]
-    formats = {session.protocol_format for session in sessions}
-    columns = tables_of(max(formats))[name]
-    if len(formats) > 1:
-        columns = tuple(replace(column, later=True, may_miss=True) for column in columns)
-    table, lengths = tables(paths, columns)
-    if len(formats) > 1 and name == "responses":
-        value = table["value"].where(table["kind"].notna(), pd.to_numeric(table["response"], errors="coerce"))
-        table = table.assign(kind=table["kind"].fillna(STATEMENT), value=value)
+    table, lengths = tables(paths, {"responses": RESPONSES, "trials": TRIALS, "intervals": INTERVALS}[name])
     _check_own(sessions, paths, table, lengths)
     if name == "responses":
         _check_answers(sessions, paths, table, lengths)
@@ -318,10 +304,9 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
                 f"block {block!r}: the file was changed or belongs to another study; create it again from the "
                 f"journal: liquid-study rebuild {sessions[which].folder.path}"
             )
-    which_one = [
-        name for name in ("participant", "session", "form", "after_block", "trial", "attempt", "item") if name in table
-    ]
-    twice = np.flatnonzero(table.duplicated(which_one))
+    twice = np.flatnonzero(
+        table.duplicated(["participant", "session", "form", "after_block", "trial", "attempt", "item"])
+    )
     if len(twice):
         which, row = _place(lengths, int(twice[0]))
         answer = table.iloc[int(twice[0])]

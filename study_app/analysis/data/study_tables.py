@@ -64,7 +64,7 @@ from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.journals.journal_events import INCOMPLETE, REACHED_END
 from study_app.store.merged import DASH, Merged, read_merged
 from study_app.store.sessions.open_session import Place
-from study_app.store.tables.study_files import has_intervals
+from study_app.store.tables.study_files import has_intervals, refuse_earlier_columns
 from study_app.store.unblinding import has_opened_keys, late_exclusions
 from study_app.store.verification.verify_session import Discrepancy, session_discrepancies
 from study_app.store.withdrawals import tombstones
@@ -289,11 +289,6 @@ class Study:
         by_block = asked.where.is_form and asked.where.settings
         return rows.assign(code=rows["after_block"].fillna(START)) if by_block else rows
 
-    @property
-    def protocol_format(self) -> int:
-        """The format of the study's protocol."""
-        return int(self.protocol.get("format", 1))
-
     def presented(self, block: Block) -> dict[str, int]:
         """Return how often each setting of a block was presented in valid trials."""
         rows = self.trials[self.trials["counted"] & (self.trials["block"] == block.id)]
@@ -408,6 +403,7 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
     sessions = [session for session in place.sessions() if not is_never_begun(session.path)]
     if not sessions:
         raise AnalysisError(_no_sessions(place.path))
+    refuse_earlier_columns(place)
     key = None if sealed else _key(place, sessions)
     listed = tuple(row for row in exclusions(place.path) if planned or row.rule_or_person not in RULES)
     records = [read_session(sessions[0], key)]
@@ -556,8 +552,6 @@ def _with_counted(table: pd.DataFrame, last: pd.Series[int]) -> pd.DataFrame:
 
 def _of_statements(table: pd.DataFrame) -> pd.DataFrame:
     """Return the answers to statements as scale points."""
-    if "kind" not in table:
-        return table
     statements = table[table["kind"] == STATEMENT]
     return statements.assign(response=statements["value"].astype("Int64"))
 

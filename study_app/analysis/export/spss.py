@@ -34,20 +34,6 @@ _TEXT_BYTES: Final = 32_767
 _RESERVED: Final = frozenset(("ALL", "AND", "BY", "EQ", "GE", "GT", "LE", "LT", "NE", "NOT", "OR", "TO", "WITH"))
 
 
-def long_sav(study: Study, table: Delivered) -> bytes:
-    """Return the long table of responses as an SPSS file."""
-    frame = table.frame
-    if study.protocol_format > 1:  # a column with answers of all kinds has texts without value labels
-        return sav(study, table, {})
-    answers = frame["response"].astype("Float64").fillna(_NOT_ANSWERED).mask(frame["cannot_judge"], _CANNOT_JUDGE)
-    labels = {block.labels for block in study.blocks}
-    levels = dict(zip(LEVELS, next(iter(labels)), strict=True)) if len(labels) == 1 else {}
-    words = {block.cannot_judge for block in study.blocks if block.cannot_judge}
-    coded = {"response": _levels(levels, " / ".join(sorted(words)))}
-    del coded["response"][_EXCLUDED]  # a row keeps its answer; the column `excluded` says so
-    return sav(study, Delivered(table.name, table.columns, frame.assign(response=answers)), coded)
-
-
 def wide_sav(study: Study, table: Delivered, cells: Mapping[str, Cells | QuestionCells]) -> bytes:
     """Return the wide table as an SPSS file."""
     answers = study.responses

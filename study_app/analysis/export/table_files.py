@@ -43,7 +43,7 @@ def table_files(
         files |= {file_name(study, table, "parquet"): _parquet_bytes(table) for table in written}
     if "sav" in extras:
         opened = {"tracks", *(statistic.table for statistic in statistics())}
-        files[file_name(study, tables[0], "sav")] = spss.long_sav(study, tables[0])
+        files[file_name(study, tables[0], "sav")] = spss.sav(study, tables[0], {})
         files[file_name(study, tables[-1], "sav")] = spss.wide_sav(study, tables[-1], cells)
         files |= {
             file_name(study, table, "sav"): spss.sav(study, table, {}) for table in tables if table.name in opened

@@ -20,7 +20,7 @@ from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
 from study_app.analysis.questions import scored
-from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2, TRIALS_MISSING, tables_of
+from study_app.store.columns import INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING
 from study_app.store.csv_files import Column, Kind, header, optional, unsealed_columns
 
 
@@ -53,7 +53,7 @@ def select_columns(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) 
 
 _OF_TRIAL: Final = ("study", "participant", "session", "simulated", "pilot", "group", "trial", "attempt", "block")
 _OF_BLOCK: Final = ("phase", "part", "index", "code")
-_LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS_2, *INTERVALS)}
+_LEVEL_COLUMNS: Final = {column.name: column for column in (*TRIALS, *INTERVALS)}
 
 _OF_PERSON: Final = tuple(_LEVEL_COLUMNS[name] for name in ("study", "participant", "simulated", "pilot", "group"))
 _TYPES: Final[dict[Kind, str]] = {"text": "string", "number": "Float64", "integer": "Int64", "flag": "boolean"}
@@ -65,8 +65,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
     """Yield the tables of a study with levels; none for other studies."""
     if not study.levels:
         return
-    intervals = tables_of(study.protocol_format)["intervals"]
-    intervals = intervals if study.revealed else unsealed_columns(intervals)
+    intervals = INTERVALS if study.revealed else unsealed_columns(INTERVALS)
     yield select_columns("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
     if not study.revealed:
         return
@@ -110,7 +109,7 @@ def names_of_sealed(study: Study) -> set[str]:
 _OF_A_FORM: Final = Setting(code="")
 """Stands for the setting of an answer in a form, which has none."""
 
-_BY_NAME: Final = {column.name: column for column in (*TRIALS_2, *RESPONSES)}
+_BY_NAME: Final = {column.name: column for column in TRIALS}
 
 _QUARTILE: Final = f"quartiles {QUARTILES}"
 _MEASURED: Final = (
@@ -151,13 +150,12 @@ def exported_tables(study: Study) -> tuple[Delivered, ...]:
     """Return responses, trials and aggregate of a study; with levels, also intervals, opened tracks and thresholds."""
     opened = OPENED if study.revealed else ()
     achieved = (*OPENED, ACHIEVED) if study.revealed else ()
-    trials = tables_of(study.protocol_format)["trials"]
-    trials = trials if study.revealed else unsealed_columns(trials)
-    responses = tables_of(study.protocol_format)["responses"]
-    about = achieved if responses is RESPONSES else _may_miss(achieved)
+    trials = TRIALS if study.revealed else unsealed_columns(TRIALS)
     judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED
     tables = (
-        select_columns("responses", (*responses, *judged, *about), _named(study, _with_delay_error(study))),
+        select_columns(
+            "responses", (*RESPONSES, *judged, *_may_miss(achieved)), _named(study, _with_delay_error(study))
+        ),
         select_columns(
             "trials",
             (*trials, *judged, *(_may_miss(achieved) if study.levels else achieved)),

@@ -42,14 +42,13 @@ LIMITER_SATURATED = 1 << 10  # the device's motors saturated: its force was betw
 class _Limiter(NamedTuple):
     """A limiter: its bit, the suffix of its column, its display name, and the description of its column.
 
-    Sessions of the first releases lack the column of a ``later`` one; an ``expected`` one does not concern an operator.
+    An ``expected`` one does not concern an operator.
     """
 
     bit: int
     name: str
     label: str
     meaning: str
-    later: bool = False
     expected: bool = False
 
 
@@ -86,14 +85,12 @@ LIMITERS: Final = (
         meaning=(
             "EWMA estimated the velocity because the Kalman filter's innovations were too large or the delay changed"
         ),
-        later=True,
     ),
     _Limiter(
         bit=LIMITER_SATURATED,
         name="saturated",
         label="Saturated motors",
         meaning="the device's motors saturated: its force was between zero and the recorded force",
-        later=True,
     ),
 )
 """Every limiter, in the order in which windows show them."""

@@ -15,7 +15,8 @@ from datetime import datetime
 from typing import Annotated, Any, ClassVar, TypeAlias, dataclass_transform, get_args, get_type_hints
 
 from study_app.errors import StoreError
-from study_app.store.columns import DELIVERED, TRIALS, VIDEO
+from study_app.protocol.questions import STATEMENT
+from study_app.store.columns import DELIVERED, TRIALS
 from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 
 _SHOWN = 200  # greatest number of characters of a bad value shown in messages
@@ -185,15 +186,15 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Response(Answer):
-    """A confirmed answer; ``number`` is its question's on the page, ``kind`` the kind of question, since format 2."""
+    """A confirmed answer; ``number`` is its question's on the page, ``kind`` the kind of question."""
 
     item: Text
     number: _Integer
-    kind: Text | None = None
+    kind: Text = STATEMENT
 
     def fields(self) -> dict[str, Any]:
         """Return the response as written in a line."""
-        return {name: getattr(self, name) for name in _RESPONSE if name != "kind" or self.kind is not None}
+        return {name: getattr(self, name) for name in _RESPONSE}
 
 
 def _journal_name(kind: type) -> str:
@@ -614,7 +615,7 @@ class SessionEnded(Event):
 def _known_kinds() -> Iterator[tuple[str, tuple[Kind, bool]]]:
     aliases: tuple[Any, ...] = (Text, Time, Number, _Integer, _Flag)
     of_columns = {alias.__metadata__[0].description: alias.__metadata__[0] for alias in aliases}
-    yield from ((column.name, (of_columns[column.kind], True)) for column in (*TRIALS, *DELIVERED, *VIDEO))
+    yield from ((column.name, (of_columns[column.kind], True)) for column in (*TRIALS, *DELIVERED))
     for owner in (Response, Event, *EVENTS.values()):
         for name, hint in get_type_hints(owner, include_extras=True).items():
             for part in (hint, *get_args(hint)):

@@ -458,9 +458,7 @@ def _open(
         if store.behind is not None:
             raise store.behind
         update_participants(place.study_folder, place.study)
-        write_description(
-            place.study_folder, protocol.study, protocol.format, intervals=bool(protocol.design_questions)
-        )
+        write_description(place.study_folder, protocol.study, intervals=bool(protocol.design_questions))
         for folder in (place.study_folder.path, place.study_folder.data):
             remove_old_temporary_files(folder)
         failing.pop_all()

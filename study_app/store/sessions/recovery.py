@@ -52,7 +52,12 @@ from study_app.store.recorder import lost_event, recorded_event, recording_files
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, session_environment
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
 from study_app.store.tables import session_tables
-from study_app.store.tables.study_files import update_participants, write_description, write_participants
+from study_app.store.tables.study_files import (
+    refuse_earlier_columns,
+    update_participants,
+    write_description,
+    write_participants,
+)
 
 RESTORE = "restore the journal from a copy"
 _SHOWN_DIFFERENCES = 6
@@ -157,8 +162,7 @@ def reopen_store(
             store.append(event)
         store.note_resumed(entry)
         store.write_tables()
-        form = left.start.protocol_format or 1
-        write_description(study_folder, protocol.study, form, intervals=bool(protocol.design_questions))
+        write_description(study_folder, protocol.study, intervals=bool(protocol.design_questions))
         update_participants(study_folder, left.place.study)
         failing.pop_all()
     return store
@@ -309,6 +313,7 @@ def _read_interrupted(study_folder: StudyFolder, folder: SessionFolder, protocol
     if receipt.has_other_format(first, start):
         raise StoreError(f"{folder.journal} has a different format from the one in its receipt: restore it from a copy")
     _refuse_truncated_journal(place, contents.lines)
+    refuse_earlier_columns(study_folder)
     _same_protocol(place, first, start, protocol, source)
     draw = stream(start.seed, "blinding").random if start.simulated else None
     return _Left(place, contents, start, first, open_or_draw_key(study_folder.path, protocol, draw))

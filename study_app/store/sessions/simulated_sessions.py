@@ -129,9 +129,7 @@ class SimulatedStudy:
     def __enter__(self) -> Self:
         """Write the study's description, which identifies its folder."""
         self._opening = lock_folder(self.folder.path)
-        write_description(
-            self.folder, self.protocol.study, self.protocol.format, intervals=bool(self.protocol.design_questions)
-        )
+        write_description(self.folder, self.protocol.study, intervals=bool(self.protocol.design_questions))
         return self
 
     def __exit__(

@@ -2,28 +2,13 @@
 
 from collections.abc import Sequence
 
-from study_app.store.columns import (
-    EXCLUSIONS,
-    INTERVALS,
-    PARTICIPANTS,
-    RESPONSES,
-    RESPONSES_2,
-    TRIALS,
-    TRIALS_2,
-    with_missing_trials,
-)
+from study_app.store.columns import EXCLUSIONS, GROUP, INTERVALS, PARTICIPANTS, RESPONSES, TRIALS, with_missing_trials
 from study_app.store.csv_files import Column
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.recordings import FRAMES, SAMPLES
 
 _SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ("Responses", "subject-…_description-responses_data.csv", "one row per response", RESPONSES),
-    (
-        "Responses, format 2",
-        "subject-…_description-responses_data.csv",
-        "one row per response, for a protocol of format 2",
-        RESPONSES_2,
-    ),
     ("Trials", "subject-…_description-trials_data.csv", "one row per presentation of a trial", TRIALS),
     (
         "Intervals",
@@ -33,10 +18,10 @@ _SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ),
     ("Participants", "study-…_description-participants_data.csv", "one row per session", PARTICIPANTS),
     (
-        "Trials and participants, format 2",
-        "…_description-trials_data.csv, …_description-participants_data.csv",
-        "differences in trials for a protocol of format 2; participants also have the group",
-        tuple(column for column in TRIALS_2 if column not in TRIALS),
+        "Participants, opened or pre-existing groups",
+        "study-…_description-participants_data.csv",
+        "a further column in a study with groups, and in every study after unblinding",
+        (GROUP,),
     ),
     (
         "Participants, trials of intervals",

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.store.columns import DELIVERED, INTERVALS, TRIALS, TRIALS_MISSING, VIDEO, tables_of
+from study_app.store.columns import DELIVERED, INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING
 from study_app.store.csv_files import Column, Row, header, unsealed_columns
 from study_app.store.delivered import is_within_limits
 from study_app.store.journals import journal_events as events
@@ -16,13 +16,14 @@ from study_app.store.progress import progress_of
 
 VALID: Final = "valid"
 _PRESENTED: Final = {"S": "standard", "C": "comparison"}
-_OF_TRIAL: Final = {column.name: column.of_trial for column in (*TRIALS, *VIDEO)}
+_OF_TRIAL: Final = {column.name: column.of_trial for column in TRIALS}
 _OF_THE_END = header(INTERVALS[[column.name for column in INTERVALS].index("invalid_reasons") :])
 _SESSION_COLUMNS = ("study", "participant", "session", "simulated", "pilot")
 _TRIAL_COLUMNS = ("trial", "attempt", "block", "phase", "part", "index", "code")
 _RECORDED = ("recording", "recording_frames", "samples_recorded", "samples_unrecorded")
 _DERIVED = ("trial_started_at", "trial_started_s", "outcome", "valid", *_RECORDED, "recording_lost", "marked", "notes")
-_MEASURED = tuple(name for name in header(TRIALS) if name not in (*_SESSION_COLUMNS, *_TRIAL_COLUMNS, "of", *_DERIVED))
+_NOT_MEASURED = (*_SESSION_COLUMNS, *_TRIAL_COLUMNS, "of", *_DERIVED, "intervals", "group")
+_MEASURED = tuple(name for name in header(TRIALS) if name not in _NOT_MEASURED)
 _DELIVERED = header(DELIVERED)
 
 
@@ -39,9 +40,6 @@ class SessionRows:
         self.intervals: list[Row] = []
         self._start = events.start_of(lines)
         self._session = _session_cells(self._start)
-        self._group = _group_cells(self._start)
-        self._answer_columns = header(tables_of(self._start.protocol_format or 1)["responses"])
-        self._measured_names = (*_MEASURED, *header(VIDEO)) if self._group else _MEASURED
         self._limits = self._start.limits
         self._started: dict[tuple[int, int], events.TrialStarted] = {}
         self._places: dict[tuple[int, int], int] = {}  # in trials
@@ -62,8 +60,7 @@ class SessionRows:
                 which = line.trial, line.attempt
                 repeats = bool(self.trials) and self.trials[-1]["trial"] == line.trial
                 self._started[which], self._places[which] = line, len(self.trials)
-                later = {**dict.fromkeys(header(VIDEO)), "intervals": 0 if line.has_intervals else None}
-                self.trials.append(_trial_row(self._session, line) | (later if self._group else {}) | self._group)
+                self.trials.append(_trial_row(self._session, self._start.group, line))
                 if self._reconnected and repeats:
                     _add_note(self.trials[-1], f"presented again: {self._reconnected}")
                 self._reconnected = ""
@@ -76,21 +73,17 @@ class SessionRows:
                 if (trial := self._started.get((line.trial, line.attempt))) is None:
                     raise _never_started(line)
                 about = {name: getattr(trial, name) for name in _TRIAL_COLUMNS}
-                self.responses += [
-                    _response_row(self._session, about, answer, line.at, self._answer_columns) for answer in line.items
-                ]
+                self.responses += [_response_row(self._session, about, answer, line.at) for answer in line.items]
             case events.FormAnswered():
                 about = {**dict.fromkeys(_TRIAL_COLUMNS), "form": line.form, "after_block": line.after}
-                self.responses += [
-                    _response_row(self._session, about, answer, line.at, self._answer_columns) for answer in line.items
-                ]
+                self.responses += [_response_row(self._session, about, answer, line.at) for answer in line.items]
             case events.SessionEnded() | events.SessionResumed():
                 self._interrupt()
             case events.IntervalStarted():
                 self._begin_interval(line)
             case events.IntervalEnded(outcome=outcome):
                 row, reasons = self._row_of(line), line.invalid or ()
-                row |= {name: line.others.get(name) for name in (*self._measured_names, *_DELIVERED)}
+                row |= {name: line.others.get(name) for name in (*_MEASURED, *_DELIVERED)}
                 row["ended_s"] = line.t_s
                 row |= {"outcome": outcome, "invalid_reasons": " ".join(reasons) or None}
                 row |= {"valid": is_within_limits(row, self._start.limits) if not reasons else False}
@@ -139,9 +132,9 @@ class SessionRows:
         """Return the measures of a completed trial, combined from all its intervals if it has a design."""
         which = line.trial, line.attempt
         if not self._started[which].has_intervals:
-            return {name: line.others.get(name) for name in self._measured_names}
+            return {name: line.others.get(name) for name in _MEASURED}
         rows = [self.intervals[at] for key, at in self._intervals.items() if key[:2] == which]
-        names = self._measured_names
+        names = _MEASURED
         return {name: _combine_values(name, [row[name] for row in rows if row.get(name) is not None]) for name in names}
 
     def _interrupt(self) -> None:
@@ -156,10 +149,11 @@ def table_columns(lines: Sequence[events.Event], *, opened: bool) -> dict[str, t
 
     Only a study with designs has a table of intervals.
     """
-    tables = tables_of(events.start_of(lines).protocol_format or 1)
-    names = ("responses", "trials", "intervals") if events.start_of(lines).intervals else ("responses", "trials")
+    tables = {"responses": RESPONSES, "trials": TRIALS}
+    if events.start_of(lines).intervals:
+        tables["intervals"] = INTERVALS
     shows = opened or not events.start_of(lines).measures_sealed
-    return {name: tables[name] if shows else unsealed_columns(tables[name]) for name in names}
+    return {name: columns if shows else unsealed_columns(columns) for name, columns in tables.items()}
 
 
 def participant_row(lines: Sequence[events.Event]) -> Row:
@@ -171,14 +165,14 @@ def participant_row(lines: Sequence[events.Event]) -> Row:
         if row["phase"] == "main" and row["outcome"] in ("complete", "timeout")
     ]
     after_main = latest_attempts(row for row in rows.responses if row["phase"] == "main")
-    in_forms = (row for row in rows.responses if row.get("form") is not None)
+    in_forms = (row for row in rows.responses if row["form"] is not None)
     answered = [row for row in (*after_main, *in_forms) if row["first_choice_s"] is not None]
     last = lines[-1]
     recorded = last.within_limits if isinstance(last, events.SessionEnded) else None
     verdicts = [row["valid"] for row in main if row["valid"] is not None] if recorded is None else [recorded]
     return {
         **_session_cells(start),
-        **_group_cells(start),
+        "group": start.group,
         "status": "unfinished" if done.ended is None else done.ended,
         "session_started_at": start.at,
         "session_ended_at": next((line.at for line in reversed(lines) if isinstance(line, events.SessionEnded)), None),
@@ -236,22 +230,16 @@ def _session_cells(start: events.SessionStarted) -> Row:
     return {name: getattr(start, name) for name in _SESSION_COLUMNS}
 
 
-def _group_cells(start: events.SessionStarted) -> Row:
-    """Return the cell of the participant's group if it was opened; no cell in format 1."""
-    return {"group": start.group} if (start.protocol_format or 1) > 1 else {}
-
-
-def _response_row(session: Row, about: Row, answer: events.Response, answered_at: str, columns: Sequence[str]) -> Row:
-    """Return the row of an answer; format 2 adds its kind, and the answer as text and as number."""
+def _response_row(session: Row, about: Row, answer: events.Response, answered_at: str) -> Row:
+    """Return the row of an answer, with the answer as text and as number."""
     value = answer.value
-    plain = answer.kind is None or value is None
     row = {
         **session,
         "form": None,
         "after_block": None,
         **about,
         "kind": answer.kind,
-        "response": " ".join(value) if isinstance(value, list | tuple) else value if plain else str(value),
+        "response": " ".join(value) if isinstance(value, list | tuple) else None if value is None else str(value),
         "value": value if isinstance(value, int | float) else None,
         "item": answer.item,
         "number": answer.number,
@@ -262,11 +250,12 @@ def _response_row(session: Row, about: Row, answer: events.Response, answered_at
         "changes": answer.changes,
         "answered_at": answered_at,
     }
-    return {name: row[name] for name in columns}
+    return {name: row[name] for name in header(RESPONSES)}
 
 
-def _trial_row(session: Row, line: events.TrialStarted) -> Row:
-    row: Row = dict.fromkeys(header(TRIALS)) | session
+def _trial_row(session: Row, group: str | None, line: events.TrialStarted) -> Row:
+    row: Row = dict.fromkeys(header(TRIALS)) | session | {"group": group}
+    row["intervals"] = 0 if line.has_intervals else None
     row |= {name: getattr(line, name) for name in (*_TRIAL_COLUMNS, "of")}
     return row | {"trial_started_at": line.at, "trial_started_s": line.t_s, "marked": False}
 

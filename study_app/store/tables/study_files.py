@@ -18,16 +18,7 @@ from study_app.protocol.table import text_in
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, open_events, opened_key, reveals
-from study_app.store.columns import (
-    GROUP,
-    LATER,
-    PARTICIPANTS,
-    PARTICIPANTS_2,
-    SEALED,
-    TRIALS_MISSING,
-    every_column,
-    with_missing_trials,
-)
+from study_app.store.columns import GROUP, PARTICIPANTS, SEALED, TRIALS_MISSING, every_column, with_missing_trials
 from study_app.store.csv_files import Column, Row, header
 from study_app.store.folder_lock import is_never_begun
 from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
@@ -163,18 +154,18 @@ def columns_of(folder: StudyFolder, rows: Iterable[csv_files.Row]) -> tuple[Colu
     rows = list(rows)
     groups = [row["group"] for row in rows if "group" in row]
     shows_group = any(groups) or bool(groups and reveals(folder.path))
-    columns = PARTICIPANTS_2 if shows_group else PARTICIPANTS
+    columns = (*PARTICIPANTS, GROUP) if shows_group else PARTICIPANTS
     return with_missing_trials(columns) if any(TRIALS_MISSING.name in row for row in rows) else columns
 
 
-def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 1, intervals: bool = False) -> bytes:
+def description_bytes(study: StudyHead, *, sealed: bool, intervals: bool = False) -> bytes:
     """Return the description of ``study``, with the same bytes on every machine.
 
-    With ``sealed`` no table has the sealed columns, except a pre-existing group; ``protocol_format`` is the format of
-    the study's file, ``intervals`` tells whether it has blocks with a design.
+    With ``sealed`` no table has the sealed columns, except a pre-existing group; ``intervals`` tells whether the study
+    has blocks with a design.
     """
     title = text_in(study.title, study.languages[0])
-    hidden = {column.name for column in every_column(protocol_format, intervals=intervals) if sealed and column.sealed}
+    hidden = {column.name for column in every_column(intervals=intervals) if sealed and column.sealed}
     if study.group_assignment == "pre-existing":
         hidden.discard(GROUP.name)
     content = {
@@ -185,41 +176,29 @@ def description_bytes(study: StudyHead, *, sealed: bool, protocol_format: int = 
         "description": study.description or title,
         "version": study.version,
         "variableMeasured": [
-            column.variable
-            for column in every_column(protocol_format, intervals=intervals)
-            if column.name not in hidden
+            column.variable for column in every_column(intervals=intervals) if column.name not in hidden
         ],
     }
     return (json.dumps(content, indent=2, ensure_ascii=False) + "\n").encode()
 
 
 def is_same_description(content: bytes, expected: bytes) -> bool:
-    """Return whether two descriptions agree on the study and on all columns except `LATER`.
-
-    Earlier versions of the program lack columns, describe others differently, and add a pattern of the cells, which is
-    no property of schema.org's PropertyValue; units and ranges are the same in all.
-    """
+    """Return whether two descriptions agree on the study and on names, units and ranges of all columns."""
     try:
         description, wanted = parse_json(content), parse_json(expected)
         columns, wanted_columns = (
             [
-                (variable["name"], {key: variable[key] for key in variable.keys() - {"description", "valuePattern"}})
+                (variable["name"], {key: variable[key] for key in variable.keys() - {"description"}})
                 for variable in it.pop("variableMeasured")
             ]
             for it in (description, wanted)
         )
     except (AttributeError, KeyError, TypeError, ValueError):
         return False
-    names = [name for name, _ in columns]
-    return bool(
-        description == wanted
-        and columns == [column for column in wanted_columns if column[0] in names or column[0] not in LATER]
-    )
+    return bool(description == wanted and columns == wanted_columns)
 
 
-def write_description(
-    folder: StudyFolder, study: StudyHead, protocol_format: int = 1, *, intervals: bool = False
-) -> None:
+def write_description(folder: StudyFolder, study: StudyHead, *, intervals: bool = False) -> None:
     """Write the description if it is missing or describes an older version of the study.
 
     Until the key is opened it lacks the sealed columns, unless an earlier version of the program described them: then
@@ -227,11 +206,25 @@ def write_description(
     """
     held = read_own(folder.description, folder.path) if is_there(folder.description) else b""
     sealed = not (reveals(folder.path) or has_sealed_columns(held))
-    content = description_bytes(study, sealed=sealed, protocol_format=protocol_format, intervals=intervals)
+    content = description_bytes(study, sealed=sealed, intervals=intervals)
     if held != content:
         write_file(folder.description, content)
     if not is_there(folder.ignore):
         write_file(folder.ignore, _IGNORED)
+
+
+def write_study_files(folder: StudyFolder) -> None:
+    """Update the table of participants and the description."""
+    if (name := described_study(folder)) is not None:
+        write_participants(folder, name)
+    for session in folder.sessions():
+        try:
+            protocol = receipt.read(session.receipt)["protocol"]
+            head, intervals = StudyHead.model_validate(protocol["study"]), has_intervals(protocol)
+        except (StoreError, KeyError, TypeError, ValueError):  # another receipt is used instead
+            continue
+        write_description(folder, head, intervals=intervals)
+        return
 
 
 def has_intervals(protocol: Mapping[str, Any]) -> bool:
@@ -259,8 +252,26 @@ def described_study(folder: StudyFolder) -> str | None:
         ) from error
 
 
+def has_earlier_columns(folder: StudyFolder) -> bool:
+    """Return whether a study's description lacks columns, because an earlier version wrote its tables."""
+    content = read_own(folder.description, folder.path) if is_there(folder.description) else b""
+    with contextlib.suppress(AttributeError, KeyError, TypeError, ValueError):
+        names = {variable["name"] for variable in parse_json(content)["variableMeasured"]}
+        columns = every_column(intervals="interval" in names)
+        return not names.issuperset(column.name for column in columns if not column.sealed)
+    return False
+
+
+def refuse_earlier_columns(folder: StudyFolder) -> None:
+    """Raise StoreError for a study whose tables an earlier version wrote; the message says how to upgrade it."""
+    if has_earlier_columns(folder):
+        raise StoreError(
+            f"{folder.path} has tables of an earlier version of the program: run liquid-study upgrade {folder.path}"
+        )
+
+
 def check_study(folder: StudyFolder, study: str) -> None:
-    """Raise an error for a folder of another study, of merged sites or of several studies, or inside one of these.
+    """Raise an error for a folder of another study or version, of merged sites or of several studies, or inside these.
 
     Raises
     ------
@@ -272,6 +283,7 @@ def check_study(folder: StudyFolder, study: str) -> None:
     if described is not None:
         if described != study:
             raise StoreError(f"{folder.path} holds the study {described!r}, not {study!r}: use another results folder")
+        refuse_earlier_columns(folder)
         return
     for above in folder.path.absolute().parents:
         if is_there(StudyFolder(above).key):

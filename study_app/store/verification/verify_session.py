@@ -400,11 +400,12 @@ def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *
             findings.error(path, f"{what}: {RESTORE}")
             telling.add(path)
     try:
-        expected = table_files(place, lines, opened_key(place.study_folder))
+        key = opened_key(place.study_folder)
+        expected = table_files(place, lines, key)
     except StoreError as error:
         findings.error(place.folder.journal, f"does not produce tables: {error}")
         return
-    columns = table_columns(lines, opened=True)
+    columns = table_columns(lines, opened=key is not None)
     for (path, content), name in zip(expected, columns, strict=True):
         held = path.read_bytes() if path.is_file() else content
         if held != content and held == _sealed_tables(place, lines).get(path):
@@ -434,10 +435,9 @@ def check_table(
         findings.error(path, "is missing or cannot be read; rebuild creates it again")
         return
     written = journal.as_written(content)
-    if content != written == csv_files.align_columns(written, expected, columns)[0]:
+    if content != written == expected:
         findings.error(path, journal.notation_change(content))
         return
-    expected, columns = csv_files.align_columns(content, expected, columns)
     pairs = zip_longest(content.split(b"\n"), expected.split(b"\n"))
     differing = [number for number, (held, whole) in enumerate(pairs, start=1) if held != whole]
     follows = all(map(may_differ, differing))

@@ -42,6 +42,7 @@ from study_app.store.tables.study_files import (
     has_intervals,
     has_sealed_columns,
     is_same_description,
+    refuse_earlier_columns,
     table_bytes,
 )
 from study_app.store.verification.leaks import certain_telltales, find_leaks, presented_numbers, recorded_numbers
@@ -106,6 +107,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
         raise StoreError(
             f"{folder} is not a study folder ({study.description.name} is missing): specify one such as results/rek2024"
         )
+    refuse_earlier_columns(study)
     key = None
     with findings.reading(study.key):
         key = blinding.read_key(study.path)
@@ -243,9 +245,13 @@ def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findi
         return
     rows = [session.row for session in sessions if session.row is not None]
     content, columns = table_bytes(study, rows), columns_of(study, rows)
+    path, sealed = study.participants(name), csv_files.csv_bytes(csv_files.unsealed_columns(columns), ())
+    if path.is_file() and sealed != csv_files.csv_bytes(columns, ()) and path.read_bytes().startswith(sealed):
+        findings.error(path, f"lacks the sealed columns: {INTERRUPTED}")
+        return
     late = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
     told = Findings(findings.folder)
-    check_table(study.participants(name), content, columns, told, may_differ=late.__contains__)
+    check_table(path, content, columns, told, may_differ=late.__contains__)
     now = study.sessions()
     written = (
         len(now) != len(sessions)
@@ -362,8 +368,8 @@ def _check_description(study: StudyFolder, findings: Findings) -> None:
     sealed_heads: set[bytes] = set()
     for protocol in _published_protocols(study):
         with contextlib.suppress(KeyError, TypeError, ValueError):  # already reported for the receipt
-            head, number = StudyHead.model_validate(protocol["study"]), protocol.get("format", 1)
-            describe = partial(description_bytes, head, protocol_format=number, intervals=has_intervals(protocol))
+            head = StudyHead.model_validate(protocol["study"])
+            describe = partial(description_bytes, head, intervals=has_intervals(protocol))
             heads.add(describe(sealed=sealed))
             sealed_heads.add(describe(sealed=True))
     if not heads or held in heads:
@@ -397,7 +403,7 @@ def _check_exclusions(study: StudyFolder, sessions: Sessions, withdrawn: Collect
             return
         content = without_byte_order_mark(read_regular(study.exclusions))
         names = content.partition(b"\n")[0].decode("utf-8", "replace")
-        columns = [column for column in EXCLUSIONS if column.name in names or not column.later]
+        columns = EXCLUSIONS if EXCLUSIONS[-1].name in names else EXCLUSIONS[:-1]  # an earlier version's list
         for problem in csv_files.table_problems(content, columns):
             findings.error(study.exclusions, problem)
         trials = {

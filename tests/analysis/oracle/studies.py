@@ -14,7 +14,7 @@ import pytest
 from study_app.analysis.report import study_figures, write_report
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.columns import INTERVALS, RESPONSES, TRIALS_2
+from study_app.store.columns import INTERVALS, RESPONSES, TRIALS
 from study_app.store.exclusions import exclude
 from study_app.store.folders import SessionFolder, StudyFolder
 from study_app.store.sites.merge import merge_sites
@@ -36,9 +36,9 @@ FILES = {
 ROOT = Path(__file__).resolve().parents[3]
 NOT_MEASURED = frozenset({"part", "intervals", "targets", "setting", "standard", "level", "catch", "response", "value"})
 MEASURED = {
-    one.name: one.kind
-    for one in (*TRIALS_2, *INTERVALS, *RESPONSES)
-    if one.may_miss and one.kind in ("integer", "number", "flag") and one.name not in NOT_MEASURED
+    name: column.kind
+    for name, column in {it.name: it for it in (*RESPONSES, *INTERVALS, *TRIALS)}.items()
+    if column.may_miss and column.kind in ("integer", "number", "flag") and name not in NOT_MEASURED
 }
 SPREAD = 0.05
 """Standard deviation of the logarithm of what is delivered of a number."""

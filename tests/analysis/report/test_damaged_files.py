@@ -94,8 +94,7 @@ def test_every_damage_behind_the_numbers_is_a_line_of_its_file(
     assert all("liquid-study verify" in line for line in lines)
 
 
-def test_a_table_that_lacks_a_later_column_is_named_where_it_had_it(copy: StudyFolder) -> None:
-    """Tables of earlier versions lack such columns, and are read without them."""
+def test_a_table_without_one_of_its_columns_is_named(copy: StudyFolder) -> None:
     path = copy.sessions()[0].table("rek2024", "trials")
     rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     place = rows[0].index("loop_delay_ticks")

@@ -12,11 +12,10 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from study_app.store.columns import RESPONSES_2, TRIALS
-from study_app.store.csv_files import csv_bytes, read_table, table_problems
+from study_app.store.columns import RESPONSES
+from study_app.store.csv_files import table_problems
 from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
-from tests.store.earlier import TRIALS_HEADER
 
 pytestmark = pytest.mark.slow
 
@@ -186,7 +185,7 @@ def test_a_changed_table_is_refused_with_file_row_and_value(real: Results, old: 
     assert str(path) in message
     found = re.search(r"(row \d+), column (\w+: '.*?' is .*?);", message)
     if found:  # `verify` refuses the same cell in the same row
-        assert list(table_problems(path.read_bytes(), RESPONSES_2)) == [", ".join(found.groups())]
+        assert list(table_problems(path.read_bytes(), RESPONSES)) == [", ".join(found.groups())]
 
 
 def test_quotes_change_nothing(real: Results) -> None:
@@ -197,21 +196,6 @@ def test_quotes_change_nothing(real: Results) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n", quoting=csv.QUOTE_ALL).writerows(rows)
     pd.testing.assert_frame_equal(load_study(real.folder).responses, before)
-
-
-def test_a_table_of_an_earlier_version_is_read_as_if_its_later_columns_held_nothing(rek: Results) -> None:
-    rek.add("P001", by_condition)
-    before = load_study(rek.folder).trials
-    path = rek.trials("P001")
-    earlier = tuple(column for column in TRIALS if column.name in TRIALS_HEADER.split(","))
-    path.write_bytes(csv_bytes(earlier, read_table(path.read_bytes(), earlier)))
-    assert path.read_text(encoding="utf-8").startswith(TRIALS_HEADER + "\n")
-    trials = load_study(rek.folder).trials
-    assert trials[["withheld_share", "limiter_estimator"]].isna().all(axis=None)
-    assert trials["force_mean_n"].equals(before["force_mean_n"])
-    lacking = [column for column in earlier if column.name != "valid"]
-    path.write_bytes(csv_bytes(lacking, read_table(path.read_bytes(), lacking)))
-    assert "does not begin with the columns" in refusal(rek.folder)
 
 
 def test_a_missing_table_is_refused(rek: Results) -> None:

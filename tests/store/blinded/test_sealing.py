@@ -11,14 +11,14 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.blinded.blinding import Key, open_events, seal_event
-from study_app.store.columns import SEALED, TRIALS_2
+from study_app.store.columns import SEALED, TRIALS
 from tests.journal_lines import event_of
 
 START = event_of("session_started", n=1, participant="P007", session=1, measures_sealed=True)
 WHICH = {"trial": 3, "attempt": 1, "outcome": "complete"}
 MEASURED = {
     column.name: 0 if column.kind == "integer" else 0.1 + 0.2
-    for column in TRIALS_2
+    for column in TRIALS
     if column.sealed and column.name != "group"
 }
 
@@ -62,7 +62,7 @@ def test_it_opens_whole_and_numpys_numbers_plain() -> None:
 )
 def test_all_texts_are_equally_long_and_every_number_comes_back(measured: dict[str, Any]) -> None:
     """So that not even the length of a line says how many digits the force has."""
-    integers = {column.name for column in TRIALS_2 if column.kind == "integer"}
+    integers = {column.name for column in TRIALS if column.kind == "integer"}
     measured = {
         name: int(value) if name in integers and value is not None else value for name, value in measured.items()
     }

@@ -1,7 +1,6 @@
 """Before unblinding no table tells a condition; after it every table is what an open study's would have been."""
 
 import csv
-import hashlib
 from pathlib import Path
 
 import pytest
@@ -9,9 +8,8 @@ import pytest
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import unblinding as module
 from study_app.store.blinded.blinding import open_events, open_or_draw_key, reveal
-from study_app.store.checksums import replace_checksums
-from study_app.store.columns import SEALED, TRIALS_2
-from study_app.store.csv_files import csv_bytes, header, read_table, unsealed_columns
+from study_app.store.columns import SEALED, TRIALS
+from study_app.store.csv_files import header, unsealed_columns
 from study_app.store.folders import REBUILT, StudyFolder
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions.open_session import SessionStore
@@ -42,7 +40,7 @@ def sound(folder: Path) -> bool:
 def test_a_sealed_study_holds_no_column_that_tells_a_condition(tmp_path: Path, finished: Start) -> None:
     store = finished()
     folder = tmp_path / "study"
-    assert names(store.folder.table("brackish", "trials")) == set(header(unsealed_columns(TRIALS_2)))
+    assert names(store.folder.table("brackish", "trials")) == set(header(unsealed_columns(TRIALS)))
     for path in folder.rglob("*.*"):
         if path.is_file():
             held = path.read_bytes()
@@ -156,7 +154,7 @@ def in_clear(store: SessionStore, study: StudyHead) -> None:
 
     forge(store.folder.journal, clear)
     cover_up(store.place.study_folder.path)
-    store.place.study_folder.description.write_bytes(description_bytes(study, sealed=False, protocol_format=2))
+    store.place.study_folder.description.write_bytes(description_bytes(study, sealed=False))
 
 
 @pytest.mark.slow
@@ -166,7 +164,7 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     store = finished()
     in_clear(store, protocol.study)
     folder = tmp_path / "study"
-    assert names(store.folder.table("brackish", "trials")) == set(header(TRIALS_2))
+    assert names(store.folder.table("brackish", "trials")) == set(header(TRIALS))
     assert sound(folder)
     assert rebuild_session(store.folder.path).rewritten == ()
     later = finished("P008")
@@ -175,20 +173,5 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
     held = store.folder.table("brackish", "trials").read_bytes()
     assert unblind(folder, "AB", "done").left == ()
     assert store.folder.table("brackish", "trials").read_bytes() == held
-    assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS_2))
+    assert names(later.folder.table("brackish", "trials")) == set(header(TRIALS))
     assert sound(folder)
-
-
-def test_a_table_of_an_earlier_version_is_opened_without_the_column_that_it_did_not_know(finished: Start) -> None:
-    store = finished()
-    folder, path = store.place.study_folder.path, store.folder.table(store.place.study, "trials")
-    earlier = tuple(column for column in unsealed_columns(TRIALS_2) if column.name != "recording_lost")
-    sealed = path.read_bytes()
-    path.write_bytes(csv_bytes(earlier, read_table(sealed, earlier)))
-    replace_checksums(
-        store.folder, {path.name: tuple(hashlib.sha256(one).hexdigest() for one in (sealed, path.read_bytes()))}
-    )
-    for _ in range(2):
-        assert unblind(folder, by="AB", reason="a test").left == ()
-        assert names(path) == set(header(TRIALS_2)) - {"recording_lost"}
-    assert verify_study(folder).errors == ()

@@ -7,7 +7,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import KINDS
 from study_app.store.blinded.blinding import open_or_draw_key
-from study_app.store.columns import RESPONSES_2
+from study_app.store.columns import RESPONSES
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import dictionary_markdown
 from study_app.store.tables.study_files import check_study, write_description
@@ -16,8 +16,7 @@ from study_app.store.tables.study_files import check_study, write_description
 @pytest.mark.parametrize(
     "line",
     [
-        "| `response` | a whole number from 1 to 7 or n/a | The answer on the scale, from 1 (completely disagree) to 7 "
-        "(completely agree). |",
+        "| `part` | a whole number of at least 1 or n/a | Part of the study, as shown to the participant. |",
         "| `simulated` | true or false | true if participant and device were simulated (a rehearsal). |",
         "| `force_peak_n` | a number of at least 0 or n/a [N] | Largest magnitude of the force sent to the device. "
         "**Sealed until unblinding.** |",
@@ -30,7 +29,7 @@ def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:
 
 
 def test_the_column_of_kinds_names_every_kind_of_question() -> None:
-    (kind,) = (column for column in RESPONSES_2 if column.name == "kind")
+    (kind,) = (column for column in RESPONSES if column.name == "kind")
     assert set(KINDS) == set(kind.description.rstrip(".").partition(": ")[2].split(", "))
 
 

@@ -14,30 +14,14 @@ from study_app.errors import StoreError
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.columns import TABLES
-from study_app.store.csv_files import csv_bytes, read_table
 from study_app.store.journals import journal_events
-from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify_study
 from tests.faults.support import short
 from tests.platforms import needs_fork
 from tests.store.conftest import Start
-from tests.store.earlier import TRIALS_HEADER
 from tests.store.verification.played_studies import P007, told, warned
 
 pytestmark = pytest.mark.slow
-
-
-def test_a_table_of_an_earlier_version_is_compared_in_the_columns_it_has(study: Path) -> None:
-    unblind(study, "AB", "done")
-    (path,) = (study / P007).glob("*trials_data.csv")
-    held = [column for column in TABLES["trials"] if column.name in TRIALS_HEADER.split(",")]
-    earlier = csv_bytes(held, read_table(path.read_bytes(), held))
-    assert earlier.startswith(TRIALS_HEADER.encode() + b"\n")
-    path.write_bytes(earlier)
-    assert [line for line in told(verify_study(study)).splitlines() if "its checksum differs" not in line] == []
-    path.write_bytes(earlier.replace(b"complete", b"timeout", 1))
-    assert "differs from the journal, from line" in told(verify_study(study))
 
 
 def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_path: Path, start: Start) -> None:
@@ -91,24 +75,23 @@ def test_nothing_of_the_key_is_shown(study: Path) -> None:
     assert not [word for word in content["tables"]["conditions"] if word in shown]
 
 
-def test_a_description_of_an_earlier_version_is_a_warning_and_a_column_it_never_had_an_error(study: Path) -> None:
+def test_another_description_of_a_column_is_a_warning_and_another_range_an_error(study: Path) -> None:
     path = study / "dataset_description.json"
     content = json.loads(path.read_bytes())
-    variables = [it for it in content["variableMeasured"] if it["name"] != "withheld_share"]
-    variables[0] = variables[0] | {"description": "In other words.", "valuePattern": "(.*)"}
+    variables = content["variableMeasured"]
+    variables[0] = variables[0] | {"description": "In other words."}
     path.write_text(json.dumps(content | {"variableMeasured": variables}), encoding="utf-8", newline="\n")
     findings = verify_study(study)
     assert not any(error.place == path.name for error in findings.errors)
     assert "describes the columns as an earlier version of the program did" in warned(findings)
     at = next(index for index, it in enumerate(variables) if "minValue" in it and "unitText" in it)
-    for change in ({"minValue": -5}, {"maxValue": 7}, {"unitText": "mile"}, {"@type": "y"}, None):
-        changed = variables[1:] if change is None else [*variables[:at], variables[at] | change, *variables[at + 1 :]]
+    for change in ({"minValue": -5}, {"maxValue": 7}, {"unitText": "mile"}, {"@type": "y"}):
+        changed = [*variables[:at], variables[at] | change, *variables[at + 1 :]]
         path.write_text(json.dumps(content | {"variableMeasured": changed}), encoding="utf-8", newline="\n")
         assert "differs from what this version writes" in told(verify_study(study))
 
 
-def test_a_column_that_earlier_versions_did_not_write_cannot_be_taken_from_a_table_of_today(study: Path) -> None:
-    """The table reads as one of an earlier version; its checksum says that it was changed."""
+def test_a_column_that_was_removed_from_a_table_is_found(study: Path) -> None:
     (path,) = (study / "data" / "sub-P007" / "ses-01").glob("*trials_data.csv")
     rows = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
     at = rows[0].index("loop_delay_changes")
