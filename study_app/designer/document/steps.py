@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, fields, is_dataclass, replace
 from functools import cache
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
     check_values,
@@ -247,6 +247,9 @@ class AddInstrument(Request):
         return Step(f"Add {self.name}", (*edits, Set(path, table)), path)
 
 
+_SCALE: Final = ("scene", "scale")
+
+
 @cache
 def _shipped_documents() -> dict[str, Mapping[str, Any]]:
     return {name: read_document(source_bytes(name), name)[0] for name in shipped()}
@@ -264,21 +267,30 @@ def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
 
 @dataclass(frozen=True, slots=True)
 class AddLiquid(Request):
-    """Add a shipped study's liquid, with a condition for it if the study has conditions."""
+    """Add a shipped study's liquid, with a condition for it if the study has conditions.
+
+    A study without a scale of its own gets that of the shipped study: at another scale the device may not be able to
+    present the liquid.
+    """
 
     source: str
     name: str
 
     def help(self, study: Study) -> str:
-        """Return where the liquid comes from, and whether its forces differ because the scales of the scenes do."""
-        theirs, own = (
-            value_at(document, ("scene", "scale")) or SceneDefaults.model_fields["scale"].default
-            for document in (_shipped_documents()[self.source], study.document)
-        )
+        """Return where the liquid comes from, and whether the scale of the scene changes or its forces differ."""
+        theirs, own = self._scales(study)
         origin = f"As in the shipped study {self.source}, with all its numbers"
         if theirs == own:
             return origin
+        if value_at(study.document, _SCALE) is None:
+            return f"{origin}. The scale of the scene becomes {theirs:g}, as there, for all liquids."
         return f"{origin}. Its forces differ: there the scale of the scene is {theirs:g}, here {own:g}."
+
+    def _scales(self, study: Study) -> tuple[float, float]:
+        """Return the scale of the scene in the shipped study and in this one."""
+        documents = (_shipped_documents()[self.source], study.document)
+        theirs, own = (value_at(it, _SCALE) or SceneDefaults.model_fields["scale"].default for it in documents)
+        return theirs, own
 
     def step(self, at: Situation) -> Step:
         document = at.study.document
@@ -286,6 +298,9 @@ class AddLiquid(Request):
         edits: tuple[Edit, ...] = (Set(("liquids", name), _as_written(shipped_liquids()[self.source, self.name])),)
         if names(document, "conditions"):
             edits = (*edits, Set(("conditions", name), {"liquid": name}))
+        theirs, own = self._scales(at.study)
+        if theirs != own and value_at(document, _SCALE) is None:
+            edits = (*edits, Set(_SCALE, theirs))
         return Step(f"Add {label_of(self.name).lower()}", edits, ("liquids", name))
 
 

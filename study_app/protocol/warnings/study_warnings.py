@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 
 from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
 from study_app.haptics.model.gate import effective_speed_mps
+from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.consistency import LEAST_N, force_n
@@ -58,7 +59,7 @@ def liquid_warnings(protocol: Protocol) -> tuple[str, ...]:
     felt = {name: steady_force(protocol.scene_of(name)) for name in protocol.liquids}
     return (
         *_similar_liquids(protocol, felt),
-        *_clipped_liquids(felt),
+        *_clipped_liquids(protocol, felt),
         *_ignoring_viscosity(protocol, felt),
         *_practised_liquids(protocol),
         *_balls_of_different_sizes(protocol),
@@ -86,14 +87,24 @@ def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
     return dict.fromkeys(name for condition in conditions for name in condition.liquid_ids)
 
 
-def _clipped_liquids(felt: dict[str, Steady]) -> Iterator[str]:
+def _clipped_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     for name, it in felt.items():
         if it.limit is not None:
             limit = "the force limit" if it.limit == "norm" else "the slope limit, which keeps the servo stable,"
+            scale = _unclipped_scale(protocol.scene_of(name))
+            most_percent = protocol.limits.withheld_percent
+            beyond = "" if 100 * (1 - it.force_n / it.drag_n) <= most_percent else ", beyond limits.withheld_percent"
+            advice = "" if scale is None else f"; with scene.scale = {scale} it is not clipped"
             yield (
                 f"{name} is clipped: at {HAND_MPS:g} m/s of the hand {limit} lets {it.force_n:.2f} of its "
-                f"{it.drag_n:.2f} N through"
+                f"{it.drag_n:.2f} N through{beyond}{advice}"
             )
+
+
+def _unclipped_scale(scene: Scene) -> int | None:
+    """Return the highest lower whole scale at which the liquid of a scene is not clipped, or None."""
+    lower = range(math.ceil(scene.scale) - 1, 0, -1)
+    return next((it for it in lower if steady_force(scene.model_copy(update={"scale": it})).limit is None), None)
 
 
 def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:

@@ -51,6 +51,11 @@ def after(study: Study, *requests: AddKey | SetValue | RemoveKey | AddLiquid) ->
     return study
 
 
+def warned(study: Study) -> str:
+    assert study.protocol is not None
+    return "\n".join(warnings(study.protocol))
+
+
 @pytest.fixture
 def study() -> Study:
     read = read_study(STUDY)
@@ -102,11 +107,6 @@ def test_a_repeated_form_is_counted_each_time_with_and_without_groups() -> None:
     assert facts(read_study(plain)).answers == facts(read_study(grouped)).answers == 2
 
 
-def warned(study: Study) -> str:
-    assert study.protocol is not None
-    return "\n".join(warnings(study.protocol))
-
-
 def test_another_liquid_and_another_delay_are_warned_of_and_a_drawn_order_is_not(study: Study) -> None:
     good = after(study, SetValue(DESIGN, "abx"))
     assert "in one order" not in warned(good)
@@ -119,11 +119,18 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     entries = {entry.words: entry for entry in addable_elements(study, ())}
     slime = entries["Slime liquid (slime)"]
     assert isinstance(slime.asks, AddLiquid)
-    assert slime.help.endswith("Its forces differ: there the scale of the scene is 3, here 10.")
+    assert slime.help.endswith("The scale of the scene becomes 3, as there, for all liquids.")
+    other = after(study, SetValue(("scene", "scale"), 10))
+    assert slime.asks.help(other).endswith("Its forces differ: there the scale of the scene is 3, here 10.")
+    assert after(other, slime.asks).document["scene"] == {"scale": 10}
     same = after(study, SetValue(("scene", "scale"), 3))
     assert slime.asks.help(same) == "As in the shipped study slime, with all its numbers"
     added = after(study, slime.asks)
     assert added.faults == ()
+    assert added.document["scene"] == {"scale": 3}
+    assert "slime_2 is clipped" not in warned(added)
+    clipped = warned(after(added, SetValue(("scene", "scale"), 10)))
+    assert "17.36 N through, beyond limits.withheld_percent; with scene.scale = 3 it is not clipped" in clipped
     table = added.document["liquids"]["slime_2"]
     assert dict(table) == dict(shipped_liquids()["slime", "slime"])
     assert added.document["conditions"]["slime_2"] == {"liquid": "slime_2"}
