@@ -40,6 +40,7 @@ from study_app.designer.document.study import Study, read_study
 from study_app.designer.header import HeaderState, StudyChoice, problems_chip
 from study_app.designer.outline import icon_of
 from study_app.designer.parts import cut_text, make_dense
+from study_app.designer.problems import problem_rows
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.designer.version_rows import VersionChip
 from study_app.errors import StudyError
@@ -116,6 +117,10 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "compare-liquids": (
         "Compare liquids",
         "Can people tell liquids apart, and what do they call them? Statements after each liquid.",
+    ),
+    "two-liquids-abx": (
+        "Two liquids, ABX",
+        "Can people tell two liquids apart? A, B, and X, which is one of them; statements after the block.",
     ),
     "viscosity-jnd": (
         "Viscosity JND",
@@ -307,7 +312,7 @@ def header_state(
     return HeaderState(
         studies=choices,
         chosen=source_of(opened.file),
-        problems=problems_chip(len(opened.study.faults), warnings),
+        problems=problems_chip(len(problem_rows(opened.study)), warnings),
         draft="" if opened.read_only else draft,
         undo=opened.done[-1].words if opened.done else "",
         redo=opened.undone[-1].words if opened.undone else "",

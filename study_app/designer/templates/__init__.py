@@ -15,6 +15,7 @@ QUESTIONS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
         ("Delays from, to", ("stimuli", "delay", "levels")),
         ("Trials", ("methods", "adaptive", "trials")),
     ),
+    "two-liquids-abx": (("Trials", ("blocks", "liquids", "repetitions")),),
     "rate-realism": (("Each liquid comes", ("blocks", "liquids", "repetitions")),),
 }
 """What a template asks beyond title, name and languages: words, and the key that holds the answer."""
