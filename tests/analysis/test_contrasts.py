@@ -232,6 +232,14 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
     assert (tmp_path / "report" / "hypothesis-1.svg").is_file()
 
 
+def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> None:
+    protocol = parse(LOADED.encode(), "loaded.toml")
+    told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found={}))
+    half, smallest = detectable(18, tail=0.025)
+    assert "“raw” of load differs between late and prompt" in told
+    assert f"| raw | 18 | 1 | ±{half:.2f} SD | ±{smallest:.2f} SD |" in told
+
+
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [

@@ -67,7 +67,7 @@ from study_app.store.sessions.open_session import Place
 from study_app.store.tables.study_files import has_intervals, refuse_earlier_columns
 from study_app.store.unblinding import has_opened_keys, late_exclusions
 from study_app.store.verification.verify_session import Discrepancy, session_discrepancies
-from study_app.store.withdrawals import tombstones
+from study_app.store.withdrawals import Tombstone, tombstones
 
 Settings: TypeAlias = Mapping[tuple[str, str], Setting]
 AnyBlock = TypeVar("AnyBlock", Block, LevelBlock)
@@ -164,7 +164,7 @@ class Study:
     trials; ``others`` are the questions outside blocks of statements; ``answered`` has the recorded answers to all
     questions, of which ``responses`` are those to statements; ``own_dynamics`` are the device's, if receipts record a
     measurement; ``estimator`` is the velocity estimator, "device" if the device measured the velocity, None if receipts
-    do not record it. ``withdrawn`` is the number of participants who withdrew and whose data were erased. ``contrasts``
+    do not record it. ``withdrawn`` are the participants who withdrew and whose data were erased. ``contrasts``
     are the study's hypotheses and ``liquids`` its liquids' tables, once the key is open. ``sites`` are the names of the
     sites of a merged study, whose participants are SITE-ID. ``with_below_chance`` includes answers below chance even
     though no person has decided about them.
@@ -191,7 +191,7 @@ class Study:
     protocol: Mapping[str, Any] = field(default_factory=dict)
     own_dynamics: OwnDynamics | None = None
     estimator: str | None = None
-    withdrawn: int = 0
+    withdrawn: tuple[Tombstone, ...] = ()
     sites: tuple[str, ...] = ()
     contrasts: tuple[Contrast, ...] = ()
     with_below_chance: bool = False
@@ -350,10 +350,10 @@ def _load_sites(merged: Merged, *, planned: bool) -> Study:
     sites = {name: read(place.path) for name, place in places.items() if place.sessions()}
     if not sites:
         raise AnalysisError(f"{merged.path} does not contain sessions: all participants of its sites withdrew")
-    return pool_sites(merged.path, sites, sum(len(tombstones(place)) for place in places.values()))
+    return pool_sites(merged.path, sites, [it for place in places.values() for it in tombstones(place).values()])
 
 
-def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Study:
+def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: Sequence[Tombstone]) -> Study:
     """Return a merged study from the studies of its sites by name; either all or none are unblinded."""
     studies = list(sites.values())
     estimators = [study.estimator.split(" or ") for study in studies if study.estimator is not None]
@@ -393,7 +393,7 @@ def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: int) -> Stud
             (study.own_dynamics for study in studies), sum(len(study.participants) for study in studies)
         ),
         estimator=" or ".join(dict.fromkeys(part for parts in estimators for part in parts)) or None,
-        withdrawn=withdrawn,
+        withdrawn=tuple(withdrawn),
     )
 
 
@@ -450,7 +450,7 @@ def _load(folder: Path, *, sealed: bool = False, planned: bool = True) -> Study:
         protocol=records[0].protocol,
         own_dynamics=mean_dynamics(records),
         estimator=estimators_of(records),
-        withdrawn=len(tombstones(place)),
+        withdrawn=tuple(tombstones(place).values()),
     )
 
 

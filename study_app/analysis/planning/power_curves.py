@@ -465,7 +465,7 @@ def _summary(power: Powers) -> Iterator[str]:
 
 
 def _between(power: Powers) -> Iterator[str]:
-    """Yield a table for each contrast of a statement between groups, for which the answer model has no effect."""
+    """Yield a table for each contrast of a statement between groups or of a form, which have no simulated effect."""
     plan = power.plan
     given = draw_opinions(plan, _MANY, power.seed, 0) if plan.between else ()
     for contrast, shares in plan.between:
@@ -483,6 +483,27 @@ def _between(power: Powers) -> Iterator[str]:
             said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan),
             largest=equality_limits(contrast, 1.0, ratio=False)[1],
         )  # fmt: skip
+    for contrast, of_groups in plan.of_forms:
+        members = len(plan.contrasts) + plan.untested
+        yield from form_differences(contrast, power.sizes, plan.decided.alphas[-1], members, of_groups)
+
+
+def form_differences(
+    contrast: Contrast, sizes: Sequence[int], alpha: float, members: int, shares: tuple[float, float] | None
+) -> Iterator[str]:
+    """Yield the table of a contrast of a form in standard deviations, which no answer model predicts.
+
+    The parameters are those of `smallest_differences`.
+    """
+    of = "answers or scores" if contrast.within is None else "differences within participants"
+    said = (
+        f"Answers to this form are not simulated. Numbers are multiples of the standard deviation (SD) of the {of}, "
+        "which pilot sessions or published data give."
+    )
+    rows = [(contrast.measure, "1", 1.0)]
+    yield from smallest_differences(
+        contrast, sizes, alpha, members, rows, "question or score", said, "±{:.2f} SD".format, shares
+    )
 
 
 def _bounds(plan: Plan) -> int:

@@ -69,7 +69,8 @@ class Plan:
 
     ``kinds`` are the kinds of participants whose power is computed, by name, the main kind first; ``participants`` is
     their planned number. Contrasts of statements ``between`` groups come with the share of participants in each of the
-    two groups. Of the others, ``untested_bounds`` have an equivalence bound.
+    two groups; so do contrasts ``of_forms``, with None within participants. Of the others, ``untested_bounds`` have an
+    equivalence bound.
     """
 
     name: str
@@ -83,6 +84,7 @@ class Plan:
     untested: int = 0
     between: tuple[tuple[Contrast, tuple[float, float]], ...] = ()
     untested_bounds: int = 0
+    of_forms: tuple[tuple[Contrast, tuple[float, float] | None], ...] = ()
 
     @property
     def unknown(self) -> tuple[str, ...]:
@@ -102,7 +104,8 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
     every = () if protocol.analysis is None else protocol.analysis.contrasts
     items = {block.id: {item.id for item in _statements(protocol, block)} for block in asked}
-    stated = [contrast for contrast in every if all(contrast.measure in items.get(it, ()) for it in contrast.blocks)]
+    asked_of = [it for it in every if it.form is None]
+    stated = [it for it in asked_of if all(it.measure in items.get(block, ()) for block in it.blocks)]
     within = tuple(contrast for contrast in stated if contrast.groups is None)
     return Plan(
         name=protocol.study.name,
@@ -118,6 +121,7 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
             (contrast, shares) for contrast in stated if (shares := group_shares(protocol, contrast)) is not None
         ),
         untested_bounds=sum(contrast.bound is not None for contrast in every if contrast not in within),
+        of_forms=tuple((it, group_shares(protocol, it)) for it in every if it.form is not None),
     )
 
 

@@ -16,7 +16,13 @@ import numpy as np
 from study_app import __version__
 from study_app.analysis.data.blocks import decisions, display_language
 from study_app.analysis.data.measures import Array
-from study_app.analysis.planning.power_curves import OF_BLOCK, OF_STUDIES, interval, smallest_differences
+from study_app.analysis.planning.power_curves import (
+    OF_BLOCK,
+    OF_STUDIES,
+    form_differences,
+    interval,
+    smallest_differences,
+)
 from study_app.analysis.planning.simulated_studies import group_shares
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
@@ -355,7 +361,12 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
     if (decided := precisions.protocol.analysis) is None:
         return
     planned = plans(precisions.protocol, ())
+    alpha, members = decisions(precisions.protocol).alphas[-1], len(decided.contrasts)
     for contrast in decided.contrasts:
+        if contrast.form is not None:
+            shares = group_shares(precisions.protocol, contrast)
+            yield from form_differences(contrast, precisions.sizes, alpha, members, shares)
+            continue
         firsts = [next(iter(planned[block].values())) for block in contrast.blocks if block in planned]
         if len(firsts) < len(contrast.blocks) or any(_MEASURED.get(type(it)) != contrast.measure for it in firsts):
             continue
@@ -370,7 +381,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         if contrast.within is not None:
             whose = "one participant's difference, from the errors of both estimates and differences between people"
         yield from smallest_differences(
-            contrast, precisions.sizes, decisions(precisions.protocol).alphas[-1], len(decided.contrasts), rows,
+            contrast, precisions.sizes, alpha, members, rows,
             f"trials{first.per}",
             f"SD{share}; {whose} by a factor of {BETWEEN_PEOPLE:g}.",
             (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,

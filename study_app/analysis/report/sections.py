@@ -407,7 +407,9 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         people = listed([f"{site} ({counted(here[site], 'participant')})" for site in study.sites])
         yield paragraph(f"The results of these sites are merged: {people}.")
     if study.withdrawn:
-        yield paragraph(f"{counted(study.withdrawn, 'participant').capitalize()} withdrew; their data were erased.")
+        people = counted(len(study.withdrawn), "participant").capitalize()
+        yield paragraph(f"{people} withdrew; their data were erased.")
+        yield bullets([f"{it.at[:10]}, recorded by {it.by}: {it.reason}" for it in study.withdrawn])
     masked = Counter(map(str, study.participants["motors_masked"].dropna()))
     if masked:
         answers = [f"{means} in {counted(count, 'session')}" for means, count in masked.most_common()]

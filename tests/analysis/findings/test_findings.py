@@ -46,7 +46,7 @@ SHAPES = {
     "two liquids": made(2, 8, kind="liquids"),
     "one setting": made(1, 8),
     "sessions and repetitions": made(4, 10, sessions=2, repetitions=2),
-    "sites": pool_sites(Path("nowhere"), {"A": made(3, 6), "B": made(3, 6)}, 0),
+    "sites": pool_sites(Path("nowhere"), {"A": made(3, 6), "B": made(3, 6)}, ()),
     "five people": made(4, 5),
     "one person": made(3, 1, kind="liquids"),
     "nobody": made(3, 0),

@@ -65,7 +65,7 @@ def test_those_of_sites_are_weighted_by_their_sessions() -> None:
         for own in (OwnDynamics(damping_nspm=1, friction_n=2, mass_kg=3, sessions=1, of=2), None)
     )
     third = replace(one, own_dynamics=OwnDynamics(damping_nspm=4, friction_n=5, mass_kg=9, sessions=2, of=2))
-    assert pool_sites(Path("nowhere"), {"A": one, "B": other, "C": third}, 0).own_dynamics == OwnDynamics(
+    assert pool_sites(Path("nowhere"), {"A": one, "B": other, "C": third}, ()).own_dynamics == OwnDynamics(
         damping_nspm=3, friction_n=4, mass_kg=7, sessions=3, of=0
     )
 

@@ -101,7 +101,9 @@ def test_no_byte_of_the_person_remains_and_the_study_is_sound(study: Path, resul
     assert verify_study(study, copy).is_sound
     assert "participant P002 withdrew at 2026-11-22T09:30:00+00:00" in "\n".join(map(str, verify_study(study).warnings))
     (page,) = [path for path in report(study, results.parent / "again") if path.name == "report.html"]
-    assert "1 participant withdrew; their data were erased." in page.read_text(encoding="utf-8")
+    text = page.read_text(encoding="utf-8")
+    assert "1 participant withdrew; their data were erased." in text
+    assert "2026-11-22, recorded by AK: asked" in text
 
 
 def test_the_tombstone_proves_which_session_was_erased(study: Path) -> None:
