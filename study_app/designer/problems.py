@@ -1,6 +1,7 @@
 """The problems of a study, as ``check`` prints them, with their repairs: found, listed, and pressed."""
 
 import re
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -26,6 +27,7 @@ from study_app.gui.widgets.labels import Clamped, Elided, label
 from study_app.number_text import capitalised
 from study_app.protocol.source.document import Path, names, places_of
 from study_app.protocol.source.problems import Fault
+from study_app.protocol.wording.languages import language_name
 
 _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
 """The place in the file that a warning begins with."""
@@ -59,7 +61,26 @@ class ProblemRow:
 
 @lru_cache(maxsize=2)
 def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
-    """Return the problems of a study, in the order of their lines."""
+    """Return the problems of a study, in the order of their lines.
+
+    The texts that are missing in a language are one problem, at the first of them.
+    """
+    rows = fault_rows(study)
+    missing = Counter(row.fault.missing_language for row in rows if row.fault.kind == "no text")
+    shown: dict[object, ProblemRow] = {}
+    for row in rows:
+        code = row.fault.missing_language
+        if row.fault.kind == "no text" and missing[code] > 1:
+            message = f"{missing[code]} texts are missing in {language_name(code)}; this is the first"
+            fault = row.fault._replace(message=message, hint="")
+            shown.setdefault(code, replace(row, message=message, hint="", fault=fault))
+        else:
+            shown[row] = row
+    return tuple(shown.values())
+
+
+def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
+    """Return a row for each fault of a study, in the order of their lines."""
     if not study.is_toml:
         return tuple(
             ProblemRow(
@@ -289,7 +310,7 @@ class ProblemsCard(Card):
         self.next = small_button("", "Next", cap=key_cap("next problem"), height=36)
         self.next.setToolTip(command_tip("next problem"))
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
-        titles = self.heading, label("the same problems as printed by liquid-study check", "small", "text2")
+        titles = self.heading, label("liquid-study check prints them, too", "small", "text2")
         top = hbox(*titles, STRETCH, self.limit, self.next, self.close_button, spacing=10)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)

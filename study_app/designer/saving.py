@@ -13,6 +13,7 @@ from study_app.designer.document.toml_text import Refused
 from study_app.designer.editing import Editing
 from study_app.designer.header import Notice
 from study_app.designer.new_study_page import source_of
+from study_app.designer.problems import problem_rows
 from study_app.designer.prompts import ConfirmCard
 from study_app.designer.version_rows import FILE, Comparison
 from study_app.designer.versions import KnownRuns, SaveCard, compare, latest_run, version_of
@@ -185,7 +186,7 @@ class Saving(QObject):
     def _show_save_card(self, opened: Document, standing: Standing) -> None:
         run = latest_run(self.runs.known)
         comparison = Comparison() if run is None else compare(version_of(opened, run), opened.study)
-        problems = len(opened.study.faults)
+        problems = len(problem_rows(opened.study))
         self.card = card = SaveCard(standing, self.runs.known, comparison, problems)
         card.save_asked.connect(self.save_as_version)
         card.another_asked.connect(self.save_as_another)
@@ -234,7 +235,7 @@ class Saving(QObject):
             self.place.message.emit("The study was not saved", f"{error}.")
             self.editing.announce_edit()
             return
-        count = len(opened.study.faults)
+        count = len(problem_rows(opened.study))
         said = f"Saved. It cannot be run yet: {counted(count, 'problem')}" if count else None
         self._show_notice(said, ("problems", "Show the list"), lasts=False)
         self._show_banner(opened)

@@ -103,7 +103,7 @@ def finding(story: Story) -> None:
 
 def languages(story: Story) -> None:
     story.act("add", lambda: story.designer.editing.handle_request(ChangeLanguage("add", "nl")))
-    story.play("@pages.welcome ctrl+l ctrl+4 F8 Return ctrl+z")
+    story.play("@pages.welcome ctrl+l ctrl+4 F8")
     story.act("copy", lambda: story.designer.editing.handle_request(ChangeLanguage("copy", "nl")))
     story.select("pages", "welcome")
     story.act("title", story.designer.field("pages", "welcome", "title").lines["nl"].setFocus)

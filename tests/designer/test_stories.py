@@ -329,11 +329,13 @@ def incomplete(story: Story) -> None:
     story.ask(ChangeLanguage("add", "nl"))
     count = len(story.designer.study.faults)
     assert count == sum(1 for _ in texts_of(story.designer.study)), "each text is missing in Dutch"
-    story.expect(f"{count} problems", undo="Add Dutch")
+    story.expect("1 problem", undo="Add Dutch")
     story.play("ctrl+s")
-    story.expect(f"Saved. It cannot be run yet: {count} problems", kept="saved")
+    story.expect("Saved. It cannot be run yet: 1 problem", kept="saved")
     story.play("[Show the list] @device")
-    assert story.designer.place.problems.isVisible()
+    (line,) = story.designer.place.problems.lines
+    assert line.row.message == f"{count} texts are missing in Dutch; this is the first"
+    assert "missing" not in " ".join(told(story.designer.place.form)), "no field complains before it was filled in"
     story.ask(ChangeLanguage("copy", "nl"))
     story.expect("No problems", "1 warning", undo="Fill in Dutch")
     story.play("ctrl+s")
@@ -621,9 +623,9 @@ def repairs(story: Story) -> None:
     )
     story.ask(RetypeFile(text))
     story.play("ctrl+1 F8")
-    story.expect("27 problems", at="Use this text in every language: Task Reach, Instruction")
+    story.expect("26 problems", at="Use this text in every language: Task Reach, Instruction")
     story.play("'E' 'en titel'")
-    story.expect("26 problems", at="Instruction, Dutch")
+    story.expect("25 problems", at="Instruction, Dutch")
     assert designer.value("tasks", "reach", "instruction", "nl") == "Een titel"
 
 

@@ -25,7 +25,7 @@ from study_app.designer import header as shown
 from study_app.designer.controller import DesignerController
 from study_app.designer.header import Notice, PlayDevices
 from study_app.designer.participant.playable import NotPlayableError, Playable, StepPosition, part_to_play
-from study_app.designer.problems import problem_rows
+from study_app.designer.problems import fault_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
 from study_app.gui.kit.devices import device_choices, settings_here
@@ -189,7 +189,7 @@ class Playing(QObject):
         try:
             playable_part = part_to_play(study, opened.selected, self.where())
         except NotPlayableError as refused:
-            names = {str(problem): row.name for problem, row in zip(study.problems, problem_rows(study), strict=True)}
+            names = {str(problem): row.name for problem, row in zip(study.problems, fault_rows(study), strict=True)}
             named = (replace(problem, place=names.get(str(problem), problem.place)) for problem in refused.problems)
             self._show_notice(shown.refusal_notice(tuple(map(str, named))))
             return

@@ -238,7 +238,10 @@ def _repairs_by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
         yield Repair("Use this text in every language", (Set(path, dict.fromkeys(languages, value)),))
     elif fault.kind == "not in sequence" and isinstance(sequence, tuple):
         yield Repair("Add to the session", (Insert(("sequence", max(len(sequence) - 1, 0)), path[-1]),))
-    elif (lacking := fault.missing_language) and isinstance(value, Mapping) and value:
+    elif (lacking := fault.missing_language) and fault.kind == "no text":
+        first = languages_of(study.document)[0]
+        yield Repair(f"Copy {language_name(first)} to {language_name(lacking)}", edits_to_fill_in(study, lacking))
+    elif lacking and isinstance(value, Mapping) and value:
         first = next(iter(value))
         sentence = f"Copy {language_name(first)} to {language_name(lacking)}"
         yield Repair(sentence, (Set((*path, lacking), value[first]),))

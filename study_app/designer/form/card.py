@@ -299,7 +299,7 @@ class RowWidget(Themed, QWidget):
         offered = {
             problem: sentences
             for problem, sentences in known.items()
-            if problem.fault.path[: len(path)] == path and sentences
+            if problem.fault.path[: len(path)] == path and problem.fault.kind != "no text" and sentences
         }
         if offered == self._offered:
             return

@@ -231,7 +231,11 @@ def _is_given(row: Row) -> bool:
 
 def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     document, path = study.document, row.path
-    faults = tuple(_sentence(fault.message, fault.hint) for fault in study.faults if fault.path[: len(path)] == path)
+    faults = tuple(
+        _sentence(fault.message, fault.hint)
+        for fault in study.faults
+        if fault.path[: len(path)] == path and fault.kind != "no text"  # the empty field says that
+    )
     if path == STUDY_LANGUAGES:
         row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
     codes, is_text = languages_of(document), row.kind in {"localised", "paragraphs"}

@@ -19,11 +19,12 @@ Schema = Mapping[str, Any]
 
 _FaultKind: TypeAlias = Literal[
     "", "missing", "unknown key", "unknown name", "surplus", "other language", "one language", "alike", "not a number",
-    "not in sequence", "part",
+    "not in sequence", "part", "no text",
 ]  # fmt: skip
 """What is wrong, where a repair follows from it: "surplus" does not belong there, "other language" is a text in one
 that the study lacks, "one language" a plain text in a study of several, "alike" a text that repeats another one, "part"
-the number of a part of the session; "" is anything else."""
+the number of a part of the session, "no text" a text that is missing in one of several languages; "" is anything
+else."""
 
 
 class Fault(NamedTuple):

@@ -195,7 +195,7 @@ def language_name(code: str) -> str:
 def missing_text(path: Path, language: str) -> Fault:
     """Return the fault about a text missing in one of the study's languages."""
     hint = f"add {language}: every text must exist in every language of the study"
-    return Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language)
+    return Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language, kind="no text")
 
 
 def words(language: str) -> Words:

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QAbstractButton, QApplication
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import read_study
 from study_app.designer.header import problems_chip
+from study_app.designer.problems import problem_rows
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.document import Path, value_at
 from study_app.store.drafts import draft_of
@@ -100,9 +101,9 @@ class Story:
             self._checked = opened.study.text
             again = read_study(self._checked.encode(), opened.file.parent)
             assert again.faults == opened.study.faults
-            rows = {row.fault for row in designer.place.view.problems if not row.warning}
-            assert rows == set(again.faults), "the list of problems"
-        count = len(opened.study.faults)
+            rows = [row.fault for row in designer.place.view.problems if not row.warning]
+            assert rows == [row.fault for row in problem_rows(again)], "the list of problems"
+        count = len(problem_rows(opened.study))
         words = header.problems.words
         assert words == problems_chip(count, 0)[2] if count else not words.endswith("problem"), words
         for button, steps in ((header.undo, opened.done), (header.redo, opened.undone)):
