@@ -59,26 +59,33 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
 
 
 def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
-    """Return edits of a block's design and the further edits that the design requires.
+    """Return edits of a block's design or conditions and the further edits that the design requires.
 
     Keys that no longer belong to the block are removed; a questionnaire comes after the block, once; the first
-    condition becomes the standard.
+    condition becomes the standard unless the standard is among the conditions.
     """
-    if path[:1] != ("blocks",) or path[2:] != ("design",):
+    if path[:1] != ("blocks",) or path[2:3] not in (("design",), ("conditions",)):
         return edits
     after = study.with_edits(*edits)[0].document
     block = value_at(after, path[:2])
     if not isinstance(block, Mapping):
         return edits
+    if path[2] == "conditions":
+        return (*edits, *_standard_edits(block, path[:2])) if "standard" in block else edits
     others: list[Edit] = [Unset((*path[:2], key)) for key in refused_at(after, path[:2]) if key in block]
     sequence, form = value_at(after, ("sequence",)), block.get("questionnaire")
     if "design" in block:
         if form is not None and isinstance(sequence, tuple) and path[1] in sequence and form not in sequence:
             others.append(Insert(("sequence", sequence.index(path[1]) + 1), form))
-        conditions = block.get("conditions", ())
-        if len(conditions) > 1 and block.get("standard") not in conditions:
-            others.append(Set((*path[:2], "standard"), conditions[0]))
+        others += _standard_edits(block, path[:2])
     return (*edits, *others)
+
+
+def _standard_edits(block: Mapping[str, Any], path: Path) -> tuple[Edit, ...]:
+    """Return the edit that makes the first of several conditions the standard, unless one of them is."""
+    conditions = block.get("conditions", ())
+    is_edited = isinstance(conditions, tuple) and len(conditions) > 1 and block.get("standard") not in conditions
+    return (Set((*path, "standard"), conditions[0]),) if is_edited else ()
 
 
 def with_language(study: Study, code: str) -> tuple[Edit, ...]:

@@ -166,7 +166,7 @@ class AddEntry(Request):
             first = initial_value({}, self.path) if not entries else entries[-1]
             value = _as_written(first[0] if not entries and isinstance(first, list | tuple) else first)
         edit: Edit = Insert((*self.path, len(entries)), value) if entries else Set(self.path, [value])
-        return Step(f"Add to {label_of(self.path[-1])}", (edit,))
+        return Step(f"Add to {label_of(self.path[-1])}", edits_that_follow(at.study, self.path, edit))
 
 
 @dataclass(frozen=True, slots=True)

@@ -72,7 +72,7 @@ from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.questions import Value
-from study_app.protocol.source.document import Path, value_at
+from study_app.protocol.source.document import Path, places_of, value_at
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import DesignPage, Page, QuestionnairePage, TaskPage
 from study_app.session.simulated.observers import ProgrammedBall
@@ -590,7 +590,10 @@ class ParticipantPreview(Card):
         if study is None:
             return
         if place is None:
-            problem = str(study.problems[0]) if study.problems else "there is no step"
+            faults = study.faults if study.is_toml else ()
+            hiding = next((fault for fault in faults if fault.kind != "no text"), None)  # a missing text hides no page
+            found = study.problems[:1] if hiding is None else (hiding.located(places_of(study.text)),)
+            problem = next(map(str, found), "there is no step")
             self.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
             return
         shown, index = place.shown, place.index

@@ -3,7 +3,15 @@
 import pytest
 
 from study_app.designer.document.fields import kind_note, refused_at, row_at
-from study_app.designer.document.steps import AddKey, AddLiquid, RemoveKey, SetValue, Situation, shipped_liquids
+from study_app.designer.document.steps import (
+    AddEntry,
+    AddKey,
+    AddLiquid,
+    RemoveKey,
+    SetValue,
+    Situation,
+    shipped_liquids,
+)
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable_elements
@@ -45,7 +53,7 @@ questionnaire = "after"
 DESIGN = ("blocks", "feel", "design")
 
 
-def after(study: Study, *requests: AddKey | SetValue | RemoveKey | AddLiquid) -> Study:
+def after(study: Study, *requests: AddEntry | AddKey | SetValue | RemoveKey | AddLiquid) -> Study:
     for request in requests:
         study, _ = study.with_edits(*request.step(Situation(study)).edits)
     return study
@@ -99,6 +107,17 @@ def test_the_standard_is_one_of_the_blocks_conditions(study: Study) -> None:
     assert row is not None
     assert [choice.value for choice in row.choices] == ["water", "slime"]
     assert not any("^" in bound for bound in row.bounds)
+
+
+def test_the_standard_follows_the_conditions_of_its_block(study: Study) -> None:
+    whole = after(study, SetValue(DESIGN, "abx"))
+    conditions = ("blocks", "feel", "conditions")
+    one = after(whole, RemoveKey((*conditions, 0)))
+    assert [fault.path[-1] for fault in one.faults] == ["standard"]
+    assert after(one, AddEntry(conditions, "late")).document["blocks"]["feel"]["standard"] == "slime"
+    three = after(whole, AddEntry(conditions, "late"))
+    assert three.document["blocks"]["feel"]["standard"] == "water"
+    assert after(three, RemoveKey((*conditions, 0))).document["blocks"]["feel"]["standard"] == "slime"
 
 
 def test_a_repeated_form_is_counted_each_time_with_and_without_groups() -> None:
