@@ -431,7 +431,9 @@ def _comparable_items(document: Mapping[str, Any]) -> Iterator[Compared]:
         if not isinstance(block, Mapping) or block.get("phase", "main") != "main":
             continue
         name, title, measures = str(place[1]), title_of(document, place), _MEASURES
-        if "design" not in block:
+        if "design" in block and "stimulus" not in block:  # only blocks with levels have the others
+            measures = tuple(measure for measure in _MEASURES if measure[0] == "d_prime")
+        elif "design" not in block:
             asked = entries(document, f"questionnaires.{block.get('questionnaire')}.items.*")
             items = ((item, path) for path, item in asked if isinstance(item, Mapping) and "kind" not in item)
             measures = tuple((str(item.get("id")), title_of(document, path)) for item, path in items)

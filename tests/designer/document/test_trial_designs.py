@@ -2,6 +2,7 @@
 
 import pytest
 
+from study_app.designer.document.additions import edits_to_duplicate
 from study_app.designer.document.fields import kind_note, refused_at, row_at
 from study_app.designer.document.steps import (
     AddEntry,
@@ -13,6 +14,7 @@ from study_app.designer.document.steps import (
     shipped_liquids,
 )
 from study_app.designer.document.study import Study, read_study
+from study_app.designer.form.special import comparable_items
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable_elements
 from study_app.protocol.warnings.study_warnings import warnings
@@ -155,3 +157,13 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert added.document["conditions"]["slime_2"] == {"liquid": "slime_2"}
     for source, name in shipped_liquids():
         assert after(study, AddLiquid(source, name)).faults == ()
+
+
+def test_a_hypothesis_on_a_design_of_conditions_begins_with_d_prime(study: Study) -> None:
+    whole = after(study, SetValue(DESIGN, "abx"))
+    two, _ = whole.with_edits(*edits_to_duplicate(whole, DESIGN[:2])[0])
+    row = row_at(two.document, ("analysis",))
+    assert row is not None
+    first, _ = comparable_items(two, row)
+    assert first.measures[0] == ("d_prime", "Sensitivity d′")
+    assert not {"threshold", "pse", "exponent"} & {measure for measure, _ in first.measures}
