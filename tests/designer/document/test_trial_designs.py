@@ -14,7 +14,7 @@ from study_app.designer.document.steps import (
     shipped_liquids,
 )
 from study_app.designer.document.study import Study, read_study
-from study_app.designer.form.special import comparable_items
+from study_app.designer.form.form import form_of
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable_elements
 from study_app.protocol.warnings.study_warnings import warnings
@@ -162,8 +162,7 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
 def test_a_hypothesis_on_a_design_of_conditions_begins_with_d_prime(study: Study) -> None:
     whole = after(study, SetValue(DESIGN, "abx"))
     two, _ = whole.with_edits(*edits_to_duplicate(whole, DESIGN[:2])[0])
-    row = row_at(two.document, ("analysis",))
-    assert row is not None
-    first, _ = comparable_items(two, row)
+    rows = (row for section in form_of(two, ("sequence",)).sections for row in section.rows)
+    first, _ = next(row.facts for row in rows if row.path == ("analysis", "contrasts"))
     assert first.measures[0] == ("d_prime", "Sensitivity d′")
     assert not {"threshold", "pse", "exponent"} & {measure for measure, _ in first.measures}
