@@ -1,4 +1,4 @@
-"""Tests of means: Student's t, together with a bootstrap that allows for people who were not drawn, and with skewness.
+"""Tests of means: Student's t, a bootstrap that allows for people who were not drawn, and t corrected for skewness.
 
 The bootstrap gives each participant a random weight (Rubin 1981, Ann. Stat. 9, 130–134), and so a further one who
 differs like the most extreme participant in the direction that speaks against what is tested. With the end of the scale
