@@ -571,10 +571,6 @@ def contrast_section(results: Results) -> Iterator[str]:
         f"{_SIZES} SD: standard deviation between participants, of the two compared values and of their difference.",
         "soft",
     )
-    yield paragraph(
-        f"{_SIZES} SD: standard deviation between participants, of the two compared values and of their difference.",
-        "soft",
-    )
     if rows := [contrast for contrast in results.contrasts if contrast.left_out]:
         yield bullets([f"{question(row)}: left out {_left_out_words(row)}." for row in rows])
 

@@ -1,19 +1,21 @@
 """What the results window shows, as one frozen value, and its figures."""
 
+import html
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
-from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QMarginsF, QRectF, QSize, QSizeF, Qt, Signal
+from PySide6.QtCore import QBuffer, QByteArray, QIODevice, QMarginsF, QPointF, QRectF, QSize, QSizeF, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QGuiApplication,
     QImage,
     QImageWriter,
+    QMouseEvent,
     QPageSize,
     QPainter,
     QPaintEvent,
@@ -28,6 +30,7 @@ from study_app.errors import StoreError
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.theme.theme import FAMILIES, SHADOW, Theme, font
 from study_app.gui.theme.themed import Coloured, remove_widget
+from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Bar, Card, Chip
@@ -203,8 +206,34 @@ def drawn_svg(svg: bytes, size: QSize, ratio: float) -> QImage:
     return image
 
 
+_PERSON = re.compile(rb'<g id="person-([^"]+)">(.*?)</g>', re.DOTALL)
+_MARK = re.compile(rb'<use [^>]*?x="([0-9.]+)" y="([0-9.]+)"')
+_REACH_PX = 8
+
+
+class _Mark(NamedTuple):
+    """A participant's point in a figure, with its position in the units of the SVG."""
+
+    participant: str
+    at: QPointF
+
+
+def _marks_of(svg: bytes) -> list[_Mark]:
+    """Return the points of all participants in a figure of `analysis.figures`."""
+    return [
+        _Mark(html.unescape(person.decode()), QPointF(float(x), float(y)))
+        for person, inside in _PERSON.findall(svg)
+        for x, y in _MARK.findall(inside)
+    ]
+
+
 class _FigureView(Coloured, QWidget):
-    """A figure as wide as its room permits, with its aspect ratio."""
+    """A figure as wide as its room permits, with its aspect ratio.
+
+    ``person_asked`` carries the participant whose point was clicked.
+    """
+
+    person_asked = Signal(str)
 
     def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         super().__init__()
@@ -228,6 +257,8 @@ class _FigureView(Coloured, QWidget):
         size = _SIZE.search(figure.svg)
         self.width_pt = float(size[1]) if size else 516.0
         self._proportion = float(size[2]) / float(size[1]) if size else 0.5
+        self._marks = _marks_of(figure.svg)
+        self.setMouseTracking(bool(self._marks))
         self.setAccessibleName(figure.title)
         self.setAccessibleDescription(figure.caption)
         self.updateGeometry()
@@ -248,6 +279,22 @@ class _FigureView(Coloured, QWidget):
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
         self._request_image()
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:
+        person = self._person_at(event.position())
+        self.setCursor(Qt.CursorShape.PointingHandCursor if person else Qt.CursorShape.ArrowCursor)
+        self.setToolTip(plain_tip(f"{person}: click for the session" if person else ""))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:
+        person = self._person_at(event.position())
+        if person and event.button() == Qt.MouseButton.LeftButton:
+            self.person_asked.emit(person)
+
+    def _person_at(self, at: QPointF) -> str:
+        """Return the participant with the nearest point within reach of a position in the widget, or ""."""
+        scale = self.width() / self.width_pt
+        near = [((mark.at * scale - at).manhattanLength(), mark.participant) for mark in self._marks]
+        return min((pair for pair in near if pair[0] <= _REACH_PX), default=(0.0, ""))[1]
 
     def _request_image(self) -> None:
         """Request a drawing at the present size and theme, unless it exists."""
@@ -319,10 +366,11 @@ class FigureCard(Card):
     """A figure below the answer that it shows, or the reason why it is missing.
 
     Its caption is shown on request. Figure and numbers can be copied, the figure saved. ``failed`` carries the reason
-    if saving failed.
+    if saving failed, ``person_asked`` the participant whose point was clicked.
     """
 
     failed = Signal(str)
+    person_asked = Signal(str)
 
     def __init__(self, figure: FigureDrawn, colours: Mapping[str, str]) -> None:
         super().__init__(padding=_PADDING, gap=8)
@@ -384,6 +432,7 @@ class FigureCard(Card):
             self.drawing = None
         elif has_figure:
             self.drawing = _FigureView(figure, colours)
+            self.drawing.person_asked.connect(self.person_asked)
             self._place.addWidget(self.drawing, 0, Qt.AlignmentFlag.AlignHCenter)
             self.more.raise_()
 
@@ -492,11 +541,13 @@ class _TroubleCard(Card):
 class FiguresPanel(QScrollArea):
     """The cards of the figures or, while there are none, the activity or the reason.
 
-    ``asked`` carries a button's action, ``failed`` the reason why a figure was not saved.
+    ``asked`` carries a button's action, ``failed`` the reason why a figure was not saved, ``person_asked`` the
+    participant whose point was clicked.
     """
 
     asked = Signal(str)
     failed = Signal(str)
+    person_asked = Signal(str)
 
     def __init__(self) -> None:
         super().__init__()
@@ -541,6 +592,7 @@ class FiguresPanel(QScrollArea):
             if card is None:
                 card = FigureCard(figure, view.colours)
                 card.failed.connect(self.failed)
+                card.person_asked.connect(self.person_asked)
             self._column.insertWidget(place, card)
             self.cards.append(card)
         for gone in kept.values():

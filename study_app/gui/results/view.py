@@ -431,6 +431,7 @@ class ResultsPlace(Place):
         self.exclusions.open.clicked.connect(lambda: self._opener(self.view.exclusions_file or self.results))
         self.figures.asked.connect(self._apply_remedy)
         self.figures.failed.connect(lambda why: self.message.emit("The figure was not saved", why))
+        self.figures.person_asked.connect(self._open_participant)
         self.sessions.rows.opened.connect(self._open_session)
         self.sessions.rows.version_asked.connect(self.version_asked)
 
@@ -546,8 +547,13 @@ class ResultsPlace(Place):
         self._open_dialog(dialog)
 
     def _open_session(self, session: SessionFacts) -> None:
-        page = SessionPage(self, self.theme, session, self._opener)
-        self._open_dialog(page)
+        self._open_dialog(SessionPage(self, self.theme, session, self._opener))
+
+    def _open_participant(self, participant: str) -> None:
+        """Open a participant's first session, one in the figures if there is one."""
+        own = [session for session in self.view.sessions if session.participant == participant]
+        if own:
+            self._open_session(min(own, key=lambda session: (not session.is_counted, session.session)))
 
     def _ask_leave_out(self, proposed: Exclusion | None) -> None:
         included = [session for session in self.view.sessions if session.excluded is None]
@@ -710,12 +716,8 @@ class ResultsPlace(Place):
                 self._update_view(proposed=answer.exclusions)
             case StudyFound() if newest:
                 self._blocks = answer.blocks
-                nothing = Trouble(
-                    title="No figures",
-                    sentence="This study does not have a questionnaire.",
-                    button="Refresh",
-                    remedy="again",
-                )
+                sentence = "This study does not have a questionnaire."
+                nothing = Trouble(title="No figures", sentence=sentence, button="Refresh", remedy="again")
                 self._update_view(
                     trials=answer.trials,
                     doubts=answer.doubts,

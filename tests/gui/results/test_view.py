@@ -5,7 +5,7 @@ import re
 from dataclasses import replace
 
 import pytest
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QLabel
 
@@ -16,7 +16,7 @@ from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, T
 from study_app.gui.results.view import NO_SAV
 from study_app.gui.widgets.controls import ActionButton
 from tests.analysis.conftest import SAMPLE
-from tests.gui.results.sample import LEFT_OUT, facts, view
+from tests.gui.results.sample import LEFT_OUT, SVG, facts, view
 from tests.gui.windows import results
 
 pytestmark = pytest.mark.slow
@@ -121,6 +121,26 @@ def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, 
     with qtbot.waitSignal(place.message) as told:
         card.save_to(tmp_path / "none" / "a.png")
     assert "cannot be written" in told.args[1]
+
+
+def test_a_click_on_a_participants_point_opens_the_session(place, qtbot):
+    """The points of the test's figure are at (50, 40) and (150, 70) of 200 × 100."""
+    point = '<g id="person-{}"><g clip-path="url(#p)"><use xlink:href="#m" x="{}" y="{}" style="a"/></g></g>'
+    points = '<defs><path id="m" d="M 0 0"/></defs>' + point.format("P002", 50.25, 40) + point.format("P003", 150, 70.5)
+    place.show_view(
+        view(figures=(replace(view().figures[0], svg=SVG.replace(b"</svg>", points.encode() + b"</svg>")),))
+    )
+    drawing = place.figures.cards[0].drawing
+    qtbot.waitUntil(lambda: drawing.is_settled)
+    qtbot.mouseClick(drawing, Qt.MouseButton.LeftButton, pos=QPoint(drawing.width() // 2, drawing.height() // 2))
+    assert place.dialog is None, "there is no point"
+    for x, y, participant in ((0.25, 0.4, "P002"), (0.75, 0.7, "P003")):
+        at = QPoint(round(x * drawing.width()) + 3, round(y * drawing.height()) - 2)
+        qtbot.mouseMove(drawing, at)
+        assert participant in drawing.toolTip()
+        qtbot.mouseClick(drawing, Qt.MouseButton.LeftButton, pos=at)
+        assert place.dialog.facts.participant == participant
+        place.dialog.reject()
 
 
 def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
