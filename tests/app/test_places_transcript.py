@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QLabel
 
 from study_app.analysis import worker_messages as of
 from study_app.app import main_controller
+from study_app.app.compilation import Compilation
 from study_app.app.main_controller import MainController, WorkstationController
 from study_app.app.session.live_session import BUG
 from study_app.devices.descriptor import NONE, READY, Backend
@@ -255,7 +256,7 @@ class Live(QObject):
     error: Exception | None = None
     has_begun, is_opening, code = False, True, 0
 
-    def __init__(self, chosen: NewSession, theme: Any, *, asks: bool) -> None:
+    def __init__(self, chosen: NewSession, theme: Any, *, asks: bool, compilation: Compilation) -> None:
         super().__init__()
         self.theme, self.chosen = theme, chosen
         self.done.append(f"session of {chosen.participant} {theme.name} {asks}")

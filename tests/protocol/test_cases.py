@@ -139,4 +139,4 @@ def test_the_command_prints_problems_and_judges_levels_for_a_delay(
 def test_the_thesis_studies_warn_only_of_what_the_thesis_does_not_state(name: str) -> None:
     _, _, warnings = describe(load(name)).partition("Warnings\n")
     places = [line.split()[0] for line in warnings.splitlines()]
-    assert places == {"rek2024": ["analysis.participants", "tasks.reach:"], "demo": ["tasks.reach:"]}[name]
+    assert places == {"rek2024": ["analysis.participants", "tasks.reach:"], "demo": []}[name]

@@ -102,8 +102,13 @@ OF_THE_ELEMENT = {
 
 
 def shown_at(study: Study, fault: Fault) -> str:
-    """Return where the form shows a fault: "row", "section", "id", "element", or "" for nowhere."""
+    """Return where the form shows a fault: "row", "section", "id", "element", or "" for nowhere.
+
+    A missing text is shown by its empty field.
+    """
     found = form_of(study, element_of(study, fault.path))
+    if fault.kind == "no text":
+        return "row" if any(fault.path[: len(row.path)] == row.path for row in found.rows) else ""
     sentence = f"{fault.message[:1].upper()}{fault.message[1:]}"
     places = (
         ("row", [words for row in found.rows if fault.path[: len(row.path)] == row.path for words in row.faults]),
