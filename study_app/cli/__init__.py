@@ -20,7 +20,7 @@ import click
 from study_app import __version__
 from study_app.cli import data, demo, evidence, model, power, study
 from study_app.cli.devices import devices, outlets, plugins
-from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of
+from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of, printable
 from study_app.discovery import explain_error
 from study_app.errors import PlugInError, StudyError, naming_the_extra
 
@@ -57,8 +57,8 @@ for command in (devices, outlets, plugins):  # the module's other commands belon
 
 
 def _shortened(message: str) -> str:
-    """Return a message in which words longer than `SHOWN` letters, such as paths, are truncated."""
-    return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", message)
+    """Return a message without unprintable letters, in which words longer than `SHOWN` letters are truncated."""
+    return re.sub(rf"(\S{{{SHOWN}}})\S+", r"\1…", "\n".join(map(printable, message.split("\n"))))
 
 
 def _exit_at_once(ended: list[int]) -> None:

@@ -16,6 +16,7 @@ from study_app.cli.options import (
     echo_files,
     exclude_each_other,
     exit_if,
+    printable,
     progress,
     takes_session,
     takes_study,
@@ -331,9 +332,9 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
         verification = verify_folder(results, fingerprints)
         measured = [] if xdf is None else check_recording(xdf, results, verification)
     for finding in verification.errors:
-        click.echo(f"error: {finding}")
+        click.echo(printable(f"error: {finding}"))
     for finding in sorted(verification.warnings, key=lambda finding: finding.shares):
-        click.echo(f"{'to share it' if finding.shares else 'warning'}: {finding}")
+        click.echo(printable(f"{'to share it' if finding.shares else 'warning'}: {finding}"))
     for package, names in verification.plug_ins.items():
         click.echo(f"plug-in {package}: {', '.join(names)}")
     for line in measured:

@@ -187,6 +187,11 @@ def exit_if(problems: object) -> None:
         raise click.exceptions.Exit(EXIT_FOUND)
 
 
+def printable(text: str) -> str:
+    """Return a line with its unprintable characters escaped: names of a stranger's files may control a terminal."""
+    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)
+
+
 def echo_files(written: Iterable[Path]) -> None:
     """Print the paths of the files that a command wrote."""
     for path in written:

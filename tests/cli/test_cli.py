@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -144,6 +145,15 @@ def test_verify_says_last_what_concerns_sharing(liquid_study: Run) -> None:
     assert [line.partition(":")[0] for line in first] == ["warning", "warning"]
     assert shared.startswith("to share it: dataset_description.json: ")
     assert verdict == "2 sessions: sound"
+
+
+def test_names_from_elsewhere_do_not_control_the_terminal(liquid_study: Run, tmp_path: Path) -> None:
+    released = Path(__file__).parents[1] / "store" / "releases" / "0.2" / "demo"
+    study = shutil.copytree(released, tmp_path / "demo")
+    (study / "data/sub-P001/ses-01/\u202egnp.exe").touch()
+    said = liquid_study("verify", str(study)).stdout + liquid_study("verify", "no\u202estudy").stderr
+    assert said.count("\\u202e") == 2
+    assert "\u202e" not in said
 
 
 @needs_servo

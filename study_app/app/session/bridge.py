@@ -55,6 +55,7 @@ from study_app.session.transitions.events import (
     Reconnected,
     RepeatRequested,
     ResumeRequested,
+    WriteRetried,
     broken,
 )
 from study_app.store.blinded.allocation import session_protocol
@@ -557,6 +558,8 @@ class SessionBridge(QObject):
     def _close_window(self) -> None:
         """Close the operator's window after the session; before, send zero force and ask; leave if asked again."""
         if self.runner.finished:
+            if self.runner.stalled is not None:
+                self._post_event(WriteRetried(self._now()))  # the end is not written, and the next attempt is due later
             self._leave_session()
             return
         if self.runner.ending:  # as soon as the recordings are on the disk

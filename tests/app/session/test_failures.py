@@ -228,6 +228,18 @@ def test_a_thread_that_ends_by_an_exception_is_told_noted_and_ends_no_session(br
     assert not bridge.trouble
 
 
+def test_closing_the_window_writes_an_end_that_the_full_disk_did_not_take(bridge, world, caplog):
+    begin_trial(bridge, world)
+    world.full = True
+    bridge.operator.ask("end", "aborted", "")
+    assert bridge.runner.stalled
+    world.full = False
+    bridge.operator.close()
+    assert world.events()[-1] == "session_ended"
+    assert not world.force_is_on
+    caplog.clear()
+
+
 FAULT = "the device 'memory' stopped responding"
 
 
