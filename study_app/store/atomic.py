@@ -23,6 +23,7 @@ from study_app.errors import StoreError
 OLD_S = 3600.0  # longer than any time between the last write of a temporary file and its renaming
 _NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # error numbers of folders that cannot be flushed
 _MOVE_AGAIN_S = (0.01, 0.05, 0.2)
+_MOST_BYTES = 1 << 30  # of a file that is read at once: a session's files have megabytes
 _MOST_LEVELS = 64  # greatest depth of JSON, so that values can be processed recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not of hidden files: markers are created and removed
 
@@ -337,8 +338,10 @@ def open_regular(path: Path) -> BufferedReader:
 
 
 def read_regular(path: Path) -> bytes:
-    """Return the content of a regular file; errors as in `open_regular`."""
+    """Return the content of a regular file of at most `_MOST_BYTES`; other errors as in `open_regular`."""
     with open_regular(path) as file:
+        if os.fstat(file.fileno()).st_size > _MOST_BYTES:
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
         return file.read()
 
 

@@ -11,6 +11,7 @@ from study_app.store.atomic import (
     append_line,
     create_folder,
     probe_free_bytes,
+    read_if_there,
     remove_old_temporary_files,
     temporary_path,
     write_file,
@@ -98,3 +99,12 @@ def test_macos_flushes_the_drive_itself_where_it_can(
     monkeypatch.setattr(os, "fsync", lambda _: flushed.append("system"))
     write_file(tmp_path / "table.csv", b"1\n")
     assert flushed == ["drive" if offered else "system"] * 2
+
+
+@needs_posix  # other systems write the zeros
+def test_a_huge_file_is_refused_in_one_line_before_memory_runs_out(tmp_path: Path) -> None:
+    path = tmp_path / "exclusions.csv"
+    with path.open("wb") as file:
+        file.truncate(1 << 40)
+    with pytest.raises(StoreError, match="cannot be read"):
+        read_if_there(path)
