@@ -1,0 +1,209 @@
+"""Break each painter once, in a session in real windows or on the pages of the main window.
+
+Run as ``python -m tests.benchmarks.windows.painters``: offscreen, with the emulated Falcon. They are all painting
+methods of classes of `study_app` and of the plots that are called in a session or on a page. After an exception in one
+the force must be off where the session stopped, the exception must be in the journal or told in the main window, and
+the session must be complete once it is resumed. Prints a table and the faults, and names the painters that were not
+seen; the exit code is 1 if there are faults.
+"""
+
+import importlib
+import pkgutil
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import FunctionType
+from typing import Any, Final
+
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication, QDialog, QGraphicsItem, QStyledItemDelegate, QWidget
+
+import study_app.app.session.playing  # noqa: F401 - before `run_part` replaces the class that it derives from
+from study_app.app import main_controller
+from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.participant.window import ParticipantWindow
+from study_app.session.pages import TroublePage
+from study_app.store.folders import StudyFolder
+from tests.benchmarks.windows.closings import (
+    PHASES,
+    STUDY,
+    Case,
+    Tell,
+    every_20_ms,
+    phase_of,
+    run_part,
+    start_when_asked,
+)
+
+BROKEN: Final = "no such colour"
+PATIENCE_S: Final = 3.0
+MOST_SESSIONS: Final = 3
+
+
+class Painting:
+    """Notes where each painting method of the program is first called, and lets one of them fail once."""
+
+    def __init__(self) -> None:
+        self.breaks: set[str] = set()  # classes whose next call fails
+        self.phase = "opening"
+        self.phases: dict[str, set[str]] = defaultdict(set)  # by class, the phases of its calls
+        self.names: set[str] = set()
+
+    def install(self) -> None:
+        """Count in all classes, before `guard_painting` guards them."""
+        for package in map(importlib.import_module, ("study_app.gui", "study_app.designer")):
+            for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+                importlib.import_module(module.name)
+        kinds: list[type] = [QWidget, QGraphicsItem, QStyledItemDelegate]
+        while kinds:
+            kind = kinds.pop()
+            kinds += kind.__subclasses__()
+            for method in {"paintEvent", "paint"} & vars(kind).keys():
+                if isinstance(whole := vars(kind)[method], FunctionType) and not hasattr(whole, "counts"):
+                    name = f"{kind.__module__}.{kind.__qualname__}"
+                    self.names.add(name)
+                    setattr(kind, method, self._counting(name, method, whole))
+
+    def _counting(self, name: str, method: str, whole: Callable[..., None]) -> Callable[..., None]:
+        def painted(*arguments: Any) -> None:
+            self.phases[name].add(self.phase)
+            if name in self.breaks:
+                self.breaks.remove(name)
+                raise ValueError(f"{BROKEN} in {name}")
+            whole(*arguments)
+
+        painted.__code__ = painted.__code__.replace(co_name=method)  # as Qt calls it
+        painted.counts = True  # type: ignore[attr-defined]
+        return painted
+
+    def break_next(self, name: str) -> None:
+        self.breaks = {name}
+        for widget in QApplication.allWidgets():
+            if widget.isVisible():
+                widget.update()
+
+
+class PaintersCase(Case):
+    """A session in which each painter fails once, in its phase; what stops it, leaves it, and it is resumed."""
+
+    def __init__(self, folder: Path, painting: Painting, painters: dict[str, str]) -> None:
+        super().__init__(folder, painters.values(), self._break_next)
+        self._painting = painting
+        self._painters: dict[str, list[str]] = defaultdict(list)
+        self.stopped: list[str] = []  # painters after which the session stopped
+        for name, phase in sorted(painters.items()):
+            self._painters[phase].append(name)
+
+    def look(self, participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+        self._painting.phase = phase_of(participant.page) or self._painting.phase
+        if self.next is None and isinstance(participant.page, TroublePage):
+            self._leave(operator)  # a painter failed while the session was opened
+            return True
+        return super().look(participant, operator)
+
+    def _leave(self, operator: OperatorWindow) -> None:
+        self.check(not self.force_is_on, "force in trouble")
+        for _ in range(2):
+            operator.windowHandle().close()
+
+    @property
+    def left(self) -> dict[str, str]:
+        """The painters whose phases were too short, with their phases."""
+        return {name: phase for phase, names in self._painters.items() for name in names}
+
+    def _break_next(self, _case: Case, _participant: ParticipantWindow, _operator: OperatorWindow) -> None:
+        name = self._painters[self.phase].pop()
+        self.phase = f"{self.phase}, {name}"
+        self._painting.break_next(name)
+
+        def observe(participant: ParticipantWindow, operator: OperatorWindow) -> bool:
+            late = time.perf_counter() > self.acted_s + PATIENCE_S
+            if name in self._painting.breaks and not late:
+                return False  # it may be painted on the next page
+            self.check(name not in self._painting.breaks, "was not painted again")
+            self._painting.breaks.clear()
+            self.next = None
+            if isinstance(participant.page, TroublePage):
+                self.stopped.append(name)
+                self._leave(operator)
+            (session,) = StudyFolder(self.results).sessions()
+            self.check(name in session.journal.read_text(encoding="utf-8") or late, "the journal does not name it")
+            return True
+
+        self.next = observe
+
+
+def tour(results: Path, painting: Painting, faults: dict[str, list[str]]) -> None:
+    """Visit each page of the main window, and break each of the painters that are seen there."""
+
+    def visit(controller: main_controller.MainController) -> None:
+        steps = _tour_steps(controller, painting, faults)
+        timer = QTimer(controller.window, interval=30)
+        timer.timeout.connect(lambda: next(steps, None) or controller.window.close())
+        timer.start()
+
+    if code := main_controller.run_home_window(results, then=visit):
+        faults["the main window"] = [f"exit code {code}"]
+
+
+def _tour_steps(
+    controller: main_controller.MainController, painting: Painting, faults: dict[str, list[str]]
+) -> Iterator[bool]:
+    before = set(painting.phases)
+    for place in controller.window.rail.buttons:
+        painting.phase = f"page {place}"
+        controller.window.go(place)
+        if place == "designer":
+            controller.open_designer(str(STUDY))
+        for _ in range(150):
+            yield True
+        for name in sorted(painting.phases.keys() - before - faults.keys()):
+            painting.break_next(name)
+            for _ in range(100):
+                yield True
+                if not painting.breaks:
+                    break
+            if painting.breaks:
+                painting.breaks.clear()  # it was shown for a moment only
+                continue
+            told = any(name in bug for bug in controller._bugs)
+            faults[name] = [] if told else [f"{name}: the exception is not told"]
+            for dialog in controller.window.findChildren(QDialog):
+                dialog.close()
+
+
+def _rank(phase: str) -> int:
+    """Return the order in which phases are preferred: the force is on in the trial."""
+    return 0 if phase == "trial" else PHASES.index(phase)
+
+
+def run_painters(folder: Path, tell: Tell) -> None:
+    painting = Painting()
+    painting.install()
+    with every_20_ms(start_when_asked):
+        PaintersCase(folder / "dry", painting, {}).hold()
+        seen = {name: set(phases) for name, phases in painting.phases.items()}
+        opening = {name for name, phases in seen.items() if "opening" in phases}
+        case = PaintersCase(folder / "opening", painting, {})
+        painting.breaks = set(opening)
+        case.hold()
+        tell("broken while a session is opened", len(opening - painting.breaks), case.faults)
+        painting.breaks.clear()
+        due = {name: phase for name, phases in seen.items() for phase in sorted(phases & set(PHASES), key=_rank)[:1]}
+        for number in range(MOST_SESSIONS):
+            case = PaintersCase(folder / f"session-{number}", painting, due)
+            case.hold()
+            tell(f"broken in a session, which {len(case.stopped)} stopped", len(case.done), case.faults)
+            if not (due := case.left):
+                break
+    toured: dict[str, list[str]] = {}
+    tour(folder / "dry" / "results", painting, toured)
+    tell("broken on a page of the main window", len(toured), [one for wrong in toured.values() for one in wrong])
+    left = {name for name in painting.names - seen.keys() - toured.keys() if name.startswith("study_app")}
+    print(f"{len(left)} painters were not seen: {', '.join(sorted(left))}")
+
+
+if __name__ == "__main__":
+    sys.exit(0 if run_part(run_painters, asks=True) else 1)
