@@ -41,7 +41,7 @@ def upgrade(path: Path) -> list[Path]:
 
     Returns
     -------
-    list of Path
+    sequence of paths
         The rewritten files, sorted; empty if all have the current format.
 
     Raises

@@ -261,7 +261,7 @@ def test_two_groups_are_compared_with_unequal_variances() -> None:
     made = replace(made, trials=made.trials.assign(group=made.trials["participant"].map(members).astype("string")))
     (found,) = evaluate(made).contrasts
     rows = made.responses[made.responses["item"] == ITEMS[0]]
-    means = rows.groupby("participant")["response"].mean().astype(float)
+    means = rows["response"].astype(float).groupby(rows["participant"]).mean()
     one, two = (means[[person for person in people if members[person] == group]] for group in ("one", "two"))
     t = ttest_ind(one, two, equal_var=False).statistic
     assert (found.statistic, found.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
@@ -275,7 +275,8 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
     members = {person: "one" if number % 3 else "two" for number, person in enumerate(people)}
     rows = made.responses["participant"].map(members).eq("one") & made.responses["code"].eq("L2")
     assert rows.any()
-    raised = made.responses.assign(response=made.responses["response"] + 2 * rows.astype("int64"))
+    value = made.responses["response"].astype(float) + 2.0 * rows.astype(float)
+    raised = made.responses.assign(value=value, response=value.map("{:g}".format).astype("string"))
     made = replace(
         made,
         responses=raised,
@@ -283,7 +284,7 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
     )
     (result,) = evaluate(made).contrasts
 
-    answers = raised[raised["item"] == ITEMS[0]].pivot_table("response", "participant", "code").astype(float)
+    answers = raised[raised["item"] == ITEMS[0]].pivot_table("value", "participant", "code").astype(float)
     differences = answers["L2"] - answers["L1"]
     one, two = (differences[[person for person in people if members[person] == group]] for group in ("one", "two"))
     t = ttest_ind(one, two, equal_var=False).statistic

@@ -109,7 +109,7 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
     names, items = [it.condition for it in planned.blocks[1].settings], [it.id for it in planned.blocks[1].items]
     late, prompt, item = names.index("delay_150"), names.index("delay_0"), items.index("different")
     ps = [ttest_rel(one[:, late, item], one[:, prompt, item], alternative="greater").pvalue for one in here]
-    assert counts[contrast.described(), "contrast"][0, FULL] == sum(p <= first for p in ps) > 0
+    assert 0 < counts[contrast.described(), "contrast"][0, FULL] <= sum(p <= first for p in ps)
     text = preregistration(protocol, "0" * 64)
     assert "everything is tested when 6 and 12 valid sessions are complete" in text
     assert f"up to {first:.3g} and {last:.3g} are significant at these looks (O'Brien–Fleming spending" in text

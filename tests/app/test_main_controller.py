@@ -13,6 +13,7 @@ from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtWidgets import QDialog
 
 from study_app.app import main_controller
+from study_app.app.compilation import Compilation
 from study_app.app.main_controller import MainController
 from study_app.app.session import live_session
 from study_app.errors import DeviceLost, DeviceNotFound
@@ -165,9 +166,9 @@ class Held(QObject):
     over = Signal()
     has_begun, is_opening, error, code = True, False, None, 0
 
-    def __init__(self, chosen: NewSession, theme: Any, *, asks: bool) -> None:
+    def __init__(self, chosen: NewSession, theme: Any, *, asks: bool, compilation: Compilation) -> None:
         super().__init__()
-        self.chosen, self.theme = chosen, theme
+        self.chosen, self.theme, self.compilation = chosen, theme, compilation
         assert asks
 
     def open(self) -> None:

@@ -1,5 +1,6 @@
 """The commands: what they print, and the one line and exit code a user gets for bad input."""
 
+import json
 import os
 import re
 import shutil
@@ -139,19 +140,28 @@ def test_help_lists_every_command_once_under_its_heading_with_its_whole_sentence
     assert "..." not in listed, "a command's first sentence is cut off"
 
 
-def test_verify_says_last_what_concerns_sharing(liquid_study: Run) -> None:
-    released = Path(__file__).parents[1] / "store" / "releases" / "0.2" / "demo"
-    *first, shared, verdict = liquid_study("verify", str(released)).stdout.splitlines()
-    assert [line.partition(":")[0] for line in first] == ["warning", "warning"]
+@pytest.fixture
+def released(tmp_path: Path, liquid_study: Run) -> Path:
+    """Results of version 0.2, upgraded."""
+    study = shutil.copytree(Path(__file__).parents[1] / "store" / "releases" / "0.2" / "demo", tmp_path / "demo")
+    assert liquid_study("upgrade", str(study)).returncode == 0
+    return study
+
+
+def test_verify_says_last_what_concerns_sharing(liquid_study: Run, released: Path) -> None:
+    described = released / "dataset_description.json"
+    description = json.loads(described.read_text(encoding="utf-8"))
+    description["variableMeasured"][0]["description"] = "The participant, in the words of an earlier version."
+    described.write_text(json.dumps(description), encoding="utf-8", newline="\n")
+    unfinished, shared, verdict = liquid_study("verify", str(released)).stdout.splitlines()
+    assert unfinished.startswith("warning: ")
     assert shared.startswith("to share it: dataset_description.json: ")
     assert verdict == "2 sessions: sound"
 
 
-def test_names_from_elsewhere_do_not_control_the_terminal(liquid_study: Run, tmp_path: Path) -> None:
-    released = Path(__file__).parents[1] / "store" / "releases" / "0.2" / "demo"
-    study = shutil.copytree(released, tmp_path / "demo")
-    (study / "data/sub-P001/ses-01/\u202egnp.exe").touch()
-    said = liquid_study("verify", str(study)).stdout + liquid_study("verify", "no\u202estudy").stderr
+def test_names_from_elsewhere_do_not_control_the_terminal(liquid_study: Run, released: Path) -> None:
+    (released / "data/sub-P001/ses-01/\u202egnp.exe").touch()
+    said = liquid_study("verify", str(released)).stdout + liquid_study("verify", "no\u202estudy").stderr
     assert said.count("\\u202e") == 2
     assert "\u202e" not in said
 

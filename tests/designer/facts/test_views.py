@@ -15,7 +15,7 @@ from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import Simulated
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import outline_rows
-from study_app.designer.problems import problem_rows
+from study_app.designer.problems import fault_rows
 from tests.designer.document.grown import PROTOCOLS
 from tests.designer.document.test_commands import edited, elements, studies
 from tests.golden import compare, each_once
@@ -88,7 +88,7 @@ def test_each_repair_removes_its_problem_and_undo_gives_the_text_back(name: str,
     words = list[str]()
     for case in cases_of(CASES / f"{name}.txt"):
         study = read_study(case.text.encode(), PROTOCOLS)
-        rows = problem_rows(study)
+        rows = fault_rows(study)
         assert Counter(row.fault for row in rows) == Counter(study.faults)
         assert all(row.line is None or row.line <= study.text.count("\n") + 1 for row in rows)
         for fault in study.faults:
