@@ -1,8 +1,8 @@
 """Contrasts: the hypotheses that a study states, tested on one number of each participant.
 
 Within participants the differences between the two settings are tested (of thresholds, the differences of logarithms,
-whose mean is a ratio), between groups the participants' numbers, in an interaction their differences: by Student's t
-together with a bootstrap, see `statistics.mean_tests`. Thresholds have the weights of the random-effects mean; those of
+whose mean is a ratio), between groups the participants' numbers, in an interaction their differences: by three tests
+that must agree, see `statistics.mean_tests`. Thresholds have the weights of the random-effects mean; those of
 two blocks with the same levels and design have a width in common. Equivalence is tested as everywhere, and corrected
 over the hypotheses with a bound.
 """
@@ -505,7 +505,8 @@ def contrast_methods(results: Results) -> Iterator[str]:
     holm_words = f", Holm-adjusted across {len(contrasts)} hypotheses"
     yield (
         "Each participant had one number in each comparison. A bootstrap that adds a participant like the most extreme "
-        f"one (Gaffke 2005) had to agree: p is the larger of both{holm_words * (len(contrasts) > 1)}."
+        "one (Gaffke 2005) and t corrected for skewness (Hall 1992) had to agree: p is the largest of the three"
+        f"{holm_words * (len(contrasts) > 1)}."
     )
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
@@ -560,10 +561,11 @@ def contrast_section(results: Results) -> Iterator[str]:
     )
     weighted = any(contrast.contrast.measure == "threshold" for contrast in results.contrasts)
     yield paragraph(
-        "The study file states these hypotheses. Each was tested on one number per participant by a t test together "
-        "with a bootstrap that adds a participant like the most extreme one; adjusted p is the larger p, Holm-adjusted "
-        f"across {number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that both tests show, with "
-        "enough participants, that the mean lies within the stated bound, Holm-adjusted across the bounds. "
+        "The study file states these hypotheses. Each was tested on one number per participant by a t test, a "
+        "bootstrap that adds a participant like the most extreme one, and t corrected for skewness; adjusted p is the "
+        f"largest p, Holm-adjusted across {number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means "
+        "that t and the bootstrap show, with enough participants, that the mean lies within the stated bound, "
+        "Holm-adjusted across the bounds. "
         f"{_WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )

@@ -270,7 +270,8 @@ class ContrastResult(Outcome):
     """The test of the ``compared`` quantity; the effect is first ÷ second with ``ratio``, otherwise first − second.
 
     ``n`` participants are compared; ``left_out`` are the others with the reasons. ``higher`` is the number of
-    participants with a higher number in the first; None between groups. ``equivalent`` tells whether the effect is
+    participants with a higher number in the first; None between groups. ``p_bootstrap`` and ``p_skewed`` (t corrected
+    for skewness) must show the difference, too. ``equivalent`` tells whether the effect is
     shown to lie within the study's bound, by ``p_equivalent``, which is corrected over the hypotheses with a bound;
     None without a bound. ``not_excluded`` is then the upper limit of the 95 % interval of the share of participants
     that differ by more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the

@@ -15,7 +15,7 @@ CompilationClient: TypeAlias = WorkerClient[tuple[str, ...], float | None]
 
 
 def start_compilation(devices: tuple[str, ...] = DEVICES) -> CompilationClient | None:
-    """Start a worker process of the lowest priority that compiles what sessions with these devices need.
+    """Start a worker process that compiles what sessions with these devices need.
 
     Returns None if that was compiled before, or cannot be stored.
 
@@ -28,9 +28,7 @@ def start_compilation(devices: tuple[str, ...] = DEVICES) -> CompilationClient |
 
     if CACHE is None or (CACHE / _FILLED).exists():
         return None
-    client: CompilationClient = WorkerClient(
-        "study_app.session.compile_worker:carry_out", name="compilation", background=True
-    )
+    client: CompilationClient = WorkerClient("study_app.session.compile_worker:carry_out", name="compilation")
     client.order(devices)
     return client
 

@@ -195,7 +195,7 @@ def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
     told = methods(made, evaluate(made))
     assert f"Hypothesis 1 ({contrast.described()}) was tested by a paired t test, two-sided." in told
     assert f"Hypothesis 2 ({other.described()}) was tested by a paired t test, one-sided." in told
-    assert "p is the larger of both, Holm-adjusted across 2 hypotheses." in told
+    assert "p is the largest of the three, Holm-adjusted across 2 hypotheses." in told
     assert "Equivalence was tested by two one-sided t tests" in told
     assert "Means were tested in the hypotheses" in told
     assert "never means" not in told

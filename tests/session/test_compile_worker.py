@@ -19,7 +19,6 @@ def test_no_process_starts_if_nothing_can_be_stored_or_all_is(monkeypatch: pytes
 
 @needs_servo
 @pytest.mark.nightly
-@pytest.mark.timeout(1200)  # it has the lowest priority
 def test_the_process_fills_the_cache_and_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(compiled, "CACHE", tmp_path / compiled.CACHE.name)

@@ -640,7 +640,7 @@ def _explained(question: Question, found: Powers) -> list[str]:
         case "contrast":
             return [
                 "Paired t tests of each participant's mean answers, Holm-corrected across the hypotheses; the "
-                f"bootstrap must agree. Equivalence is tested as in the report. {LEFT_OUT}"
+                f"bootstrap and t corrected for skewness must agree. Equivalence is tested as in the report. {LEFT_OUT}"
             ]
 
 

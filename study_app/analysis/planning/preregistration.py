@@ -105,8 +105,9 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
             f"Hypothesis: {contrast.described(words)}. We test it by a {test} "
             f"({'two-sided' if contrast.expected is None else 'one-sided'}"
             f"{', weighted as in the group mean' if contrast.measure == 'threshold' else ''}) on one number per "
-            "participant. A bootstrap that adds a participant like the most extreme one must agree. p is Holm-adjusted "
-            f"across all hypotheses of this kind.{_equality_of(protocol, contrast)}"
+            "participant. A bootstrap that adds a participant like the most extreme one and t corrected for skewness "
+            "(Hall 1992) must agree. p is Holm-adjusted across all hypotheses of this kind."
+            f"{_equality_of(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
         yield LEFT_OUT

@@ -1,9 +1,9 @@
 """How this package compiles: one decorator, and one cache that is never stale after an edit.
 
 numba keys its on-disk cache on the file of the outermost function alone, so it would miss a change in a function that
-it calls, or in a constant that it reads. The cache is therefore a folder named after a digest of every module that
-compiles a function and of what these modules import, of the versions of Python, numba and LLVM, and of the processor;
-old folders are removed. Within the folder a function is found by its path relative to the package, so that the package
+it calls, or in a constant that it reads. The cache is therefore a folder named after a digest. The digest covers every
+module that compiles a function, what these modules import, the versions of Python, numba and LLVM, and the processor.
+Old folders are removed. Within the folder a function is found by its path relative to the package, so that the package
 may be moved. A wheel or a bundle comes with filled caches for two kinds of processors (see docs/install.md), and starts
 with a copy of the one that fits.
 """
@@ -122,7 +122,7 @@ def _processor() -> str:
     NUMBA_CPU_NAME=host ignores shipped caches.
     """
     wanted = os.environ.get("NUMBA_CPU_NAME")
-    if wanted is None:
+    if wanted is None and _SHIPPED_CACHES.is_dir():
         features = get_host_cpu_features()
         for name, needed in PROCESSORS.items():
             is_shipped = (_SHIPPED_CACHES / digest_of(SOURCES, name, versions())).is_dir()

@@ -740,8 +740,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Between groups, t has the degrees of freedom of the smaller group \(Hsu 1938\)\.",
      when(lambda told: any(one["contrast"]["groups"] for one in told.contrasts))),
     (r"Each participant had one number in each comparison\.", when(lambda told: bool(told.contrasts))),
-    (r"A bootstrap that adds a participant like the most extreme one \(Gaffke 2005\) had to agree: p is the larger of "
-     r"both(?:, Holm-adjusted across (\d+) hypotheses)?\.",
+    (r"A bootstrap that adds a participant like the most extreme one \(Gaffke 2005\) and t corrected for skewness "
+     r"\(Hall 1992\) had to agree: p is the largest of the three(?:, Holm-adjusted across (\d+) hypotheses)?\.",
      lambda match, told: int(match[1] or 1) == len(told.contrasts)),
     (r"Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree(?:, "
      r"Holm-adjusted across (\d+) bounds)?, and requires that the sample is large enough to contain a member of a "
