@@ -23,7 +23,7 @@ from study_app.errors import StoreError
 OLD_S = 3600.0  # longer than any time between the last write of a temporary file and its renaming
 _NO_FLUSH = (errno.EINVAL, errno.EBADF, errno.ENOTSUP)  # error numbers of folders that cannot be flushed
 _MOVE_AGAIN_S = (0.01, 0.05, 0.2)
-_MOST_BYTES = 1 << 30  # of a file that is read at once: a session's files have megabytes
+_LARGEST_FILE_BYTES = 1 << 30  # of a results folder, whose files have megabytes
 _MOST_LEVELS = 64  # greatest depth of JSON, so that values can be processed recursively
 _TEMPORARY = re.compile(r"\.[^.].*\.[0-9a-f]{8}\.tmp")  # not of hidden files: markers are created and removed
 
@@ -330,18 +330,19 @@ def cannot_read(path: Path, error: OSError) -> StoreError:
     )
 
 
-def open_regular(path: Path) -> BufferedReader:
-    """Open a regular file for reading; raise OSError for a folder, device or pipe."""
-    if not stat.S_ISREG(path.stat().st_mode):
+def open_regular(path: Path, *, largest_bytes: float = _LARGEST_FILE_BYTES) -> BufferedReader:
+    """Open a regular file for reading; raise OSError for a folder, device, pipe or larger file."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
         raise OSError(errno.EINVAL, "it is not a file")
+    if status.st_size > largest_bytes:
+        raise OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
     return path.open("rb")
 
 
 def read_regular(path: Path) -> bytes:
-    """Return the content of a regular file of at most `_MOST_BYTES`; other errors as in `open_regular`."""
+    """Return the content of a regular file; it raises the errors of `open_regular`."""
     with open_regular(path) as file:
-        if os.fstat(file.fileno()).st_size > _MOST_BYTES:
-            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG), str(path))
         return file.read()
 
 

@@ -7,6 +7,7 @@ has a line for every output. Results folders hold no such list: reading them nev
 import contextlib
 import hashlib
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -111,7 +112,7 @@ def _file_parts(copied: FileCopy) -> Iterator[bytes]:
     """Yield the content of a file to copy in parts; errors name this file, not the folder that is written."""
     digest = hashlib.sha256()
     try:
-        with open_regular(copied.source) as file:
+        with open_regular(copied.source, largest_bytes=math.inf) as file:
             while part := file.read(_CHUNK_BYTES):
                 digest.update(part)
                 yield part

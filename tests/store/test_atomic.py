@@ -1,6 +1,7 @@
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from study_app.store.atomic import (
     temporary_path,
     write_file,
 )
+from study_app.store.checksums import sha256
 from tests.platforms import files_up_to, needs_posix
 
 
@@ -102,9 +104,11 @@ def test_macos_flushes_the_drive_itself_where_it_can(
 
 
 @needs_posix  # other systems write the zeros
-def test_a_huge_file_is_refused_in_one_line_before_memory_runs_out(tmp_path: Path) -> None:
+@pytest.mark.timeout(30)
+@pytest.mark.parametrize("read", [read_if_there, sha256])
+def test_a_huge_file_is_refused_before_memory_or_time_runs_out(read: Callable[[Path], object], tmp_path: Path) -> None:
     path = tmp_path / "exclusions.csv"
     with path.open("wb") as file:
         file.truncate(1 << 40)
     with pytest.raises(StoreError, match="cannot be read"):
-        read_if_there(path)
+        read(path)

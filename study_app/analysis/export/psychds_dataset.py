@@ -1,6 +1,7 @@
 """An export as a Psych-DS folder of its own, to share: tables, report, script, and materials."""
 
 import json
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -111,7 +112,7 @@ def _why_missing(path: Path | None) -> str:
     if path is None:
         return "outside the study's folder"
     try:
-        with open_regular(path) as file:
+        with open_regular(path, largest_bytes=math.inf) as file:
             file.read(1)
     except (OSError, ValueError) as error:
         return f"cannot be read: {system_message(error) if isinstance(error, OSError) else error}"
