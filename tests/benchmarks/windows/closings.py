@@ -247,8 +247,6 @@ def close_dialog(name: str, case: Case, _participant: ParticipantWindow, operato
 
 
 def take_permissions(kind: str, case: Case, _participant: ParticipantWindow, _operator: OperatorWindow) -> None:
-    _set_permissions(case.results, kind, writable=False)
-
     def wait(participant: ParticipantWindow, _operator: OperatorWindow) -> bool:
         if isinstance(participant.page, TroublePage):
             case.check(not case.force_is_on, "force while it waits for the disk")
@@ -260,13 +258,15 @@ def take_permissions(kind: str, case: Case, _participant: ParticipantWindow, _op
         return phase_of(participant.page) != case.phase or case.phase == "end"
 
     case.next = wait
+    _set_permissions(case.results, kind, writable=False)
 
 
 def _set_permissions(folder: Path, kind: str, *, writable: bool) -> None:
     if kind == "modes":
-        subprocess.run(["chmod", "-R", "u+w" if writable else "a-w", str(folder)], check=True)
+        command = ["chmod", "-R", "u+w" if writable else "a-w", str(folder)]
     else:
-        subprocess.run(["chattr", "-R", "-i" if writable else "+i", str(folder)], check=True)
+        command = ["chattr", "-R", "-i" if writable else "+i", str(folder)]
+    subprocess.run(command, check=writable)  # a temporary file may vanish while permissions are taken
 
 
 def start_when_asked() -> None:
