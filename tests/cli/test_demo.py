@@ -135,6 +135,7 @@ def is_opened(workspace: Path) -> bool:
 
 @needs_servo
 @pytest.mark.slow
+@pytest.mark.variants(2)
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(

@@ -181,6 +181,8 @@ def _views(controller: main_controller.MainController, study: Path) -> Iterator[
     assert isinstance(shown.dialog, SessionPage)
     shown.dialog.watch.click()
     yield "watch again"
+    while shown.dialog.watched.stage is None:  # the trial is read in the background
+        yield "watch again"
     controller.window.go("machine")
     controller._test_display()
     yield "display test"
