@@ -1,4 +1,4 @@
-"""Sentences for people: none has a pattern that readers of English stumble over (`docs/testing.md` lists them)."""
+"""Sentences for people: none has a pattern that readers of English stumble over."""
 
 import ast
 import re
