@@ -26,36 +26,36 @@ from study_app.number_text import counted
 
 @click.command()
 @takes_study
-@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
+@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write to.")
 @click.option(
     "--wide",
     is_flag=True,
     help=(
-        "Also write the answers as a wide table, with a row for each participant and a column for each statement "
-        "and condition."
+        "Also write the answers as a wide table, with one row per participant and one column per statement and "
+        "condition."
     ),
 )
-@click.option("--parquet", is_flag=True, help="Also every table as Parquet.")
+@click.option("--parquet", is_flag=True, help="Also write every table as a Parquet file.")
 @click.option(
-    "--sav", is_flag=True, help="Also write the answers, long and wide, for SPSS, jamovi and JASP; needs pyreadstat."
+    "--sav", is_flag=True, help="Also write the answers, long and wide, for SPSS, jamovi and JASP; requires pyreadstat."
 )
 @click.option(
     "--psych-ds",
     is_flag=True,
-    help="Also write a Psych-DS folder to share, with all tables, the report with its script, and the study's file.",
+    help="Also write a Psych-DS folder for sharing, with all tables, the report and its script, and the study file.",
 )
 @click.option(
     "--validator",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="PATH",
-    help="Run this installed Psych-DS validator on that folder; ends with exit code 3 if it finds faults.",
+    help="Check that folder with this installed Psych-DS validator; the exit code is 3 if it finds faults.",
 )
 def export(
     results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool, validator: Path | None
 ) -> None:
-    """Write the tidy tables of all participants, with a codebook.
+    """Write tidy tables for all participants, with a codebook.
 
-    Ends with exit code 3 if a section of the report that --psych-ds adds could not be computed.
+    The exit code is 3 if a section of the report that --psych-ds adds could not be computed.
     """
     if validator is not None and not psych_ds:
         raise click.UsageError("--validator checks the folder that --psych-ds writes: use both options")
@@ -95,9 +95,9 @@ def _run_validator(validator: Path, to: Path) -> None:
 
 @click.command()
 @takes_study
-@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
+@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write to.")
 def plot(results: Path, to: Path) -> None:
-    """Draw the responses; conditions appear as codes until the study is unblinded, and as names afterwards."""
+    """Plot the responses; conditions are shown as codes until the study has been unblinded, and by name afterwards."""
     from study_app.analysis.report.study_figures import plot as plot_study
 
     with progress() as show:
@@ -110,9 +110,9 @@ def plot(results: Path, to: Path) -> None:
 @takes_study
 @click.option("--to", type=Target(), required=True, metavar="DIR", help="Folder for the report.")
 def report(results: Path, to: Path) -> None:
-    """Write the report of a study: tests, figures, tables, conclusions and limitations, and how to reproduce it.
+    """Write a study's report: tests, figures, tables, conclusions, limitations, and how to reproduce the results.
 
-    Ends with exit code 3 if a section could not be computed: the report states which and contains everything else.
+    The exit code is 3 if a section could not be computed; the report names it and contains everything else.
     """
     gc.set_threshold(50_000, 20, 100)  # collections took a tenth of the time of a report of 12
     from study_app.analysis.report.write_report import report as write_report
@@ -120,7 +120,7 @@ def report(results: Path, to: Path) -> None:
     failed: list[str] = []
     with progress() as show:
         files = write_report(results, to, progress=show, warn=partial(click.echo, err=True), failed=failed.append)
-    click.echo(f"{files[0]}  and {counted(len(files) - 1, 'more file')} in its folder")
+    click.echo(f"{files[0]}  and {counted(len(files) - 1, 'more file')} in the same folder")
     _report_failed_sections(failed)
 
 
@@ -129,10 +129,10 @@ def report(results: Path, to: Path) -> None:
 @BY
 @REASON
 def unblind(results: Path, by: str, reason: str) -> None:
-    """Open the sealed key of a study and write the sealed columns; name, time and reason are recorded.
+    """Open a study's sealed key and write the sealed columns; your name, the time and the reason are recorded.
 
-    In a merged study the command opens the key of each site; to open one key, name the folder of that site, such as
-    pooled/sites/A. It ends with exit code 3 if a file was left unchanged, and states the reason and what to do.
+    In a merged study, the command opens the key of every site; to open only one, specify that site's folder, such as
+    pooled/sites/A. If a file was left unchanged, the command states why and what to do, and the exit code is 3.
     """
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder
@@ -156,7 +156,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @takes_study
 @PARTICIPANT
 @SESSION
-@click.option("--trial", type=click.IntRange(1), help="This trial only; default: the whole session.")
+@click.option("--trial", type=click.IntRange(1), help="Exclude only this trial; default: the whole session.")
 @BY
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
@@ -174,21 +174,24 @@ def _warn_if_opened(results: Path) -> None:
     from study_app.store.unblinding import has_opened_keys
 
     if has_opened_keys(results):
-        click.echo("warning: the key is open; the report states that this was decided afterwards", err=True)
+        click.echo("warning: the key is already open; the report will state that this was decided afterwards", err=True)
 
 
 @click.command()
 @takes_study
 @PARTICIPANT
 @SESSION
-@click.option("--trial", type=click.IntRange(1), help="This trial only, if it was excluded by itself.")
+@click.option("--trial", type=click.IntRange(1), help="Include only this trial, if it was excluded individually.")
 @click.option("--rule", metavar="RULE", help="Keep a session that meets this rule, such as below_chance.")
 @BY
 @REASON
 def include(
     results: Path, participant: str, session: int, trial: int | None, rule: str | None, by: str, reason: str
 ) -> None:
-    """Include a session or trial again, or keep a session that a rule proposes; name, time and reason are recorded."""
+    """Include a session or trial again, or keep a session that a rule would exclude.
+
+    Your name, the time and the reason are recorded.
+    """
     from study_app.store.exclusions import describe_exclusion, keep
     from study_app.store.exclusions import include as include_in
     from study_app.store.merged import locate_participant
@@ -199,7 +202,7 @@ def include(
         taken = include_in(*where, session, trial=trial, by=by, reason=reason)
     else:
         taken = keep(*where, session, rule=rule, by=by, reason=reason)
-    done = "counts again" if rule is None else f"is kept, although it meets the rule {rule}"
+    done = "included again" if rule is None else f"kept, although it meets the rule {rule}"
     click.echo(f"{done}: {describe_exclusion(replace(taken, participant=participant))}")
     _warn_if_opened(results)
 
@@ -209,17 +212,17 @@ def include(
 @PARTICIPANT
 @BY
 @click.option(
-    "--reason", required=True, metavar="TEXT", help="Reason; it is stored, so it must not identify the person."
+    "--reason", required=True, metavar="TEXT", help="Reason; it is stored, so it must not identify the participant."
 )
 @click.option(
     "--also",
     multiple=True,
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     metavar="DIR",
-    help="Folder that contains copies of the study, at any depth; you can repeat the option.",
+    help="Folder that contains copies of the study at any depth; the option can be repeated.",
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
-    """Erase the data of a participant; date, operator, reason and checksums remain."""
+    """Erase a participant's data; the date, the operator, the reason and checksums remain."""
     from study_app.store.checksums import checked_line
     from study_app.store.merged import locate_participant
     from study_app.store.withdrawals import proof_of_withdrawal
@@ -230,16 +233,16 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
     for folder in done.folders:
         click.echo(f"erased     participant {participant} from {folder}")
     for path in done.outputs:
-        click.echo(f"deleted    {path}, made from the results")
-    click.echo(f"keep, with the fingerprints:  {checked_line(*proof_of_withdrawal(done.tombstone))}")
+        click.echo(f"deleted    {path}, which was produced from the results")
+    click.echo(f"keep this line with the fingerprints:  {checked_line(*proof_of_withdrawal(done.tombstone))}")
     if not (done.folders or done.outputs):
-        click.echo(f"nothing to erase: participant {participant} withdrew at {done.tombstone.at}")
+        click.echo(f"nothing to erase: participant {participant} already withdrew at {done.tombstone.at}")
     for output in done.elsewhere:
-        state = "delete it, and create it again" if output.paths else "no longer there"
-        click.echo(f"warning: output of {output.at} outside the workspace ({state}): {output.to}", err=True)
+        state = "delete it and create it again" if output.paths else "it no longer exists"
+        click.echo(f"warning: output created at {output.at} outside the workspace ({state}): {output.to}", err=True)
     for sentence in done.left:
         click.echo(f"warning: {sentence}", err=True)
-    click.echo(f"searched   {workspace().results}; for copies elsewhere repeat the command with --also DIR")
+    click.echo(f"searched   {workspace().results}; if there are copies elsewhere, repeat the command with --also DIR")
 
 
 def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tuple[str, ...]) -> dict[str, Path]:
@@ -247,9 +250,9 @@ def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tu
     for text in texts:
         name, equals, folder = text.partition("=")
         if not (name and equals and folder):
-            raise click.BadParameter(f"{text!r} is not NAME=RESULTS, such as A=results/rek2024")
+            raise click.BadParameter(f"{text!r} does not have the form NAME=RESULTS, such as A=results/rek2024")
         if name in sites:
-            raise click.BadParameter(f"site {name!r} is given twice")
+            raise click.BadParameter(f"site {name!r} is specified twice")
         sites[name] = Path(folder)
     return sites
 
@@ -258,10 +261,10 @@ def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tu
 @click.argument("sites", nargs=-1, required=True, callback=_parse_sites, metavar="NAME=RESULTS...")
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="New folder, or a merged study to add to.")
 def merge(sites: dict[str, Path], to: Path) -> None:
-    """Merge the study folders of several sites that ran the same protocol; they are copied unchanged.
+    """Merge the study folders of several sites that ran the same protocol; the folders are copied unchanged.
 
-    Each site has a name, which precedes its IDs (A-P001), and keeps its sealed key. The merged folder is RESULTS for
-    report, export, plot, verify, unblind, exclude and withdraw.
+    Each site has a name, which is added in front of its IDs (A-P001), and keeps its own sealed key. Use the merged
+    folder as RESULTS in report, export, plot, verify, unblind, exclude and withdraw.
     """
     from study_app.store.sites.merge import merge_sites
 
@@ -286,7 +289,7 @@ def rebuild(session: Path) -> None:
     for path in made.swept:
         click.echo(f"removed    {path}, an incomplete file")
     if made.torn_bytes:
-        click.echo(f"the journal ends with an incomplete line, which is kept: {counted(made.torn_bytes, 'byte')}")
+        click.echo(f"the journal ends with an incomplete line of {counted(made.torn_bytes, 'byte')}, which is kept")
     if not (made.rewritten or made.swept):
         click.echo("nothing to do: every table agrees with the journal")
 
@@ -300,7 +303,7 @@ def reproduce(session: Path) -> None:
     reproduction = reproduce_session(session)
     for line in (*reproduction.differences, *reproduction.followed):
         click.echo(line)
-    same = "reproduced: the order of trials and statements is as in the receipt"
+    same = "reproduced: the order of trials and statements matches the receipt"
     click.echo("orders or levels differ" if reproduction.differences else same)
     exit_if(reproduction.differences)
 
@@ -312,18 +315,18 @@ def reproduce(session: Path) -> None:
     type=click.Path(path_type=Path),
     metavar="FILE",
     help=(
-        "Compare with fingerprints kept elsewhere (a copy, or the output of proof) and list what has been changed "
-        "or removed since."
+        "Compare the study with fingerprints kept elsewhere (a copy, or the output of proof), and list what has been "
+        "changed or removed since."
     ),
 )
 @click.option(
     "--xdf",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Compare markers, lost samples and clock drift with a recording of its LSL streams; needs pyxdf.",
+    help="Compare the study with a recording of its LSL streams (markers, lost samples, clock drift); requires pyxdf.",
 )
 def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
-    """Check everything in a study's folder: columns, checksums, receipts, journals, key, recordings."""
+    """Check everything in a study folder: columns, checksums, receipts, journals, the key and recordings."""
     from study_app.store.verification.recorded_streams import check_recording
     from study_app.store.verification.verify_study import verify_study as verify_folder
 
@@ -334,7 +337,7 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     for finding in verification.errors:
         click.echo(printable(f"error: {finding}"))
     for finding in sorted(verification.warnings, key=lambda finding: finding.shares):
-        click.echo(printable(f"{'to share it' if finding.shares else 'warning'}: {finding}"))
+        click.echo(printable(f"{'before sharing' if finding.shares else 'warning'}: {finding}"))
     for package, names in verification.plug_ins.items():
         click.echo(f"plug-in {package}: {', '.join(names)}")
     for line in measured:
@@ -348,28 +351,30 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
 
 @click.command()
 @takes_study
-@click.option("--to", type=Target(), metavar="FILE", help="Write the lines into this file; default: print them.")
-@click.option("--sign", is_flag=True, help="Sign them with the key of the lab, which the system's key store keeps.")
+@click.option("--to", type=Target(), metavar="FILE", help="Write the lines to this file; default: print them.")
+@click.option(
+    "--sign", is_flag=True, help="Sign the lines with the lab's key, which is kept in the system's key store."
+)
 @click.option("--server", metavar="URL", help="Obtain a time stamp from this server (RFC 3161).")
 @click.option(
     "--root",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="FILE",
-    help="Root certificate of the server (PEM), to verify its stamps; remembered.",
+    help="The server's root certificate (PEM), used to verify its time stamps; this setting is remembered.",
 )
 @click.option(
     "--always",
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     metavar="DIR",
-    help="Write the proof into this folder at the end of every session, with --server; both are remembered.",
+    help="Write the proof to this folder at the end of every session, using --server; both settings are remembered.",
 )
 def proof(
     results: Path, to: Path | None, *, sign: bool, server: str | None, root: Path | None, always: Path | None
 ) -> None:
     """Print a proof of a study: one line for each session, withdrawal, unblinding and exclusion.
 
-    Keep the lines where people who can change the results cannot change them; verify --fingerprints compares the
-    study with them.
+    Keep the lines where nobody who can change the results can change them; verify --fingerprints compares the study
+    with them.
     """
     from study_app.store import workstation
     from study_app.store.atomic import write_file
@@ -391,10 +396,10 @@ def proof(
 @click.command()
 @takes_session
 def replay(session: Path) -> None:
-    """Recompute every force from the recording, with the same kernel, and list the seconds that differ.
+    """Recompute every force from the recording, with the same kernel, and list the seconds in which forces differ.
 
-    The command also lists the trials whose recordings are lost, missing or not comparable. It ends with exit code 3 if
-    a force differs, a recording is missing, or nothing could be compared.
+    The command also lists the trials whose recordings were lost, are missing or cannot be compared. The exit code is 3
+    if a force differs, a recording is missing, or nothing could be compared.
     """
     from study_app.session.replay import replay as replay_session
 
@@ -402,7 +407,7 @@ def replay(session: Path) -> None:
     for sentence in (*replayed.differences, *replayed.missing, *replayed.uncompared):
         click.echo(sentence)
     if not (replayed.recordings or replayed.missing or replayed.uncompared):
-        click.echo("the session kept no recordings")
+        click.echo("the session did not store any recordings")
     verdict = "forces differ" if replayed.differences else "all compared forces are equal"
     if not replayed.seconds:
         verdict = "no force was compared, so the result is not confirmed"

@@ -29,7 +29,7 @@ def demo(context: click.Context, *, no_window: bool) -> None:
 
     The demo uses the session runner, the servo, and the Falcon's own driver on an emulated device. It does not need a
     display; if there is one, the program opens and shows the results. If the demo was interrupted, run it again to
-    finish.
+    complete it.
     """
     from study_app.workspace import workspace
 
@@ -94,7 +94,7 @@ def _unblind(study: Path) -> None:
     for opened in unblind_folder(study, by="demo", reason="every participant is simulated").values():
         for sentence in opened.left:
             click.echo(f"warning: {sentence}", err=True)
-    click.echo("Key opened: the tables contain the conditions")
+    click.echo("The key has been opened: the tables now contain the conditions")
 
 
 def _write_report(study: Path, to: Path) -> list[str]:
@@ -130,7 +130,7 @@ def _show_results(study: Path) -> int:
         if platform not in _UNSEEN_PLATFORMS:
             from study_app import app
 
-            click.echo("The program opens with these results; close its window to finish")
+            click.echo("The program is opening with these results; close its window to finish")
             return int(app.run_home_window(then=lambda visit: visit.show_study(study)))
         reason = f"QT_QPA_PLATFORM={platform} does not show windows"
     except DisplayError as error:

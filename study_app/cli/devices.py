@@ -36,14 +36,14 @@ _OFF = "off"
 @click.group(invoke_without_command=True)
 @click.pass_context
 def devices(context: click.Context) -> None:
-    """List the devices; examine or measure one; calibrate a Falcon."""
+    """List the devices, examine or measure one, or calibrate a Falcon."""
     if context.invoked_subcommand is None:
         context.invoke(list_devices)
 
 
 @devices.command("list")
 def list_devices() -> None:
-    """List every device: whether it is connected, what it can do, and why it cannot be used."""
+    """List every device, with whether it is connected, what it can do, and why it cannot be used."""
     from study_app.devices.registry import all_devices, backends
 
     of = {device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in all_devices()}
@@ -58,9 +58,9 @@ def list_devices() -> None:
 
 @click.command()
 def plugins() -> None:
-    """List the plug-ins of other packages with version, location, what each adds, and problems.
+    """List the plug-ins from other packages, with their versions and locations, what they add, and any problems.
 
-    Exit code 3 if a device cannot be used.
+    The exit code is 3 if a plug-in cannot be used.
     """
     from study_app.discovery import UPDATE, plug_ins
 
@@ -71,21 +71,21 @@ def plugins() -> None:
             if (entry.package, entry.version) == (package, version):
                 click.echo(f"    {entry.kind:<9} {entry.name}{f': {entry.fault}; {UPDATE}' if entry.fault else ''}")
     if not entries:
-        click.echo("No plug-in is installed; docs/plug-ins.md says how to make one.")
+        click.echo("No plug-ins are installed; docs/plug-ins.md explains how to write one.")
     exit_if(any(entry.fault for entry in entries))
 
 
 @devices.command(cls=TakesDeviceOptions)
 @DEVICE
-@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of an emulated device: drop=0.01, nan …")
+@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of the emulated device: drop=0.01, nan …")
 @click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for support.")
 def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: dict[str, str | Path]) -> None:
     """Examine a device: find, open and run it without force; report each fault with its cause and remedy.
 
     NAME is a device that can be examined: falcon, falcon:SERIAL, falcon-emulated, inverse3,
-    inverse3:HOST:PORT, inverse3-emulated, force-dimension, force-dimension:SERIAL or force-dimension-emulated. Exit
-    code 3 if something is wrong. The zip file contains this report, versions, settings, log and last error, but no
-    participant IDs, answers or liquids.
+    inverse3:HOST:PORT, inverse3-emulated, force-dimension, force-dimension:SERIAL or force-dimension-emulated. The exit
+    code is 3 if a fault is found. The zip file contains this report, version numbers, settings, the log and the last
+    error, but no participant IDs, answers or liquids.
     """
     click.echo(_PREPARING)  # the next imports and compilations take long the first time
     from study_app.devices.doctor import report_lines
@@ -108,12 +108,12 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
 @_FIRMWARE
 @click.option("--grams", type=click.FloatRange(110, 600), metavar="G", help="Use a weight of 110 to 600 grams.")
 @click.option("--scale", is_flag=True, help="Use a luggage scale instead.")
-@click.option("--geometry", metavar="NAME", help="libnifalcon (default), zm-redux or martin-hillier.")
+@click.option("--geometry", metavar="NAME", help="Arm geometry: libnifalcon (default), zm-redux or martin-hillier.")
 def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: bool, geometry: str | None) -> None:
-    """Calibrate a Falcon's force with a known weight or a luggage scale; the result is stored by serial number.
+    """Calibrate a Falcon's force with a known weight or a luggage scale; the result is stored for its serial number.
 
-    The Falcon holds its grip at five positions, first without load, then with the weight. If the measurements are
-    inconsistent, the exit code is 3 and nothing is saved.
+    The Falcon holds its grip in five positions, first without a load and then with the weight. If the measurements are
+    inconsistent, nothing is saved and the exit code is 3.
     """
     if scale == (grams is not None):
         raise click.UsageError("calibrate needs either --grams G (a weight to hang on the grip) or --scale")
@@ -137,7 +137,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     for line in _calibration_lines(calibrated, notes):
         click.echo(line)
     if calibrated.residual_n > calibration.MOST_RESIDUAL_N:
-        unexplained = f"More than {calibration.MOST_RESIDUAL_N} N is unexplained"
+        unexplained = f"The unexplained force is greater than {calibration.MOST_RESIDUAL_N} N"
         click.echo(f"{unexplained}, so nothing was saved. Repeat the calibration.")
         exit_if(True)
     click.echo(f"Saved in {calibration.save_calibration(serial or '', calibrated)}.")
@@ -152,12 +152,12 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     help="Folder for the report; default: bench-NAME in the current folder.",
 )
 def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> None:
-    """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, stable damping.
+    """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, and stable damping.
 
     Stay within reach of the power switch: the handle moves by itself, with a force of up to 4 N. Enter, Ctrl+C and the
-    handle's stop button, if it has one, end the force. You can send the report (bench.md, bench.json) to others;
-    receipts of later sessions on this machine record what was measured. If the handle was touched, the exit code is 3
-    and nothing is saved.
+    handle's stop button, if it has one, end the force. You can share the report (bench.md, bench.json); the receipts of
+    later sessions on this machine include the measurements. If somebody touched the handle, nothing is stored for
+    receipts and the exit code is 3.
     """
     from study_app.devices.registry import check_options, descriptor_of
 
@@ -206,14 +206,13 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
         return
     if not results.fits:
         click.echo(
-            "Nothing was stored for receipts, because mass, damping and friction do not explain the motion of the "
-            "handle."
+            "Nothing was stored for receipts, because mass, damping and friction do not explain the handle's motion."
         )
         exit_if(True)
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**workstation_results(results, day), "report": report})
     workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
-    click.echo("Saved in this machine's settings: receipts of later sessions record it, and Devices shows it.")
+    click.echo("Saved in this machine's settings: the receipts of later sessions include it, and Devices shows it.")
 
 
 def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
@@ -228,7 +227,7 @@ def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) 
     request = OpenRequest(argument=name.partition(":")[2], options=options, progress=click.echo)
     device = framed_device(name, request)
     if not isinstance(device, FalconDevice):
-        raise DeviceError(f"'{name}' cannot be calibrated: only a Falcon has motors to calibrate")
+        raise DeviceError(f"'{name}' cannot be calibrated: specify a Falcon")
     if not isinstance(device, EmulatedFalcon):
         return device, None
     if grams is None:
@@ -241,7 +240,7 @@ def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) 
 def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
     from study_app.devices.falcon.calibration import UNCALIBRATED_UNITS_PER_NM, residual_forces
 
-    lines = ["", "rest  load [N]  unexplained x, y, z [N]"]
+    lines = ["", "pos.  load [N]  unexplained x, y, z [N]"]
     for number, (load, left) in enumerate(
         zip(-notes.forces_n[:, 1], residual_forces(fit, notes.counts, notes.forces_n, notes.units), strict=True),
         start=1,
@@ -250,9 +249,9 @@ def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
     share = fit.units_per_nm / UNCALIBRATED_UNITS_PER_NM
     lines += [
         "",
-        f"{fit.units_per_nm:.0f} motor units per newton metre, {share:.2f} times the default without calibration",
-        f"arms' offset {degrees(fit.arm_offset_rad):+.2f} degrees; the grip's own weight {fit.own_weight_n:.2f} N",
-        f"unexplained {fit.residual_n:.3f} N RMS, mostly friction",
+        f"{fit.units_per_nm:.0f} motor units per newton metre, {share:.2f} times the uncalibrated default",
+        f"offset of the arms {degrees(fit.arm_offset_rad):+.2f} degrees; weight of the grip {fit.own_weight_n:.2f} N",
+        f"unexplained force {fit.residual_n:.3f} N RMS, mostly friction",
     ]
     return lines
 
@@ -313,18 +312,18 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
 
 @click.command()
 @click.option(
-    "--markers", type=click.Choice((_OFF, "on")), help="Markers of events over the Lab Streaming Layer (LSL)."
+    "--markers", type=click.Choice((_OFF, "on")), help="Send event markers over the Lab Streaming Layer (LSL)."
 )
 @click.option(
     "--samples",
     type=click.Choice((_OFF, "single-blind", "always")),
-    help="Samples over LSL; single-blind: not in double-blind studies.",
+    help="Send samples over LSL; single-blind: except in double-blind studies.",
 )
 @click.option(
-    "--triggers", metavar="PORT", help=("Trigger codes on a port, such as serial:/dev/ttyUSB0; off disables them.")
+    "--triggers", metavar="PORT", help=("Send trigger codes to a port, such as serial:/dev/ttyUSB0; off disables them.")
 )
 def outlets(markers: str | None, samples: str | None, triggers: str | None) -> None:
-    """Print what sessions on this machine send to other programs; with options, change it."""
+    """Print what sessions on this machine send to other programs; use the options to change it."""
     from study_app.errors import OutletError
     from study_app.outlets.session_outlets import is_port, port_examples
     from study_app.store import workstation
@@ -337,7 +336,9 @@ def outlets(markers: str | None, samples: str | None, triggers: str | None) -> N
         changes["triggers"] = "" if triggers == _OFF else triggers
         if triggers != _OFF and not is_port(triggers):
             examples = " or ".join(port_examples())
-            raise OutletError(f"--triggers '{triggers}' is not the address of a port: use one like {examples}, or off")
+            raise OutletError(
+                f"--triggers '{triggers}' is not the address of a port: specify one such as {examples}, or off"
+            )
     if changes:
         settings = type(settings).model_validate(settings.model_dump() | changes)
         workstation.save_settings(settings)

@@ -67,29 +67,32 @@ _REAL = "physical2"
 
 @click.command()
 @click.argument("scene", metavar="[FILE]", required=False)
-@click.option("--liquid", metavar="NAME", help="Name of the liquid; default: water of rek2024, and honey of physical2.")
+@click.option("--liquid", metavar="NAME", help="Name of the liquid; default: water in rek2024, and honey in physical2.")
 @click.option(
     "--path",
     default=_DEFAULT_PATH,
     show_default=True,
     metavar="PATH",
-    help="Motion CSV, or a programmed path: stir, circle, reverse, reach …",
+    help="CSV file with a motion, or a programmed path: stir, circle, reverse, reach …",
 )
 @click.option(
     "--liquids",
     "every",
     is_flag=True,
     help=(
-        "Compare the liquids of FILE (default: physical2) instead, each with its own model (error of the force, "
-        "speed range, computation time of a tick)."
+        "Compare the liquids in FILE (default: physical2) instead, each with its own model (force error, speed range "
+        "and computation time per tick)."
     ),
 )
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for table and figure; default: print.")
+@click.option(
+    "--to", type=Target(), metavar="DIR", help="Folder for the table and the figure; default: print the table."
+)
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, *, every: bool) -> None:
-    """Compare accuracy and computation time of the models of a liquid.
+    """Compare the accuracy and computation time of a liquid's models.
 
     FILE is a protocol or scene file; default: rek2024 and physical2.
-    Wakes are compared with their definition, models of a real liquid with experiments, exact solutions and a solver.
+    Wakes are compared with their definition; models of real liquids are compared with experiments, exact solutions and
+    a solver.
     """
     if every:
         exclude_each_other(liquids=every, liquid=liquid)
@@ -120,7 +123,7 @@ def _print_survey(file: str | None, to: Path | None) -> None:
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         errors = survey(load_scenes(file or _REAL), show)
     if not errors:
-        raise click.UsageError(f"{file}: its liquids do not have a viscosity, so there is no physical reference")
+        raise click.UsageError(f"{file}: none of its liquids has a viscosity, so there is no physical reference")
     _present_evidence(evidence(errors), to, with_text=False)
 
 
@@ -135,15 +138,17 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
         if liquid in thesis or liquid in real:
             return thesis.get(liquid or ""), real.get(liquid or ""), ()
         known = ", ".join(dict.fromkeys([*thesis, *real]))
-        raise click.UsageError(f"--liquid {liquid}: known liquids are {known}; or name the FILE that contains it")
+        raise click.UsageError(
+            f"--liquid {liquid}: the known liquids are {known}; for another one, specify the FILE that contains it"
+        )
     if liquid is None:
         scenes = load_scenes(scene)
         if len(scenes) > 1:
-            raise click.UsageError(f"{scene}: say which --liquid of {', '.join(scenes)}")
+            raise click.UsageError(f"{scene} contains several liquids: specify one with --liquid ({', '.join(scenes)})")
         liquid = next(iter(scenes))
     chosen = load_scene(scene, liquid)
     if chosen.liquids[0].viscosity_pa_s is None:
-        return chosen, None, (f"{liquid} does not state a viscosity, so there is no physical reference",)
+        return chosen, None, (f"{liquid} does not have a viscosity, so there is no physical reference",)
     if chosen.liquids[0].drag.law == "linear":
         return chosen, None, (f"{liquid} is a linear damper, so there is no physical reference",)
     return chosen, chosen, ()
@@ -170,38 +175,40 @@ def _motion_along(path: str, scene: Scene) -> Motion:
     "--solve",
     is_flag=True,
     help=(
-        "Solve the flow again instead of using the stored tables (20 minutes on one core, an hour on a busy core); "
-        "needs the extra cfd (NGSolve, 350 MB)."
+        "Solve for the flow again instead of using the stored tables (20 minutes on one core, an hour if it is busy); "
+        "requires the extra cfd (NGSolve, 350 MB)."
     ),
 )
 @click.option(
     "--refit",
     is_flag=True,
     help=(
-        "Fit the constants of unsteady drag to the stored motions, and print the error of each motion, fitted and not "
-        "fitted; this takes about two minutes."
+        "Fit the constants of unsteady drag to the stored motions, and print the error for each motion, whether it "
+        "was used in the fit or not; this takes about two minutes."
     ),
 )
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure; default: print.")
+@click.option(
+    "--to", type=Target(), metavar="DIR", help="Folder for the tables and the figure; default: print the tables."
+)
 @click.option(
     "--materials",
     is_flag=True,
-    help="Only compare the drag in Herschel–Bulkley liquids; with --solve this takes half an hour.",
+    help="Compare only the drag in Herschel–Bulkley liquids; with --solve this takes half an hour.",
 )
 @click.option(
     "--score",
     is_flag=True,
     help=(
-        "Score the models with the benchmark for other engines (error, time, energy given, tolerated delay); this "
-        "takes about five minutes."
+        "Score the models on the benchmark for other force engines (error, time, energy supplied, tolerated delay); "
+        "this takes about five minutes."
     ),
 )
 @takes_workers
 def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, materials: bool, score: bool) -> None:
-    """Fit models of honey and glycerin to the force of a fluid solver, and report the remaining error.
+    """Fit models of honey and glycerin to the forces computed by a fluid solver, and report the residual error.
 
-    A ball of 68 mm starts, moves at constant speed and stops abruptly, at 0.2 and 0.6 m/s. Fitting takes about a
-    minute. Further motions, such as oscillations and a reversal, are used by --refit.
+    A 68 mm ball starts, moves at a constant speed of 0.2 or 0.6 m/s, and stops abruptly. Fitting takes about a minute.
+    --refit also uses other motions, such as oscillations and a reversal.
     """
     from study_app.evidence.cfd import fits, law_fit
     from study_app.evidence.cfd.solver import solve as solve_all
@@ -210,7 +217,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     exclude_each_other(refit=refit, materials=materials, score=score)
     exclude_each_other(solve=solve, score=score)
     if solve and to is None:
-        raise click.UsageError("--solve needs --to: the folder for the solver's tables")
+        raise click.UsageError("--solve needs --to, the folder for the solver's tables")
     make_output_folder(to)
     if score:
         with progress(lambda text: click.echo(text, err=True)) as show:
@@ -385,13 +392,17 @@ _LOAD = click.Choice(("none", "gui", "gui+cpu"))
     default=10.0,
     show_default=True,
     metavar="S",
-    help=("Duration for each loop, or for each delay."),
+    help=("Duration of the measurement of each loop, or of each delay."),
 )
 @click.option(
-    "--load", type=_LOAD, default="none", show_default=True, help="Also paint both windows; also keep all cores busy."
+    "--load",
+    type=_LOAD,
+    default="none",
+    show_default=True,
+    help="gui: paint both windows; gui+cpu: also keep all cores busy.",
 )
 @click.option(
-    "--spin", "spin_us", type=float, metavar="US", help="Poll the clock for this time before a deadline [µs]."
+    "--spin", "spin_us", type=float, metavar="US", help="Time for which the clock is polled before each deadline [µs]."
 )
 @click.option("--delays", "of_delays", is_flag=True, help="Measure the delay of the participant's picture instead.")
 @click.option(
@@ -401,9 +412,9 @@ _LOAD = click.Choice(("none", "gui", "gui+cpu"))
 @click.option(
     "--triggers",
     metavar="PORT",
-    help="Measure triggers on a port instead, such as serial:/dev/ttyUSB0; virtual: on a pair of virtual ports.",
+    help="Measure triggers on a port instead, such as serial:/dev/ttyUSB0; virtual uses a pair of virtual ports.",
 )
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figure.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the tables and the figure.")
 def timing(
     seconds: float,
     load: LoadName,
@@ -416,20 +427,22 @@ def timing(
 ) -> None:
     """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
-    They alternate every quarter second, in each priority class that the system grants. Ctrl+C ends the command.
+    The four alternate every quarter of a second, in each priority class that the system grants. Ctrl+C ends the
+    command.
 
-    With --delays a session presents the delays of rek2024 on screens of 60 and 144 Hz, with and without load, and
-    computes the error of every frame's delay from its recordings. It does not need a display.
+    With --delays, a session presents the delays of rek2024 on 60 and 144 Hz screens, with and without load, and the
+    error of every frame's delay is computed from the session's recordings. A display is not needed.
 
-    With --devices the servo runs alternately on each emulated device and on the scripted hand. The command ends with
-    exit code 3 if the 99th percentile of the lateness on one of them is more than 1.5 times the value on the scripted
-    hand, and the whole 95 % interval of this ratio is above 1.5.
+    With --devices, the servo runs alternately with each emulated device and with the scripted hand. The exit code is 3
+    if, for any device, the 99th percentile of the lateness is more than 1.5 times that with the scripted hand, and the
+    whole 95 % interval for this ratio lies above 1.5.
 
-    With --lsl another process receives samples at 1 kHz and markers for the given time; then the servo runs with and
-    without both streams, alternately, for up to 300 s each. Ends with exit code 3 if something is lost, a marker's
-    time differs from the servo's clock by more than 1 ms, or the median lateness grows by more than 10 %.
+    With --lsl, another process first receives markers and 1 kHz samples for the given time; then the servo runs
+    alternately with and without both streams, for up to 300 s each. The exit code is 3 if anything is lost, if a
+    marker's time differs from the servo's clock by more than 1 ms, or if the median lateness increases by more than
+    10 %.
 
-    With --triggers the command sends a byte to a port for each event, and measures its delay.
+    With --triggers, the command sends a byte to a port for each event, and measures the delay.
     """
     from study_app.evidence.computer import under_load
     from study_app.evidence.table import check_seconds
@@ -438,7 +451,7 @@ def timing(
     exclude_each_other(**others)
     other = next((name for name, given in others.items() if given), "")
     if other and spin_us is not None:
-        raise StudyError(f"--spin applies to the servo's loops: omit it with --{other}")
+        raise StudyError(f"--spin applies only to the servo's loops: omit it with --{other}")
     if other in {"lsl", "triggers"}:
         check_seconds(seconds, "outlets are measured")
     if other == "delays":
@@ -521,16 +534,19 @@ def _ending_by_signal() -> Iterator[tuple[threading.Event, list[int]]]:
 @click.argument("protocol", metavar="[FILE]", default="rek2024")
 @click.option("--hours", type=float, required=True, metavar="H", help="Duration in hours; 0.01 is 36 seconds.")
 @click.option("--virtual", is_flag=True, help="Run in virtual time, in which a day takes minutes.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the faults.")
+@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the faults.")
 @click.option(
-    "--load", type=_LOAD, default="none", help="Also paint both windows of a session; also keep all cores busy."
+    "--load",
+    type=_LOAD,
+    default="none",
+    help="gui: paint both windows of a session; gui+cpu: also keep all cores busy.",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the report.")
 @click.pass_context
 def soak(
     context: click.Context, hours: float, protocol: str, seed: int, load: LoadName, to: Path | None, *, virtual: bool
 ) -> None:
-    """Run the servo for hours with a moving hand and every fault, and report drift, leaks and failures.
+    """Run the servo for hours with a moving hand and every kind of fault, and report drift, leaks and failures.
 
     FILE defines the liquids; default: rek2024. Ctrl+C ends the command and prints the report so far.
     """
@@ -585,18 +601,21 @@ def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
     help="Initial number of studies per cell.",
 )
 @takes_workers
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation."
+)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
-    """Measure how often the report's verdicts are wrong, on simulated studies without effects, with some, or with all.
+    """Measure how often the report's verdicts are wrong, in simulated studies with no effects, some, or all of them.
 
-    The report's own tests analyse studies of rek2024 with 5, 12 and 24 participants, simulated by the rehearsals'
-    answer model and by an ordinal probit model with random effects. Every rate is printed with its Wilson interval, and
-    whether it meets its limit: "at most 5 %" is met if the interval ends below 7.5 %, and exceeded if an interval that
-    allows for the number of rates lies above 5 %. Hypotheses, recognition, equivalence with a minority and skewed
-    trends are tested on numbers drawn directly. If a rate is undecided, its cell gets more studies, up to four times as
-    many. Ctrl+C ends the command and prints the results so far. It ends with exit code 3 if a rate exceeds its limit,
-    otherwise with 4 if there are too few studies to decide about a rate.
+    The report's own tests are applied to simulated rek2024 studies with 5, 12 and 24 participants, whose answers come
+    from the rehearsals' answer model or from an ordinal probit model with random effects. Every rate is printed with
+    its Wilson interval and with a statement of whether it meets its limit: "at most 5 %" is met if the interval ends
+    below 7.5 %, and exceeded if an interval that allows for the number of rates lies above 5 %. Hypotheses,
+    recognition, equivalence with a minority and skewed trends are tested on values drawn directly. While a rate is
+    undecided, more studies are simulated for its cell, up to four times the initial number. Ctrl+C ends the command and
+    prints the results so far. The exit code is 3 if a rate exceeds its limit; otherwise it is 4 if there are too few
+    studies to decide on every rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.evidence.report_rates.simulation import Rate, evidence, validate
@@ -637,18 +656,18 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     multiple=True,
     default=(1,),
     show_default=True,
-    help="Seed of the simulation. Repeat the option for more seeds; all studies are evaluated together.",
+    help="Seed for the simulation. Repeat the option to use several seeds; all studies are evaluated together.",
 )
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
     """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
 
-    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay) the command simulates and
-    analyses many studies of 20 observers whose thresholds differ by a factor of 1.2; in magnitude estimation the
-    exponent is known. Then it rehearses three participants with servo, files, unblinding and analysis. Every value is
-    printed with its limit; the interval in brackets allows for the number of values. Ends with exit code 3 if an
-    interval lies beyond its limit.
+    For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
+    analyses many studies with 20 observers whose thresholds differ by a factor of 1.2; in magnitude estimation, the
+    exponent is known instead. It then rehearses three participants with the servo, files, unblinding and analysis.
+    Every value is printed with its limit; the interval in brackets allows for the number of values. The exit code is 3
+    if an interval lies beyond its limit.
     """
     from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
     from study_app.evidence.thresholds.known_values import validate as validate_values
@@ -664,22 +683,26 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
         verdicts = validate_values(chosen, studies, seeds, executor, show, say)
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.perf_counter() - begun:.0f} s, {used_s:.0f} s of processor time"
-    heading = f"{studies} studies of each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
+    heading = f"{studies} studies for each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
     _present_evidence(evidence(verdicts, heading), to)
 
 
 @click.command("delay-thresholds")
-@click.option("--people", type=click.IntRange(5, 1000), default=40, show_default=True, help="Simulated people.")
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
+@click.option(
+    "--people", type=click.IntRange(5, 1000), default=40, show_default=True, help="Number of simulated participants."
+)
+@click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation."
+)
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
 def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
-    """Compare delays that simulated people rate as different (rek2024) with delays that they detect (delaydetect).
+    """Compare delays that simulated participants rate as different (rek2024) and delays that they detect (delaydetect).
 
-    The forced choice does not depend on a person's criterion; the rating does.
+    The ratings depend on each participant's criterion; the forced choices do not.
     """
     from study_app.evidence.thresholds.noticed_delays import compare, evidence
 
     with progress() as show:
-        show("simulating people")
+        show("simulating participants")
         comparison = compare(people, seed)
     _present_evidence(evidence(comparison), to)

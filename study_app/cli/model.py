@@ -13,22 +13,30 @@ from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 if TYPE_CHECKING:
     from study_app.haptics.model.scene import Scene
 
-_LIQUID = click.option("--liquid", required=True, metavar="NAME", help="ID of the liquid in that file.")
+_LIQUID = click.option("--liquid", required=True, metavar="NAME", help="ID of the liquid in FILE.")
 _INITIAL = click.option(
-    "--set", "changes", multiple=True, metavar="NAME=VALUE", help="Initial value, or a fixed parameter."
+    "--set",
+    "changes",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Initial value of a fitted parameter, or value of a fixed one; the option can be repeated.",
 )
 
 
 @click.command()
 @SCENE_FILE
 @_LIQUID
-@click.option("--path", required=True, metavar="PATH", help="Motion CSV, or a programmed path: circle, line, stop …")
+@click.option(
+    "--path", required=True, metavar="PATH", help="CSV file with a motion, or a programmed path: circle, line, stop …"
+)
 @click.option("--to", required=True, type=Target(), metavar="CSV", help="File to write.")
-@click.option("--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; repeatable.")
+@click.option(
+    "--set", "changes", multiple=True, metavar="NAME=VALUE", help="Override a parameter; the option can be repeated."
+)
 def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, ...]) -> None:
-    """Compute the force along a motion, with the servo's own tick, without a device or a clock.
+    """Compute the force along a motion as the servo would, tick by tick, without a device or a clock.
 
-    Every row of the motion is one tick: provide rows at the scene's rate (1 kHz unless its rate_hz differs).
+    Each row of the motion is one tick, so the rows must be at the scene's rate (1 kHz unless it sets rate_hz).
     """
     from study_app import api
     from study_app.store import csv_files
@@ -58,7 +66,7 @@ def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
 
 @click.command()
 @SCENE_FILE
-@click.option("--liquid", metavar="NAME", help="Only this liquid; default: every liquid of the file.")
+@click.option("--liquid", metavar="NAME", help="Describe only this liquid; default: every liquid in the file.")
 @click.option(
     "--delay",
     type=click.IntRange(0, MOST_DELAY),
@@ -83,9 +91,9 @@ def scene(scene: str, liquid: str | None, delay: int) -> None:
 
 
 @click.command()
-@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write into.")
+@click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write to.")
 def figures(to: Path) -> None:
-    """Redraw Figures 3 to 8 of the thesis: force over time on programmed paths, with captions."""
+    """Redraw Figures 3 to 8 of the thesis: force over time along programmed paths, with captions."""
     from study_app.evidence.thesis_figures import figures as draw
 
     echo_files(draw(to))
@@ -98,28 +106,30 @@ def figures(to: Path) -> None:
     required=True,
     type=click.Path(path_type=Path),
     metavar="CSV",
-    help="Motion and force, or a flow curve.",
+    help="CSV file with motion and force, or with a flow curve.",
 )
 @_LIQUID
-@click.option("--fit", "names", required=True, metavar="NAMES", help="Parameters, such as drag_coefficient,length.")
+@click.option(
+    "--fit", "names", required=True, metavar="NAMES", help="Parameters to fit, such as drag_coefficient,length."
+)
 @_INITIAL
 @click.option(
     "--velocity",
     type=click.Choice(["centred", "scene"]),
     default="centred",
     show_default=True,
-    help="How to estimate velocities that are missing in the CSV: without lag (centred), or with the scene's "
+    help="How to estimate velocities that are missing from the CSV file: without lag (centred), or with the scene's "
     "filter (scene).",
 )
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for preset, residuals and figure.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the preset, the residuals and the figure.")
 def identify(
     measured: Path, scene: str, liquid: str, names: str, changes: tuple[str, ...], velocity: str, to: Path | None
 ) -> None:
-    """Fit a liquid's parameters to measured motion and force, or to a flow curve, with intervals and warnings.
+    """Fit a liquid's parameters to measured motion and force, or to a flow curve; print intervals and warnings.
 
-    CSV has columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the ball), and vx_mps,
-    vy_mps, vz_mps if they are known; or t_s, velocity_mps, force_n for a motion along one line; or, from a rheometer,
-    shear_rate_per_s, shear_stress_pa.
+    The CSV file must contain the columns t_s, x_m, y_m, z_m, fx_n, fy_n, fz_n (scene frame; the liquid's force on the
+    ball) and, if known, vx_mps, vy_mps, vz_mps; or t_s, velocity_mps, force_n for motion along a line; or, for
+    rheometer data, shear_rate_per_s, shear_stress_pa.
     """
     from study_app.lab.identify import measured_force as measurements
     from study_app.lab.identify import preset as identified

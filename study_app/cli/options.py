@@ -52,10 +52,10 @@ _LONGEST: Final = 150
 Command = TypeVar("Command", bound=Callable[..., Any])
 FILE = click.argument("protocol", metavar="FILE")
 SCENE_FILE = click.argument("scene", metavar="FILE")
-BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person, or a rule.")
-PARTICIPANT = click.option("--participant", required=True, metavar="ID", help="Participant, such as P007.")
+BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person responsible, or a rule.")
+PARTICIPANT = click.option("--participant", required=True, metavar="ID", help="ID of the participant, such as P007.")
 SESSION = click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
-REASON = click.option("--reason", required=True, metavar="TEXT", help="Reason; recorded with the time.")
+REASON = click.option("--reason", required=True, metavar="TEXT", help="Reason, which is recorded with the time.")
 EXIT_CANCELLED: Final = 130
 
 
@@ -103,7 +103,7 @@ class Target(click.Path):
 
 
 RESULTS = click.option(
-    "--results", type=Target(), metavar="DIR", help="Study folder; default: results/<study> of the workspace."
+    "--results", type=Target(), metavar="DIR", help="Study folder; default: results/<study> in the workspace."
 )
 
 
@@ -111,7 +111,7 @@ def exclude_each_other(**given: object) -> None:
     """Raise a usage error if more than one of these options is given (neither None nor False)."""
     names = [f"--{name}" for name, value in given.items() if value is not None and value is not False]
     if len(names) > 1:
-        raise click.UsageError(f"{' and '.join(names)} cannot be combined: specify one of them")
+        raise click.UsageError(f"{' and '.join(names)} cannot be combined: specify only one of them")
 
 
 def takes_study(function: Command) -> Command:
@@ -143,7 +143,9 @@ def study_at(named: str | None, results: Path | None) -> Path:
     from study_app.workspace import workspace
 
     if (named is None) == (results is None):
-        raise click.UsageError("specify one study: RESULTS, or --results DIR (liquid-study studies lists them)")
+        raise click.UsageError(
+            "specify one study, as RESULTS or as --results DIR (liquid-study studies lists the studies)"
+        )
     if results is not None:
         return results
     path = Path(str(named))
@@ -178,7 +180,9 @@ def keep_offered_workspace() -> None:
     if chosen_workspace() is None:
         offered = offered_workspace()
         keep_workspace(offered)
-        click.echo(f"workspace of this machine: {offered.folder} (liquid-study workspace DIR changes it)", err=True)
+        click.echo(
+            f"this machine's workspace: {offered.folder} (to change it, run liquid-study workspace DIR)", err=True
+        )
 
 
 def exit_if(problems: object) -> None:
@@ -257,7 +261,7 @@ def takes_workers(function: Command) -> Command:
         metavar="ADDRESS",
         envvar="DASK_SCHEDULER_ADDRESS",
         show_envvar=True,
-        help="Dask cluster to use instead of this computer: the address of its scheduler, such as tcp://HOST:8786.",
+        help="Address of the scheduler of a Dask cluster to use instead of this computer, such as tcp://HOST:8786.",
     )
     @wraps(function)
     def run(*arguments: Any, count: int, cluster: str | None, **options: Any) -> Any:
@@ -273,7 +277,7 @@ def takes_workers(function: Command) -> Command:
 
 def _check_worker_count(_context: click.Context, _option: click.Parameter, value: int) -> int:
     if value == 0:
-        raise click.BadParameter("0 workers cannot compute: specify 1 or more, or -1 for one per core")
+        raise click.BadParameter("0 workers cannot compute anything: specify 1 or more, or -1 for one per core")
     return value
 
 
@@ -283,7 +287,8 @@ def executor_for(workers: Workers) -> "Iterator[Executor]":
     with open_executor(workers) as executor:
         if not getattr(executor, "has_workers", True):
             click.echo(
-                (f"{workers.cluster} does not have a worker yet: the computation starts when a worker joins"), err=True
+                (f"{workers.cluster} does not have any workers yet: the computation will start when a worker joins"),
+                err=True,
             )
         yield executor
 
@@ -307,7 +312,9 @@ class DeviceName(click.Option):
         *first, last = names
         listed = f"{', '.join(first)} or {last}" if first else last
         known = self.help
-        self.help = f"{listed}; see devices." if not known else f"{known} {listed}; see devices."
+        self.help = (
+            f"{listed}; see liquid-study devices." if not known else f"{known} {listed}; see liquid-study devices."
+        )
         try:
             return super().get_help_record(ctx)
         finally:

@@ -23,7 +23,7 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
     try:
         numbers = sorted({int(part) for part in value.split(",")})
     except ValueError as error:
-        raise click.BadParameter(f"{value!r} is not a list of numbers: specify {what} such as 5,8,12") from error
+        raise click.BadParameter(f"{value!r} is not a list of numbers: specify {what}, such as 5,8,12") from error
     if not numbers or numbers[0] < least or numbers[-1] > most:
         raise click.BadParameter(f"{value!r}: specify {what} from {least} to {most}, such as 5,8,12")
     return tuple(numbers)
@@ -37,7 +37,7 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
     show_default=True,
     callback=lambda _context, _option, value: _parse_numbers(value, 2, MOST_PARTICIPANTS, "numbers of participants"),
     metavar="N,N,…",
-    help="Numbers of participants; by default also the planned one.",
+    help="Numbers of participants; the default also includes the planned number.",
 )
 @click.option(
     "--trials",
@@ -45,18 +45,20 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
         () if value is None else _parse_numbers(value, *_TRIALS, "numbers of trials")
     ),
     metavar="N,N,…",
-    help="Number of trials per standard, comparison or rated level, for studies of thresholds, d′, ratings or "
-    "magnitude estimation; default: the protocol's.",
+    help="Numbers of trials per standard, comparison or rated level, for studies of thresholds, d′, ratings or "
+    "magnitude estimation; default: the protocol's number.",
 )
 @click.option(
     "--studies",
     type=click.IntRange(1, 1_000_000),
-    help=f"Number of simulated studies for each size; default: {STUDIES}, for thresholds {THRESHOLD_STUDIES}.",
+    help=f"Number of simulated studies for each size; default: {STUDIES}, or {THRESHOLD_STUDIES} for thresholds.",
 )
 @takes_workers
 @click.option("--engine", type=click.Choice(["processes", "dask"]), hidden=True)
-@click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed of the simulation.")
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for tables and figures.")
+@click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="Seed for the simulation."
+)
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the tables and figures.")
 def power(
     protocol: str,
     sizes: tuple[int, ...],
@@ -67,14 +69,15 @@ def power(
     seed: int,
     to: Path | None,
 ) -> None:
-    """Estimate the power of the protocol's own tests on simulated studies, and the smallest detectable difference.
+    """Estimate the power of the protocol's own tests and the smallest detectable difference from simulated studies.
 
-    Four sessions are rehearsed to obtain the features of each condition; then thousands of participants answer with the
-    rehearsals' answer model, which is plausible but not measured. Power is printed for typical people, or for the
-    values in [simulated_participants], with the range over consistent, typical and noisy people. For a study of
-    thresholds, d′, ratings or magnitude estimation the command prints, for each number of participants and of --trials,
-    the standard deviation of one participant's estimate, the half width of the group's 95 % interval, and the
-    proportion of studies that reach analysis.precision. Ctrl+C ends the command and prints the results so far.
+    Four sessions are rehearsed to obtain the features of each condition; thousands of participants are then simulated
+    with the rehearsals' answer model, which is plausible but not based on measurements. Power is printed for typical
+    participants, or for the values in [simulated_participants], with the range across consistent, typical and noisy
+    participants. For a study of thresholds, d′, ratings or magnitude estimation, the command prints, for each number of
+    participants and of trials, the standard deviation of one participant's estimate, the half-width of the group's 95 %
+    interval, and the proportion of studies that reach analysis.precision. Ctrl+C ends the command and prints the
+    results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)
@@ -89,14 +92,16 @@ def power(
     study = load(protocol)
     if trials and not plans(study, trials):
         raise click.UsageError(
-            f"--trials: {study.study.name} does not have a main block of thresholds, d′, ratings or magnitude "
-            f"estimation"
+            f"--trials cannot be used: {study.study.name} does not measure thresholds, d′, ratings or magnitude "
+            f"estimation in a main block"
         )
     if to is not None:
         make_folder(to, waits=False)
     stated = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
     if stated and study.analysis is not None and (looks := study.analysis.looks):
-        raise click.UsageError(f"--sizes: the study plans looks at {', '.join(map(str, looks))}; omit --sizes")
+        raise click.UsageError(
+            f"--sizes cannot be used, because the study plans looks at {', '.join(map(str, looks))}: omit it"
+        )
     sizes = sizes if stated else planned_sizes(study)
     estimate: PowerEstimate | None = None
     cancelled = False
@@ -112,13 +117,13 @@ def power(
                 rehearse=lambda: condition_features(study, seed=seed, progress=show),
                 progress=show,
             ):
-                show(f"{estimate.studies} of {estimate.asked} studies of each size", estimate.studies / estimate.asked)
+                show(f"{estimate.studies} of {estimate.asked} studies for each size", estimate.studies / estimate.asked)
     except KeyboardInterrupt:
         cancelled = True
     if estimate is not None:
         _write_estimate(estimate, to)
     if cancelled:
-        click.echo("ended early" if estimate else "ended before the first studies were complete", err=True)
+        click.echo("ended early" if estimate else "ended before the first studies had been completed", err=True)
         click.get_current_context().exit(EXIT_CANCELLED)
 
 
@@ -142,11 +147,11 @@ def _write_estimate(estimate: PowerEstimate, to: Path | None) -> None:
 @click.command()
 @FILE
 @click.option(
-    "--power", "computed", type=Target(), metavar="DIR", help="Folder that power --to wrote; its tables are included."
+    "--power", "computed", type=Target(), metavar="DIR", help="Folder written by power --to, whose tables are included."
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for preregistration.md; default: print it.")
 def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
-    """Write a preregistration from the protocol: hypotheses, design, participants, exclusions, analysis, and its hash.
+    """Write a preregistration from the protocol: hypotheses, design, participants, exclusions, analysis, and file hash.
 
     If the preregistration is in the study's folder (results/<study>), the report compares the study with it and lists
     every deviation.
@@ -164,12 +169,12 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
             power_md = (computed / "power.md").read_text(encoding="utf-8")
         except OSError as error:
             raise click.UsageError(
-                f"--power {computed}: power.md cannot be read ({error.strerror}): specify a folder that power --to "
-                "wrote"
+                f"--power {computed}: power.md cannot be read ({error.strerror}): specify a folder written by "
+                "power --to"
             ) from error
         if f"({study.study.name} {study.study.version})" not in power_md:
             raise click.UsageError(
-                f"--power {computed}: power.md does not belong to {study.study.name} {study.study.version}"
+                f"--power {computed}: power.md was not written for {study.study.name} {study.study.version}"
             )
     text = preregistration(study, protocol_hash(source), power_md)
     if to is None:

@@ -32,11 +32,11 @@ def kinds_markdown() -> str:
         ("Standard questionnaires", ("`instrument`", "texts", "scores", "source and comparison"), _instrument_rows()),
         ("Designs", ("`kind`", "question or answer"), _kind_descriptions(designs.KINDS)),
         ("Methods", ("`kind`", "next level"), _kind_descriptions(methods.KINDS)),
-        ("Effects", ("effect", "what it is", "`auto`", "not with"), _effect_rows()),
-        ("Limiters", ("bit", "limiter", "column", "what it says"), _limiter_rows()),
+        ("Effects", ("effect", "description", "`auto`", "not with"), _effect_rows()),
+        ("Limiters", ("bit", "limiter", "column", "meaning"), _limiter_rows()),
         ("Trigger codes", ("code", "event of the journal"), ((str(code), f"`{name}`") for name, code in CODES.items())),
         ("Devices", ("`--device`", "device", "kind", "options"), _device_rows()),
-        ("Checks of a device, in order", ("`devices doctor`", "without it", "cause; cure"), _check_rows()),
+        ("Checks of a device, in order", ("`devices doctor`", "without it", "cause; remedy"), _check_rows()),
         (
             "Templates",
             ("`--template`", "title", "question"),
@@ -62,7 +62,7 @@ def delayed_force_markdown() -> str:
     )
     tables = (
         (
-            "Force left [%], light hand (middle hand), `kalman`",
+            "Remaining force [%], light hand (middle hand in brackets), `kalman`",
             ("liquid", *(f"{delay:g} ms" for delay in delays)),
             shares,
         ),

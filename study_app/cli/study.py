@@ -25,7 +25,9 @@ from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, MOST_DELAY
 from study_app.number_text import counted
 
 SEED = click.IntRange(0, 2**31 - 1)
-_WINDOWED = click.option("--windowed", is_flag=True, help="Show the participant's window in a frame, not full-screen.")
+_WINDOWED = click.option(
+    "--windowed", is_flag=True, help="Show the participant's window in a frame instead of full screen."
+)
 _SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
 _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
 
@@ -37,17 +39,17 @@ _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Nam
     is_flag=False,
     flag_value="protocol",
     type=click.Choice(["protocol", "journal"]),
-    help="Print the JSON Schema of protocol files, or of a line of a session's journal, instead.",
+    help="Print the JSON Schema for protocol files, or for the lines of a session's journal, instead.",
 )
 @click.option(
     "--delay-ticks",
     type=click.IntRange(1, MOST_DELAY),
     default=ASSUMED_TICKS,
     show_default=True,
-    help="Force delay of the device [ticks] for which levels are checked; the pre-flight uses the measured delay.",
+    help="Force delay [ticks] assumed when levels are checked; the pre-flight check uses the device's measured delay.",
 )
 def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None:
-    """Describe the study or the scenes, or list every problem of the file with its line and a hint."""
+    """Describe the study or the scenes in a file, or list every problem in it with a line number and a hint."""
     from study_app.protocol import describe, load
 
     if schema:
@@ -60,7 +62,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         click.echo(json.dumps(printed, indent=2, ensure_ascii=False))
         return
     if protocol is None:
-        raise click.UsageError("check needs a protocol: a file, or one of " + ", ".join(load.shipped()))
+        raise click.UsageError("check needs a protocol: specify a file, or one of " + ", ".join(load.shipped()))
     if load.is_scene_file(protocol):
         click.echo(describe.describe_scenes(load.load_scenes(protocol)))
     else:
@@ -91,10 +93,11 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
 @click.command()
 @click.argument("path", metavar="PATH", type=click.Path(path_type=Path, exists=True))
 def upgrade(path: Path) -> None:
-    """Write study files, liquid files and results of earlier versions in the current format.
+    """Convert study files, liquid files and results from earlier versions to the current format.
 
-    PATH is a file or a folder. Forces and order of trials stay the same; the original of a file is kept next to it, as
-    NAME.toml.format-1. Results get tables with the current columns; journals and receipts are not changed.
+    PATH is a file or a folder. Forces and the order of trials stay the same; the original of each file is kept next to
+    it, as NAME.toml.format-1. The tables of results are rewritten with the current columns; journals and receipts are
+    not changed.
     """
     from study_app.store.upgrade import upgrade as upgrade_files
 
@@ -111,7 +114,7 @@ def upgrade(path: Path) -> None:
     metavar="T",
     default="empty",
     show_default=True,
-    help=f"Template of the study: {', '.join(templates())}.",
+    help=f"Template for the study: {', '.join(templates())}.",
 )
 @click.option("--no-window", is_flag=True, help="Write the file directly, without opening the study designer.")
 def new(name: str, template: str, *, no_window: bool) -> None:
@@ -145,10 +148,17 @@ def edit(protocol: str) -> None:
 @click.command()
 @FILE
 @click.option("--participants", type=click.IntRange(1, 9999), required=True, help="Number of participants.")
-@click.option("--from", "first", metavar="ID", default="P001", show_default=True, help="The first one; others follow.")
-@click.option("--seed", type=SEED, default=1, show_default=True, help="Seed from which their orders are drawn.")
+@click.option(
+    "--from",
+    "first",
+    metavar="ID",
+    default="P001",
+    show_default=True,
+    help="ID of the first participant; the other IDs follow consecutively.",
+)
+@click.option("--seed", type=SEED, default=1, show_default=True, help="Seed for the participants' random orders.")
 def design(protocol: str, participants: int, first: str, seed: int) -> None:
-    """Count positions and carry-over in the orders of N participants, before the study starts."""
+    """Count positions and carry-over in the trial orders for N participants before the study starts."""
     from study_app.protocol.load import load
     from study_app.protocol.orders.balance import balances, describe_balance, numbered_participants
 
@@ -158,19 +168,23 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
 
 @click.command(cls=TakesDeviceOptions)
 @FILE
-@click.option("--participant", metavar="ID", required=True, help="Letters and digits, such as P007.")
+@click.option("--participant", metavar="ID", required=True, help="ID in letters and digits, such as P007.")
 @SESSION
-@click.option("--seed", type=SEED, help="Seed of all random choices; default: drawn at random, shown and recorded.")
+@click.option("--seed", type=SEED, help="Seed for all random choices; default: drawn at random, shown and recorded.")
 @click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True, help="Haptic or input device.")
-@click.option("--language", metavar="LANG", help="Language of the pages; default: the first of the protocol.")
+@click.option("--language", metavar="LANG", help="Language of the pages; default: the protocol's first language.")
 @_OPERATOR
 @click.option(
-    "--row-of", metavar="ID", help="ID of a participant who is replaced, whose order (and place in the group) is used."
+    "--row-of",
+    metavar="ID",
+    help="ID of the participant being replaced, whose order (and position in the group) is used.",
 )
-@click.option("--group", metavar="GROUP", help="Group of the participant, in a study with pre-existing groups.")
+@click.option("--group", metavar="GROUP", help="The participant's group, if the study has pre-existing groups.")
 @_WINDOWED
 @_SCREEN
-@click.option("--pilot", is_flag=True, help="Pilot session: in a marked window, stored in results/<study>-pilot.")
+@click.option(
+    "--pilot", is_flag=True, help="Run a pilot session in a marked window, and store it in results/<study>-pilot."
+)
 @click.option("--no-recordings", is_flag=True, help="Store only answers and trial rows, not every sample and frame.")
 @RESULTS
 def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: Any) -> None:
@@ -188,7 +202,7 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
 @click.option(
     "--participants", type=click.IntRange(1, 99_999), default=1, show_default=True, help="Number of participants."
 )
-@click.option("--seed", type=SEED, default=1, show_default=True, help="Seed of all random choices.")
+@click.option("--seed", type=SEED, default=1, show_default=True, help="Seed for all random choices.")
 @click.option(
     "--device", cls=DeviceName, only_moving=True, default="scripted", show_default=True, help="Simulated device."
 )
@@ -197,19 +211,21 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
     "--answers-only",
     is_flag=True,
     help=(
-        "Simulate thousands of participants in seconds, to try an analysis. Four sessions are rehearsed without "
-        "being stored; then every participant answers from the features of one of them. The columns of measurements "
-        "are n/a. Sessions are written without waiting for the disk."
+        "Simulate thousands of participants in seconds, to try out an analysis. Four sessions are rehearsed but not "
+        "stored; each participant's answers are then derived from the features of one of them. Columns that hold "
+        "measurements contain n/a. Sessions are written without waiting for the disk."
     ),
 )
 @click.option(
-    "--group", metavar="GROUP", help=("Pre-existing group of all participants; default: spread evenly over the groups.")
+    "--group",
+    metavar="GROUP",
+    help=("Pre-existing group for all participants; default: spread evenly across the groups."),
 )
 @click.option(
     "--results",
     type=Target(),
     metavar="DIR",
-    help="Study folder; default: a new results/<study>-rehearsal-1 of the workspace.",
+    help="Study folder; default: a new folder results/<study>-rehearsal-1 in the workspace.",
 )
 @click.pass_context
 def rehearse(
@@ -222,7 +238,9 @@ def rehearse(
         keep_offered_workspace()
     study = load(protocol)
     if study.asks_group and chosen["group"] is None:
-        click.echo(f"Simulated participants are spread evenly over the pre-existing groups {', '.join(study.groups)}.")
+        click.echo(
+            f"Simulated participants are spread evenly across the pre-existing groups {', '.join(study.groups)}."
+        )
     if answers_only:
         if context.get_parameter_source("device") is not ParameterSource.DEFAULT:
             raise click.UsageError("--answers-only does not use a device: omit --device")
@@ -238,8 +256,10 @@ def rehearse(
 
 @click.command(cls=TakesDeviceOptions)
 @takes_session
-@click.option("--protocol", metavar="FILE", help="Protocol of the session; default: found among the known protocols.")
-@click.option("--device", cls=DeviceName, help="Device; default: the device of the interrupted session.")
+@click.option(
+    "--protocol", metavar="FILE", help="The session's protocol; by default it is looked up among the known protocols."
+)
+@click.option("--device", cls=DeviceName, help="Device; default: the one used in the interrupted session.")
 @_OPERATOR
 @_WINDOWED
 @_SCREEN
@@ -253,7 +273,7 @@ def resume(session: Path, **chosen: Any) -> None:
 @click.command()
 @click.argument("folder", metavar="[DIR]", required=False, type=Target())
 def workspace(folder: Path | None) -> None:
-    """Print this machine's workspace, the folder of protocols and results; with DIR, change it."""
+    """Print this machine's workspace, the folder that contains protocols and results; with DIR, change it."""
     from study_app.store.workstation import keep_workspace
     from study_app.workspace import WORKSPACE_VARIABLE, Workspace, chosen_workspace
     from study_app.workspace import workspace as workspace_here
@@ -301,10 +321,10 @@ def studies() -> None:
 @click.command()
 @click.argument("code", metavar="CODE")
 def language(code: str) -> None:
-    """Check the texts for participants in an additional language, in the file WORKSPACE/languages/CODE.toml.
+    """Check the translation of the participants' texts in the file WORKSPACE/languages/CODE.toml.
 
-    CODE is two letters, such as es. If the file does not exist, the command creates it, with a line for each text and
-    the English text as a comment.
+    CODE consists of two letters, such as es. If the file does not exist, the command creates it with a line for each
+    text and the English text as a comment.
     """
     from study_app.errors import StudyError
     from study_app.protocol.wording.languages import SHIPPED, language_template, read_language
@@ -312,7 +332,7 @@ def language(code: str) -> None:
     from study_app.workspace import workspace as workspace_here
 
     if len(code) != 2 or not (code.isascii() and code.islower()):
-        raise StudyError(f"{code!r} is not a language: specify two lowercase letters, such as es")
+        raise StudyError(f"{code!r} is not a language code: specify two lowercase letters, such as es")
     file = workspace_here().folder / "languages" / f"{code}.toml"
     if code in SHIPPED:
         click.echo(f"{SHIPPED[code].english_name} ships with the program")
@@ -331,7 +351,7 @@ def language(code: str) -> None:
 @click.argument("named", metavar="[RESULTS]", required=False)
 @RESULTS
 def sessions(named: str | None, results: Path | None) -> None:
-    """List the sessions of a study, or of every study in the workspace, with the names that commands accept."""
+    """List the sessions of a study, or of every study in the workspace, with the names that other commands accept."""
     from study_app.errors import StoreError
     from study_app.store.merged import all_exclusions, session_in
     from study_app.store.tables.study_files import participants_of
@@ -341,7 +361,7 @@ def sessions(named: str | None, results: Path | None) -> None:
     folders = list(_study_folders(at)) if named is None and results is None else [study_at(named, results)]
     for folder in folders:
         if not folder.is_dir():
-            raise StoreError(f"{folder} is not a folder: specify a study that liquid-study studies lists, or its path")
+            raise StoreError(f"{folder} is not a folder: specify a study listed by liquid-study studies, or its path")
         left_out = {row.what for row in all_exclusions(folder)}
         inside = folder.parent.resolve() == at.resolve()
         for row in participants_of(folder):
@@ -372,7 +392,7 @@ _SECTIONS_SHOWN: Final = 5
 @click.command()
 @click.argument("search_words", metavar="[PAGE | WORDS]", nargs=-1)
 def docs(search_words: tuple[str, ...]) -> None:
-    """Print a page of the documentation, such as data-dictionary, or the section that best matches the words.
+    """Print a documentation page, such as data-dictionary, or the section that best matches the search words.
 
     Without an argument it prints the names of all pages.
     """
@@ -384,7 +404,7 @@ def docs(search_words: tuple[str, ...]) -> None:
         return
     sections = documentation.search(typed)[:_SECTIONS_SHOWN]
     if not sections:
-        raise click.UsageError(f"none of the pages contains a word of {typed!r}: liquid-study docs lists the pages")
+        raise click.UsageError(f"no page contains any of the words {typed!r}: run liquid-study docs to list the pages")
     best, *others = sections
     click.echo(f"{best.page}: {best.heading}\n\n{best.source.strip()}\n")
     for section in others:

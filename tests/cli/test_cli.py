@@ -105,7 +105,7 @@ def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkey
         return done.exit_code, done.output
 
     nothing = "no force was compared, so the result is not confirmed\n"
-    assert replayed(0) == (3, f"the session kept no recordings\n{nothing}")
+    assert replayed(0) == (3, f"the session did not store any recordings\n{nothing}")
     assert replayed(0, uncompared=("trial 1 is lost",)) == (3, f"trial 1 is lost\n{nothing}")
     same = "1 recording, 10.0 s, recomputed 100 times as fast as it ran (1.5 s in all): "
     assert replayed(1) == (0, f"{same}all compared forces are equal\n")
@@ -155,7 +155,7 @@ def test_verify_says_last_what_concerns_sharing(liquid_study: Run, released: Pat
     described.write_text(json.dumps(description), encoding="utf-8", newline="\n")
     unfinished, shared, verdict = liquid_study("verify", str(released)).stdout.splitlines()
     assert unfinished.startswith("warning: ")
-    assert shared.startswith("to share it: dataset_description.json: ")
+    assert shared.startswith("before sharing: dataset_description.json: ")
     assert verdict == "2 sessions: sound"
 
 

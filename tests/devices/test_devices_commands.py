@@ -144,7 +144,7 @@ class TestCalibrate:
         assert liquid_study("calibrate", "--device", "falcon-emulated", *words).exit_code == 2
 
     def test_only_a_falcon_is_calibrated(self):
-        assert "only a Falcon has motors" in str(
+        assert "cannot be calibrated: specify a Falcon" in str(
             liquid_study("calibrate", "--device", "mouse", "--grams", "400").exception
         )
         refused = liquid_study("calibrate", "--device", "falcon-emulated", "--scale")

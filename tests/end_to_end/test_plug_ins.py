@@ -93,7 +93,7 @@ def test_it_is_installed_and_uninstalled(built: Path, tmp_path: Path) -> None:
         return done.returncode, (done.stdout + done.stderr).splitlines()
 
     none = program("plugins")
-    assert none == (0, ["No plug-in is installed; docs/plug-ins.md says how to make one."])
+    assert none == (0, ["No plug-ins are installed; docs/plug-ins.md explains how to write one."])
     pip("--python", python, "install", *PIP, "--no-deps", "--no-index", str(built))
     code, (where, *lines) = program("plugins")
     assert (code, where.partition("  (")[0]) == (0, f"{PACKAGE} 1.0")

@@ -160,7 +160,7 @@ def test_home_shows_no_card_for_a_liquid_file(tmp_path, monkeypatch):
 def test_the_first_command_that_writes_keeps_the_offered_workspace_and_says_so_once(documents, tmp_path, monkeypatch):
     start_folder(tmp_path / "start", monkeypatch)
     made = CliRunner().invoke(commands, ["new", "thick", "--no-window"])
-    assert f"workspace of this machine: {documents / 'Liquid Study'} (" in made.stderr
+    assert f"this machine's workspace: {documents / 'Liquid Study'} (" in made.stderr
     start_folder(tmp_path / "clone", monkeypatch, "results", "protocols")
     made = CliRunner().invoke(commands, ["new", "thin", "--no-window"])
     assert made.stderr == ""

@@ -41,7 +41,7 @@ PATTERNS = {
 FINE = {
     "module X has no attribute X": "is no, has no, gives no",  # Python's own sentence
     "`velocity_lag_s` is None, because the library filters.": "is no, has no, gives no",
-    "warning: output of X outside the workspace (X): X": "two colons",
+    "warning: output created at X outside the workspace (X): X": "two colons",
     "the TCP connection is refused or times out": "refuse",  # the term of networks
     "it is not connected or has no power, another program uses it, or the user does not have access to USB": "is no, "
     "has no, gives no",
