@@ -276,15 +276,15 @@ def flush_entry(path: Path) -> None:
         sync_folder(path.parent)
     except OSError as error:
         raise StoreError(
-            f"{path} is written, but the disk did not confirm it ({system_message(error)}): check the disk; after a "
-            "power failure the older state may be back"
+            f"{path} was written, but the disk did not confirm it ({system_message(error)}): check the disk; after a "
+            "power failure the file may be in its earlier state"
         ) from error
 
 
 def cannot_write(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     blocked = isinstance(error, FileExistsError | NotADirectoryError)
-    why = "a file is in the place of a folder" if blocked else system_message(error)
+    why = "there is a file where a folder is needed" if blocked else system_message(error)
     return StoreError(
         f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "
         "that uses it, or choose another folder"
@@ -361,7 +361,9 @@ def read_own(path: Path, root: Path) -> bytes:
     try:
         real = Path(os.path.realpath(path, strict=True))  # raises OSError for a loop of links, with every Python
         if not real.is_relative_to(root.resolve()):
-            raise StoreError(f"{path} leads by a link out of {root}, to {real}: replace the link with the file itself")
+            raise StoreError(
+                f"{path} leads out of {root} through a link, to {real}: replace the link with the file itself"
+            )
         return read_regular(real)
     except OSError as error:
         raise cannot_read(path, error) from error

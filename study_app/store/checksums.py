@@ -234,11 +234,13 @@ def parse_copy(path: Path, text: str) -> Proofs:
     for number, match in _matches(text):
         if match is None:
             raise StoreError(
-                f"{path}, line {number} is not a fingerprint: a line must be such as 'k3vq-7m2p-xw4d  "
+                f"{path}, line {number} is not a fingerprint: a line must look like 'k3vq-7m2p-xw4d  "
                 "data/sub-P007/ses-01'; specify a copy of a study's fingerprints.txt"
             )
         if match[2] not in (None, _check_characters(match[1], match[3])):
-            raise StoreError(f"{path}, line {number} was misread: its last two characters belong to another line")
+            raise StoreError(
+                f"{path}, line {number} was misread: its last two characters do not match the rest of the line"
+            )
         proofs.append((match[1], match[3]))
     if not proofs:
         raise StoreError(f"{path} does not contain fingerprints: specify a copy of a study's fingerprints.txt")

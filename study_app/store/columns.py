@@ -14,11 +14,11 @@ from study_app.store.csv_files import Column, optional
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
 _PARTICIPANT = Column("participant", "text", "The participant's ID: letters and digits, not a name.")
 SESSION = Column("session", "integer", "Number of the participant's session.", minimum=1, maximum=99)
-_SIMULATED = Column("simulated", "flag", "true if participant and device were simulated (a rehearsal).")
-_PILOT = Column("pilot", "flag", "true if the session was a pilot.")
+_SIMULATED = Column("simulated", "flag", "true if the participant and the device were simulated (a rehearsal).")
+_PILOT = Column("pilot", "flag", "true if the session was a pilot session.")
 _TRIAL = Column("trial", "integer", "Number of the trial in the session, in the order of presentation.", minimum=1)
 _ATTEMPT = Column(
-    "attempt", "integer", ("1, or higher if the trial was repeated; the last attempt is analysed."), minimum=1
+    "attempt", "integer", "1, or higher if the trial was repeated; only the last attempt is analysed.", minimum=1
 )
 BLOCK = Column("block", "text", "ID of the block of trials.")
 _PHASE = Column(
@@ -32,9 +32,11 @@ _PHASE = Column(
     ),
 )
 _PART = optional("part", "integer", "Part of the study, as shown to the participant.", minimum=1)
-_INDEX = Column("index", "integer", "Position of the trial in its block, from 1.", minimum=1)
+_INDEX = Column("index", "integer", "Position of the trial in its block, counting from 1.", minimum=1)
 CODE = Column(
-    "code", "text", ("Code of the condition presented (L1, D3 ...); the sealed key assigns it to the condition.")
+    "code",
+    "text",
+    "Code for the condition presented (L1, D3 ...); the sealed key states which condition it stands for.",
 )
 _SESSION_COLUMNS = (STUDY, _PARTICIPANT, SESSION, _SIMULATED, _PILOT)
 """Which session a row is about."""
@@ -42,10 +44,10 @@ _TRIAL_COLUMNS = (_TRIAL, _ATTEMPT, BLOCK, _PHASE, _PART, _INDEX)
 """Which trial of it."""
 _INVALID = (
     "invalid",
-    "an interval was not delivered as requested, so no question was asked and the trial was repeated",
+    "an interval was not delivered as requested, so the question was not asked and the trial was repeated",
 )
 _NOT_OF_INTERVALS = ("of", "trial_started_at", "trial_started_s", "marked", "notes")
-_LEVEL = "distance of the comparison from its standard, or the value itself, as the protocol asks"
+_LEVEL = "distance of the comparison from its standard, or the value itself, depending on the protocol"
 PARTICIPANTS: tuple[Column, ...] = (
     *_SESSION_COLUMNS,
     Column(
@@ -56,28 +58,28 @@ PARTICIPANTS: tuple[Column, ...] = (
             ("completed", "it reached its last page"),
             ("withdrawn", "the participant stopped"),
             ("aborted", "the operator stopped it"),
-            ("broken", "the operator stopped it after device, servo or program had failed"),
-            ("damaged", "its journal is damaged: the row contains what could be read"),
-            ("unfinished", "no end recorded: it is still running, or its program was killed"),
+            ("broken", "the operator stopped it after the device, the servo or the program had failed"),
+            ("damaged", "its journal is damaged; the row contains what could be read"),
+            ("unfinished", "its end was not recorded: it is still running, or the program was killed"),
         ),
     ),
     Column("session_started_at", "time", "Time at which the session began."),
     optional("session_ended_at", "time", "Time at which the session ended."),
-    Column("resumed", "integer", "How often it was resumed after its program had ended.", minimum=0),
+    Column("resumed", "integer", "Number of times the session was resumed after the program had ended.", minimum=0),
     optional("device", "text", "The haptic device."),
     Column("language", "text", "Language of the participant's pages."),
     Column("trials", "integer", "Number of completed main trials.", minimum=0),
     Column(
         "responses",
         "integer",
-        "Number of answers in main trials and forms, including answers off the scale.",
+        "Number of answers in main trials and forms, including “cannot judge” answers.",
         minimum=0,
     ),
     optional(
         "validity",
         "text",
         "Whether the session's main trials were valid; n/a until the first has ended.",
-        levels=(("valid", "all were"), ("invalid", "at least one was not valid")),
+        levels=(("valid", "all were valid"), ("invalid", "at least one was not valid")),
     ),
 )
 TRIALS_MISSING = optional(
@@ -104,10 +106,10 @@ EXCLUSIONS: tuple[Column, ...] = (
     _PARTICIPANT,
     SESSION,
     replace(_TRIAL, description="Number of the trial; n/a if the whole session is excluded.", may_miss=True),
-    Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person."),
+    Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person who decided."),
     Column("reason", "text", "Reason for the exclusion."),
     Column("excluded_at", "time", "Time of the decision."),
-    optional("key_open", "flag", "Whether the study's key was open at the decision."),
+    optional("key_open", "flag", "Whether the study's key was open when the decision was made."),
 )
 
 
@@ -124,31 +126,33 @@ def _count(name: str, description: str, **more: Any) -> Column:
 
 
 def _delay_error(name: str, which: str, of_trial: Literal["sum", "max", "mean"]) -> Column:
-    description = f"Visual delay, achieved minus requested: {which}."
+    description = f"{which} of the visual delay, achieved minus requested."
     return optional(name, "number", description, unit="ms", sealed=True, of_trial=of_trial)
 
 
 RESPONSES: tuple[Column, ...] = (
     *_SESSION_COLUMNS,
-    optional("form", "text", "ID of the questionnaire that was presented on its own; n/a after a trial."),
+    optional("form", "text", "ID of the questionnaire, if it was presented on its own; n/a for answers after a trial."),
     optional(
-        "after_block", "text", "Block after which the form was shown; n/a before the first block and after a trial."
+        "after_block",
+        "text",
+        "Block after which the form was shown; n/a for a form before the first block, and for answers after a trial.",
     ),
     *(replace(column, may_miss=True) for column in (*_TRIAL_COLUMNS, CODE)),
     Column("item", "text", "ID of the question; its text is in the session's receipt."),
-    Column("kind", "text", f"Kind of the question: {', '.join(KINDS.own)}."),
-    Column("number", "integer", "Position of the question on its page as shown, from 1.", minimum=1),
+    Column("kind", "text", f"Kind of question: {', '.join(KINDS.own)}."),
+    Column("number", "integer", "Position of the question on the page as shown, counting from 1.", minimum=1),
     optional(
         "response",
         "text",
-        "The answer: a point of the scale, a number, the ID of an option (several are separated by spaces), or a text.",
+        "The answer: a point on the scale, a number, the ID of an option (several are separated by spaces), or a text.",
     ),
-    optional("value", "number", "The answer as a number, if it is a number."),
-    Column("cannot_judge", "flag", "true if the participant chose the answer off the scale."),
+    optional("value", "number", "The answer as a number, if it is numeric."),
+    Column("cannot_judge", "flag", "true if the participant chose “cannot judge” instead of an answer on the scale."),
     _measure("onset_s", "Time at which the statement was shown, on the session's clock.", "s"),
     _measure("first_choice_s", "Time at which an answer was first chosen, on the session's clock.", "s"),
     _measure("last_change_s", "Time at which the final answer was chosen, on the session's clock.", "s"),
-    Column("changes", "integer", "How often the answer was changed.", minimum=0),
+    Column("changes", "integer", "Number of times the answer was changed.", minimum=0),
     Column("answered_at", "time", "Time at which the page of statements was confirmed."),
 )
 
@@ -165,9 +169,9 @@ _TRIALS: tuple[Column, ...] = (
         "text",
         "How the trial ended; n/a while it is running.",
         levels=(
-            ("complete", "the task was done"),
-            ("timeout", "the task's time ran out"),
-            ("interrupted", "stopped early: paused, repeated, cancelled, or the program ended"),
+            ("complete", "the task was completed"),
+            ("timeout", "the time allowed for the task ran out"),
+            ("interrupted", "the trial was paused, repeated or cancelled, or the program ended"),
         ),
     ),
     _measure(
@@ -178,50 +182,52 @@ _TRIALS: tuple[Column, ...] = (
     ),
     _count("targets_reached", "Number of targets reached.", sealed=True),
     _count("targets", "Number of targets to reach; n/a if the task does not have a fixed number of targets."),
-    _count("ticks", "Ticks of the servo during the trial.", sealed=True),
-    _measure("tick_rate_hz", "Achieved rate of the servo.", "Hz", of_trial="mean"),
-    _measure("lateness_p99_ms", "Lateness of the servo's ticks, 99th percentile.", "ms", of_trial="max"),
-    _measure("worst_gap_ms", "Longest time between two ticks of the servo.", "ms", of_trial="max"),
-    _count("overruns", "Deadlines of the servo that were skipped because a tick took too long."),
-    _count("samples_dropped", "Telemetry samples that were overwritten before they were read."),
+    _count("ticks", "Number of servo ticks during the trial.", sealed=True),
+    _measure("tick_rate_hz", "Servo rate that was achieved.", "Hz", of_trial="mean"),
+    _measure("lateness_p99_ms", "99th percentile of the lateness of servo ticks.", "ms", of_trial="max"),
+    _measure("worst_gap_ms", "Longest time between two servo ticks.", "ms", of_trial="max"),
+    _count("overruns", "Number of servo deadlines that were skipped because a tick took too long."),
+    _count("samples_dropped", "Number of telemetry samples that were overwritten before they were read."),
     _measure("path_length_m", "Length of the hand's path.", "m", sealed=True),
     _measure("mean_speed_mps", "Mean speed of the hand.", "m/s", sealed=True, of_trial="mean"),
     _measure("force_mean_n", "Mean magnitude of the force sent to the device.", "N", sealed=True, of_trial="mean"),
     _measure("force_peak_n", "Largest magnitude of the force sent to the device.", "N", sealed=True, of_trial="max"),
     _measure(
         "withheld_share",
-        "Proportion of the force that limits, passivity controller and device held back during the task; 0.05 is 5 %.",
+        "Proportion of the force that the limits, the passivity controller and the device held back during the task; "
+        "0.05 is 5 %.",
         sealed=True,
         of_trial="mean",
     ),
     _measure(
         "delivered_error",
         (
-            "RMS error of the force sent divided by the RMS force of the model for the actual motion, from 0.2 s after "
-            "the fade-in; 0.05 is 5 %; n/a if the participant set the force, the study delays it, or it is below 0.05 "
-            "N."
+            "RMS error of the force sent, divided by the model's RMS force for the actual motion, from 0.2 s after the "
+            "fade-in (0.05 is 5 %); n/a if the participant set the force, the study delays it, or it is below 0.05 N."
         ),
         sealed=True,
         of_trial="mean",
     ),
     _count(
         "loop_delay_ticks",
-        "Largest number of ticks during the task from a command of the servo until its force acts.",
+        "Largest number of ticks between a servo command and the moment at which its force acts, during the task.",
         of_trial="max",
     ),
-    _count("loop_delay_changes", "How often that delay changed during the task."),
+    _count("loop_delay_changes", "Number of times that loop_delay_ticks changed during the task."),
     *(
-        _count(f"limiter_{limiter.name}", f"Ticks of the servo in which {limiter.meaning}.", sealed=True)
+        _count(f"limiter_{limiter.name}", f"Number of servo ticks in which {limiter.meaning}.", sealed=True)
         for limiter in sorted(LIMITERS)
     ),
-    _count("frames", "Frames shown to the participant.", sealed=True),
-    _count("frames_late", "Frames whose delay exceeded the requested delay by more than the limit.", sealed=True),
-    _delay_error("delay_error_mean_ms", "mean", "mean"),
-    _delay_error("delay_error_p95_ms", "95th percentile", "max"),
-    _delay_error("delay_error_max_ms", "largest", "max"),
+    _count("frames", "Number of frames shown to the participant.", sealed=True),
+    _count(
+        "frames_late", "Number of frames whose delay exceeded the requested delay by more than the limit.", sealed=True
+    ),
+    _delay_error("delay_error_mean_ms", "Mean error", "mean"),
+    _delay_error("delay_error_p95_ms", "95th percentile of the error", "max"),
+    _delay_error("delay_error_max_ms", "Largest error", "max"),
     _measure(
         "first_frame_gap_ms",
-        "Time from the start of the trial to its first painted frame, when force and task begin.",
+        "Time from the start of the trial to its first painted frame, when the force and the task begin.",
         "ms",
         of_trial="max",
     ),
@@ -235,12 +241,12 @@ _TRIALS: tuple[Column, ...] = (
         "valid",
         "flag",
         (
-            "true if the trial met the protocol's limits of lateness, gaps, delay error and force held back; until "
-            "unblinding, only the limits of lateness and gaps."
+            "true if the trial met the protocol's limits for lateness, gaps, delay error and the force held back; "
+            "until unblinding, only the limits for lateness and gaps are applied."
         ),
     ),
-    optional("recording", "text", "File of the trial's samples, in the session's folder; n/a if none was stored."),
-    optional("recording_frames", "text", "File of the frames shown, in the session's folder; n/a if none was stored."),
+    optional("recording", "text", "File with the trial's samples, in the session's folder; n/a if not stored."),
+    optional("recording_frames", "text", "File with the frames shown, in the session's folder; n/a if not stored."),
     _count("samples_recorded", "Number of samples in the recording; n/a until unblinding."),
     _count("samples_unrecorded", "Number of samples missing from the recording because the disk was too slow."),
     optional(
@@ -250,8 +256,8 @@ _TRIALS: tuple[Column, ...] = (
     optional(
         "notes",
         "text",
-        "The operator's notes from the start of this trial to the start of the next, the reason of a repetition, "
-        "and failures of the device, one per line.",
+        "The operator's notes from the start of this trial to the start of the next one, the reason for a repetition, "
+        "and device failures, one per line.",
     ),
 )
 
@@ -262,39 +268,41 @@ _OUTCOME = [column.name for column in _TRIALS].index("outcome")
 DELIVERED: tuple[Column, ...] = (
     _signed(
         "value_delivered",
-        "The varied number as delivered, in its unit: a damping as fitted at the hand; a force delay as the lag "
-        "behind the model's force; another number as requested; n/a for a visual delay, whose error is in "
+        "The varied quantity as delivered, in its unit: damping as fitted at the hand, a force delay as the lag "
+        "behind the model's force, any other quantity as requested; n/a for a visual delay, whose error is in "
         "delay_error_mean_ms.",
     ),
     _signed(
         "force_share",
-        "Proportion of the model's force that was sent to the hand, after the lead and any lag; 1 is all of it.",
+        "Proportion of the model's force that was sent to the hand after the lead-in, allowing for a lag; 1 is 100 %.",
     ),
-    _signed("apparent_mass_kg", "Apparent mass of the fitted force, in addition to its damping.", "kg"),
-    _measure("pace_mps", "RMS speed of the hand, after the lead.", "m/s", sealed=True),
-    _signed("setting", "The level that the participant set; n/a in intervals that were not adjusted."),
+    _signed("apparent_mass_kg", "Apparent mass fitted to the force, in addition to the damping.", "kg"),
+    _measure("pace_mps", "RMS speed of the hand after the lead-in.", "m/s", sealed=True),
+    _signed("setting", "Level that the participant set; n/a for intervals that were not adjusted."),
 )
 """Columns of the stimulus that each interval delivered."""
 
 
 VIDEO: tuple[Column, ...] = (
-    _count("video_frames", "Frames of the video that were shown; n/a without a video.", sealed=True),
+    _count("video_frames", "Number of video frames shown; n/a if there is no video.", sealed=True),
     _count(
-        "video_frames_late", "Frames of the video shown more than one of its frames later than requested.", sealed=True
+        "video_frames_late",
+        "Number of video frames shown later than requested by more than one frame of the video.",
+        sealed=True,
     ),
     _count(
         "video_frames_lost", "Number of video frames skipped between the first and the last frame shown.", sealed=True
     ),
     _signed(
         "video_delay_error_max_ms",
-        ("Largest delay error of the video, achieved minus requested."),
+        ("Largest error of the video delay, achieved minus requested."),
         "ms",
         of_trial="max",
     ),
     _signed(
         "video_age_mean_ms",
-        "Mean age of the camera's pictures when they were ready, by the source's time stamps, in addition to the "
-        "delay; n/a if the source does not state it; 0 for a file.",
+        "Mean age of the camera's frames when they were ready, according to the source's time stamps; this age adds to "
+        "the delay; n/a if the source does not state it, 0 for a file.",
         "ms",
         of_trial="mean",
     ),
@@ -304,8 +312,10 @@ VIDEO: tuple[Column, ...] = (
 
 INTERVALS: tuple[Column, ...] = (
     *(column for column in _TRIALS[: _TRIALS.index(CODE) + 1] if column.name not in _NOT_OF_INTERVALS),
-    Column("interval", "integer", "Number of the interval in the trial, from 1.", minimum=1),
-    Column("interval_started_s", "number", "When the interval began, on the session's clock.", unit="s", minimum=0),
+    Column("interval", "integer", "Number of the interval in the trial, counting from 1.", minimum=1),
+    Column(
+        "interval_started_s", "number", "Time at which the interval began, on the session's clock.", unit="s", minimum=0
+    ),
     _measure("gap_s", "Time from the end of the previous interval to the start of this one; n/a for the first.", "s"),
     optional(
         "presented",
@@ -314,13 +324,13 @@ INTERVALS: tuple[Column, ...] = (
         levels=(("standard", "the standard"), ("comparison", "the comparison")),
         sealed=True,
     ),
-    optional("standard", "number", "The trial's standard, in the unit of the varied number.", sealed=True),
+    optional("standard", "number", "The trial's standard, in the unit of the varied quantity.", sealed=True),
     optional("level", "number", f"The trial's level: {_LEVEL}.", sealed=True),
-    optional("catch", "flag", "true in a catch trial, which presents the largest level.", sealed=True),
+    optional("catch", "flag", "true for a catch trial, which presents the largest level.", sealed=True),
     optional(
         "invalid_reasons",
         "text",
-        "Keys of the protocol's limits that the interval violates, separated by spaces; n/a if it was delivered as "
+        "Keys of the protocol's limits that the interval violated, separated by spaces; n/a if it was delivered as "
         "requested.",
     ),
     *DELIVERED,
@@ -333,7 +343,7 @@ INTERVALS: tuple[Column, ...] = (
 TRIALS: tuple[Column, ...] = (
     *(replace(column, levels=(*column.levels, _INVALID)) if column.name == "outcome" else column for column in _TRIALS),
     *VIDEO,
-    _count("intervals", "Number of intervals that this attempt presented; n/a if its block does not have a design."),
+    _count("intervals", "Number of intervals presented in this attempt; n/a if the block does not have a design."),
     GROUP,
 )
 

@@ -54,7 +54,7 @@ _KINDS: Final[dict[Kind, _Cells]] = {
     "number": _Cells("a number", r"-?[0-9]+(\.[0-9]+)?(e[+-]?[0-9]+)?", _number),
     "flag": _Cells("true or false", "true|false", "true".__eq__),
     "time": _Cells(
-        "a time with zone", r"[0-9]{4}(-[0-9]{2}){2}T[0-9]{2}(:[0-9]{2}){2}\.[0-9]{3}[+-][0-9]{2}:[0-9]{2}", str
+        "a time with a time zone", r"[0-9]{4}(-[0-9]{2}){2}T[0-9]{2}(:[0-9]{2}){2}\.[0-9]{3}[+-][0-9]{2}:[0-9]{2}", str
     ),
 }
 
@@ -207,7 +207,7 @@ def table_problems(table: bytes, columns: Sequence[Column]) -> Iterator[str]:
         if unknown:
             yield f"columns are unknown: {', '.join(unknown)}"
         if not missing and not unknown:
-            yield "columns are in another order or duplicated"
+            yield "columns are in a different order or duplicated"
         return
     for column, texts in zip(columns, zip(*rows, strict=True), strict=True) if rows else ():
         for text in dict.fromkeys(texts):
@@ -248,7 +248,7 @@ def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
         if not (finite := np.isfinite(table[name])).all():
             row = int(np.argmin(finite))
             raise StudyError(
-                f"{path} was not written: {name} is {table[name][row]} in row {row + 1}; it must be finite: "
+                f"{path} was not written, because {name} is {table[name][row]} in row {row + 1}; it must be finite: "
                 "reduce positions, speeds or parameters"
             )
     write_file(path, csv_text_of([names, *zip(*(table[name].tolist() for name in names), strict=True)]).encode())

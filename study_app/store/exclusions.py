@@ -167,8 +167,8 @@ def include(
                     participant=participant, session=session, trial=trial, rule_or_person="", reason="", excluded_at=""
                 )
             )
-            listed = "; ".join(describe_exclusion(row) for row in rows) or "nothing"
-            raise StoreError(f"{name} is not excluded; excluded: {listed}")
+            listed = "; ".join(describe_exclusion(row) for row in rows) or "none"
+            raise StoreError(f"{name} is not excluded; exclusions: {listed}")
         at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
         key_open = bool(reveals(folder))
         record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": taken.fields()}
@@ -188,7 +188,7 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
         cannot be read or written.
     """
     if rule not in RULES:
-        raise StoreError(f"there is no rule {rule!r} for exclusions ({did_you_mean(rule, RULES)})")
+        raise StoreError(f"there is no exclusion rule {rule!r} ({did_you_mean(rule, RULES)})")
     by, reason = check_name_and_reason(by, reason, "keeping a session needs a name and a reason")
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, None)
@@ -200,7 +200,7 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
         if kept.what in {row.what for row in exclusions(folder)}:
             raise StoreError(f"{describe_exclusion(kept)} is excluded: include it without --rule")
         if any(row.what == kept.what and row.rule_or_person == rule for row in reversals(folder)):
-            raise StoreError(f"{describe_exclusion(kept)} is kept already, although it meets the rule {rule}")
+            raise StoreError(f"{describe_exclusion(kept)} has already been kept, although it meets the rule {rule}")
         key_open = bool(reveals(folder))
         record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": kept.fields()}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
@@ -230,7 +230,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     except csv.Error as error:
         raise StoreError(f"{path} is not CSV ({error}): save it as CSV in UTF-8, with commas") from error
     if (separator := separator_of(text.partition("\n")[0], columns)) != ",":
-        raise StoreError(f"{path} separates its columns with {separator!r}: save it as CSV with commas")
+        raise StoreError(f"{path} uses {separator!r} as a separator: save it as CSV with commas")
     if tuple(names[1]) not in (columns, early):
         raise StoreError(f"{path}: its columns must be {', '.join(columns)}, but are {', '.join(names[1])}")
     return tuple(_parse_exclusion(path, line, row, len(names[1])) for line, row in rows)
@@ -305,7 +305,7 @@ def _check_recorded(study: StudyFolder, participant: str, session: int, trial: i
     if trial not in presented:
         listed = ", ".join(map(str, sorted(presented))) or "none"
         raise StoreError(
-            f"participant {participant}, session {session} does not contain trial {trial}: it contains {listed}"
+            f"session {session} of participant {participant} does not contain trial {trial}; its trials: {listed}"
         )
 
 

@@ -126,7 +126,8 @@ def _refuse_links(merged: Merged) -> None:
     for folder in map(merged.folder, merged.names):
         if not (real := _resolved_path(folder)).is_relative_to(_resolved_path(merged.path)):
             raise StoreError(
-                f"{folder} leads by a link out of {merged.path}, to {real}: replace the link with the folder itself"
+                f"{folder} leads out of {merged.path} through a link, to {real}: replace the link with the folder "
+                "itself"
             )
 
 
@@ -162,7 +163,7 @@ def locate_participant(folder: Path, participant: str) -> tuple[Path, str]:
     if (place := folders.get(f"{site}{dash}")) is None or not own:
         known = ", ".join(name.removesuffix(DASH) for name in folders)
         raise StoreError(
-            f"{folder} contains several sites ({known}), and {participant!r} does not state the site: specify SITE-ID, "
+            f"{folder} contains several sites ({known}), but {participant!r} does not state the site: specify SITE-ID, "
             f"such as {next(iter(folders))}P007"
         )
     return place, own
@@ -210,7 +211,7 @@ def merged_above(folder: Path) -> Path | None:
 def refuse_merged(folder: Path) -> None:
     """Raise an error for a merged study or its copy of a site, in which no sessions can run."""
     if (folder / MANIFEST).is_file():
-        raise StoreError(f"{folder} is a merged study, which contains copies: run sessions in the folder of a site")
+        raise StoreError(f"{folder} is a merged study, which contains only copies: run sessions in a site's own folder")
     if (above := merged_above(folder)) is not None:
         raise StoreError(
             f"{folder} is the copy of a site in the merged study {above}: run sessions in the site's own folder"

@@ -19,7 +19,7 @@ REASONS: Final[Mapping[str, str]] = {
     "targets_percent": "too few targets were reached",
     "level_error_percent": "the force was not as requested",
     "level_error_ms": "the delays did not differ as requested",
-    "pace_error_percent": "the hand did not keep the pace",
+    "pace_error_percent": "the hand did not move at the required speed",
     "force_limit_n": "the force limit was reached",
 }
 """The reason why a presentation is invalid, by the key of the limit that it broke."""

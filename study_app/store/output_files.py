@@ -122,7 +122,9 @@ def _file_parts(copied: FileCopy) -> Iterator[bytes]:
             "or restore it from a copy"
         ) from error
     if digest.hexdigest() != copied.sha256:
-        raise AnalysisError(f"{copied.source} changed while it was copied: nothing was written; repeat the command")
+        raise AnalysisError(
+            f"{copied.source} changed while it was being copied: nothing was written; repeat the command"
+        )
 
 
 @dataclass(frozen=True, slots=True)

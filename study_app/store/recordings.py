@@ -34,21 +34,26 @@ from study_app.store.journals.journal_events import plain_json
 
 FRAMES: tuple[Column, ...] = (
     Column("painted_ns", "integer", "Time at which the frame was shown, on the servo's clock.", unit="ns"),
-    Column("sample_ns", "integer", "Time of the hand position shown.", unit="ns"),
+    Column("sample_ns", "integer", "Time at which the hand position shown was measured.", unit="ns"),
     Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", unit="ns"),
-    Column("video_frame", "integer", "Number of the video frame shown, from 0; -1 without a video.", minimum=-1),
+    Column(
+        "video_frame",
+        "integer",
+        "Number of the video frame shown, counting from 0; -1 if there is no video.",
+        minimum=-1,
+    ),
     Column(
         "video_ns",
         "integer",
-        "Time at which the video frame was due without a delay, on the servo's clock (when the camera's "
-        "picture was ready, or the time in the file); 0 without a video.",
+        "Time at which the video frame would have been due without a delay, on the servo's clock (when the camera's "
+        "frame was ready, or the time in the file); 0 if there is no video.",
         unit="ns",
     ),
     Column(
         "video_age_ns",
         "integer",
-        "Age of the camera's picture when it was ready, by the source's time stamps: it was taken at video_ns "
-        "- video_age_ns; -1 if unknown or without a video.",
+        "Age of the camera's frame when it was ready, according to the source's time stamps: it was taken at video_ns "
+        "- video_age_ns; -1 if the age is unknown or there is no video.",
         unit="ns",
         minimum=-1,
     ),
@@ -176,7 +181,7 @@ def read_checks(path: Path, secret: bytes | None = None) -> Checks:
     """
     facts = read_facts(path, secret)
     if facts["kind"] != "samples":
-        raise StoreError(f"{path} holds {facts['kind']}, not samples: specify the recording itself")
+        raise StoreError(f"{path} contains {facts['kind']}, not samples: specify the recording of samples")
     checks = facts["crc32"]
     return Checks(checks["rows"], tuple(checks["device_force"]), tuple(checks["effect_force"]))
 
@@ -192,7 +197,9 @@ def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
     if not content.startswith(MARK):
         return content
     if secret is None:
-        raise SealedRecording(f"{path} is sealed until the study is unblinded: liquid-study unblind RESULTS opens it")
+        raise SealedRecording(
+            f"{path} is sealed until the study is unblinded: run liquid-study unblind RESULTS to open it"
+        )
     if (opened := open_file(content, secret)) is None:
         raise StoreError(f"{path} cannot be decrypted with the study's key: it was changed; restore it from a copy")
     return opened
@@ -215,7 +222,7 @@ def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str
     with _opened(path, secret) as file:
         facts = _facts(path, file.metadata)
         if facts["kind"] != kind:
-            raise StoreError(f"{path} holds {facts['kind']}, not {kind}: specify the other file of the trial")
+            raise StoreError(f"{path} contains {facts['kind']}, not {kind}: specify the trial's other file")
         table = file.read().combine_chunks()
     held = facts["format"]
     if kind == "frames":
@@ -223,7 +230,7 @@ def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str
     else:
         columns = [name for field in _RECORDED if field.since <= held for name in field.named()]
     if not _has_columns(table, columns, facts["rows"]):
-        raise StoreError(f"{path} is damaged (its columns are not the columns of {kind}): restore it from a copy")
+        raise StoreError(f"{path} is damaged (its columns do not match a recording of {kind}): restore it from a copy")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 

@@ -81,7 +81,7 @@ def save_study(file: Path, text: str, base: str) -> str:
             mode = target.stat().st_mode & 0o777
             if content_hash(content) != base:
                 raise ChangedOutsideError(
-                    f"{file} was changed by another program: compare it with the edits, then choose"
+                    f"{file} was changed by another program: compare it with your edits, then choose which to keep"
                 )
             keep_version(file, content, "found")
         elif base:
@@ -181,7 +181,7 @@ def _locked_file(file: Path) -> Iterator[None]:
     try:
         opening = lock_folder(folder)
     except StoreError as error:
-        raise StoreError(f"{file} cannot be saved while another program saves it: save again ({error})") from error
+        raise StoreError(f"{file} cannot be saved while another program saves it: try again ({error})") from error
     try:
         yield
     finally:

@@ -28,14 +28,14 @@ _HEADING: Final = re.compile(
 )
 _ABOUT: Final = """What liquid-study knows about this machine, for support.
 
-versions.json    the program, Python, the system and libraries
-settings.json    the settings of this machine, without initials, folders and camera address
-log.txt          the program's log: text and lines of the source, failures of devices
+versions.json    versions of the program, Python, the system and libraries
+settings.json    this machine's settings, without initials, folders and the camera's address
+log.txt          the program's log: messages, source lines, device failures
 last-error.txt   the last error in the log
 diagnosis.txt    findings about the device, if it was examined
-crash-N.txt      lines of the source at a crash, the newest first
+crash-N.txt      source lines at the time of a crash, the newest crash first
 
-It contains no participant id, no answers, no parameters of liquids and no key.
+It does not contain participant IDs, answers, liquids' parameters or keys.
 """
 
 

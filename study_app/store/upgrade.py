@@ -67,7 +67,8 @@ def upgrade(path: Path) -> list[Path]:
                 write_file(copy, original)
             if read_regular(copy) != original:
                 raise StoreError(
-                    f"{copy} is not a copy of {file.name}, which was not changed: rename it, and try again"
+                    f"{copy} is not a copy of {file.name}, so {file.name} was not changed: rename the copy and try "
+                    "again"
                 )
             write_file(file, content)
         for study, of_sessions in tables.items():
@@ -106,7 +107,7 @@ def _earlier_tables(
                 continue
             if isinstance(lines[-1], SessionEnded) and not has_same_cells(held, content):
                 raise StoreError(
-                    f"{table} differs from its journal, so nothing was upgraded: liquid-study rebuild {session.path} "
-                    "creates it again"
+                    f"{table} differs from its journal, so nothing was upgraded: run liquid-study rebuild "
+                    f"{session.path} to create it again"
                 )
             yield session, table, held, content

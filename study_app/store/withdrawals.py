@@ -146,7 +146,7 @@ def withdraw(
             if others := _other_sessions(copy, tombstone):
                 left += [
                     f"{other} is not a copy of an erased session: {copy.path} was not changed; if it belongs to "
-                    "the same person, also withdraw from that folder"
+                    "the same participant, also withdraw from that folder"
                     for other in others
                 ]
             elif _erase(copy, replace(tombstone, at=at)):
@@ -162,7 +162,7 @@ def withdraw(
         of_place, elsewhere_of_place = _outputs(made_from)
         outputs, elsewhere = (*outputs, *of_place), (*elsewhere, *elsewhere_of_place)
     left += [
-        f"{export.path} is an export with data of {participant}: delete it, and create it again"
+        f"{export.path} is an export that contains data from {participant}: delete it and create it again"
         for export in shared
         if any(_remaining_mentions(export, participant, export.data, export.path / RESULTS))
     ]

@@ -215,7 +215,7 @@ def load_settings() -> MachineSettings:
     except (ValueError, RecursionError) as error:
         raise _unusable_file(path, f"it is not JSON ({error})") from error
     if not isinstance(document, dict):
-        raise _unusable_file(path, "it is not a table of settings")
+        raise _unusable_file(path, "it does not contain a table of settings")
     document["workspace"] = setting_of(document)
     document.pop("results", None)
     try:
@@ -310,7 +310,7 @@ def _first_problem(error: ValidationError, document: dict[str, Any]) -> str:
 
 def _unusable_file(path: Path, why: str) -> StoreError:
     return StoreError(
-        f"this machine's settings in {path} cannot be used, {why}: correct or delete the file, or set "
+        f"this machine's settings in {path} cannot be used ({why}): correct or delete the file, or set "
         f"{FOLDER_VARIABLE} "
         "to another folder"
     )

@@ -111,7 +111,7 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     assert [one["decision"] for one in held["planned_exclusions"]] == ["undecided"]
 
     keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
-    with pytest.raises(StoreError, match="is kept already"):
+    with pytest.raises(StoreError, match="has already been kept"):
         keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
     study = load_study(pairs)
     (found,) = proposals(study, evaluate(study, recordings=False))

@@ -106,7 +106,5 @@ def test_every_figure_has_its_number_title_and_caption():
 
 def test_a_folder_that_cannot_be_is_named(tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8", newline="\n")
-    with pytest.raises(
-        StoreError, match=r"below cannot be written \(a file is in the place of a folder\): .*choose another folder"
-    ):
+    with pytest.raises(StoreError, match=r"below cannot be written \(there is a file where .*choose another folder"):
         thesis_figures.figures(tmp_path / "file" / "below")

@@ -63,8 +63,8 @@ def test_an_unplugged_device_is_reconnected_and_its_trial_presented_again(sessio
     first, *again = [row for row in rows(results) if row["trial"] == "1"]
     assert (first["outcome"], again[-1]["outcome"]) == ("interrupted", "complete")
     assert int(again[-1]["attempt"]) == 1 + len(again)
-    assert first["notes"].startswith("the device failed and was connected again")
-    assert again[0]["notes"].startswith("presented again: the device failed and was connected again")
+    assert first["notes"].startswith("the device failed and was reconnected")
+    assert again[0]["notes"].startswith("presented again: the device failed and was reconnected")
 
 
 def test_panels_that_fail_are_told_and_the_session_goes_on(session: tuple[dict[str, Any], Path]) -> None:

@@ -70,8 +70,8 @@ def test_the_rows_of_the_trial_and_of_its_repetition_say_that_the_device_failed(
     world.until(Phase.ANSWERING)
     first, again = [row for row in session_tables.SessionRows(world.store.lines).trials if row["trial"] == number]
     assert (first["attempt"], first["outcome"], again["attempt"], again["outcome"]) == (1, "interrupted", 2, "complete")
-    assert first["notes"] == f"the device failed and was connected again ({FAULT})"
-    assert again["notes"] == f"presented again: the device failed and was connected again ({FAULT})"
+    assert first["notes"] == f"the device failed and was reconnected ({FAULT})"
+    assert again["notes"] == f"presented again: the device failed and was reconnected ({FAULT})"
     world.until(Phase.COMPLETE)
     others = [row["notes"] for row in session_tables.SessionRows(world.store.lines).trials if row["trial"] != number]
     assert set(others) == {None}

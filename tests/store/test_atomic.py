@@ -38,7 +38,7 @@ def test_what_does_not_fit_leaves_what_was_there_and_nothing_beside(tmp_path: Pa
             lambda: probe_free_bytes(tmp_path / "results"),
             r"results cannot be written \(File too large\): free disk space",
         ),
-        (3, lambda: probe_free_bytes(table), r"table\.csv cannot be written \(a file is in the place of a folder\)"),
+        (3, lambda: probe_free_bytes(table), r"table\.csv cannot be written \(there is a file where a folder"),
     ):
         with files_up_to(size), pytest.raises(StoreError, match=sentence):
             act()

@@ -247,7 +247,7 @@ def keep_proof(folder: Path) -> None:
     workstation.save_settings(workstation.MachineSettings(proofs=str(folder / "proofs")))
     told = queue.Queue[str]()
     write_proof(StudyFolder(folder / "study"), told.put)
-    assert told.get(timeout=20).startswith("the proof of the study is in")
+    assert told.get(timeout=20).startswith("the study's proof was written to")
 
 
 PRIMITIVES: Final = {

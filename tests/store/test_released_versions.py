@@ -147,7 +147,7 @@ def warned(study: Path) -> str:
 
 def test_it_verifies_with_a_note(study: Path) -> None:
     found = warned(study)
-    assert "data: 2 journals are of format 1, whose lines cannot show whether an earlier line was changed" in found
+    assert "data: 2 journals are in format 1, whose lines cannot show whether an earlier line was changed" in found
     assert f"{KILLED}: is unfinished: you can resume it" in found
     changed = StudyFolder(study).session("P001", 1).journal
     content = changed.read_bytes()

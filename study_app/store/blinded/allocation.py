@@ -232,7 +232,7 @@ def check_choice(
     permitted = ", ".join(protocol.groups)
     if protocol.asks_group and group is None and own is None:
         raise StudyError(
-            f"group is missing: {name} has pre-existing groups; specify --group with the group of {participant}: "
+            f"the group is missing: {name} has pre-existing groups; specify the group of {participant} with --group: "
             f"{permitted}"
         )
     if group is not None and group not in protocol.groups:
@@ -254,13 +254,13 @@ def _check_replaced(
     if not _has_counted_places(held):
         if enrolment_number(row_of) is None:
             raise StudyError(
-                f"row of {row_of!r}: an earlier version began this folder, in which the number in the ID assigns rows; "
-                "specify an ID with a number, such as P007"
+                f"row of {row_of!r}: this folder was begun by an earlier version, in which the number in an ID assigns "
+                "the row; specify an ID with a number, such as P007"
             )
     elif own is not None:
         if own.replaces != row_of:
             now = "nobody" if own.replaces is None else own.replaces
-            raise StudyError(f"row of {row_of!r}: participant {participant} replaces {now} since the first session")
+            raise StudyError(f"row of {row_of!r}: participant {participant} has replaced {now} since the first session")
     elif replaced is None:
         raise StudyError(
             f"row of {row_of!r}: this ID does not exist in this folder; specify the ID of the participant to be "
@@ -268,8 +268,8 @@ def _check_replaced(
         )
     elif replaced.group != group:
         raise StudyError(
-            f"row of {row_of!r}: {row_of} is in group {replaced.group}, {participant} in group {group}; replace a "
-            "participant of the same group"
+            f"row of {row_of!r}: {row_of} is in group {replaced.group}, but {participant} is in group {group}; replace "
+            "a participant from the same group"
         )
 
 

@@ -30,6 +30,7 @@ from typing import Any, Final, Literal, TypeAlias
 from study_app.errors import StoreError
 from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
+from study_app.number_text import counted
 from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
 from study_app.protocol.orders.schedule import block_codes, draw_key
 from study_app.protocol.sequences import enrolment_number
@@ -116,7 +117,8 @@ def open_or_draw_key(
     if key.drawn != drawn:
         kinds = {"system": "real sessions", "seed": "a rehearsal"}
         raise StoreError(
-            f"{folder} holds {kinds[key.drawn]}: they must not be mixed with {kinds[drawn]}; use another results folder"
+            f"{folder} contains {kinds[key.drawn]}, which must not be mixed with {kinds[drawn]}: use another results "
+            "folder"
         )
     _refuse_other_conditions(study, key, protocol)
     return key
@@ -276,7 +278,7 @@ def verified_key(study: StudyFolder) -> Key:
     for session in study.sessions():
         if _published_hash(session) not in {None, key.hash}:
             raise StoreError(
-                f"{study.key} is not the key of session {session.path} (its SHA-256 differs from the published): "
+                f"{study.key} is not the key of session {session.path} (its SHA-256 differs from the published one): "
                 "restore it from a copy"
             )
     return key
@@ -350,8 +352,8 @@ def _refuse_if_lost(study: StudyFolder) -> None:
     under = [session for session in study.sessions() if is_there(session.receipt)]
     if under and not is_there(study.key):  # checked again: another program may have drawn the key in the meantime
         raise StoreError(
-            f"{study.key} is missing, although {len(under)} sessions ran under it: restore it from a copy; "
-            "without it codes cannot be assigned to conditions"
+            f"{study.key} is missing, although {counted(len(under), 'session')} used it: restore it from a copy; "
+            "without it, codes cannot be assigned to conditions"
         )
 
 

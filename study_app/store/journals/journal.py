@@ -157,15 +157,15 @@ def scan(path: Path) -> Contents:
         except ValueError:
             line = None
         if not isinstance(line, dict):
-            return Contents(lines, whole_bytes, damage=f"{path}, line {number}: damaged; restore it from a copy")
+            return Contents(lines, whole_bytes, damage=f"{path}, line {number} is damaged: restore it from a copy")
         if line.get("n") != number:
             shown = shorten_value(line.get("n"))
-            damage = f"{path}, line {number}: its n is {shown}: lines are missing or duplicated; restore it from a copy"
+            damage = f"{path}, line {number} has n {shown}, so lines are missing or duplicated: restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         version = line.get("version", version)
         wrong = line_problem(line)
         if wrong is None and version == study_app.__version__ and line["event"] not in EVENTS:
-            wrong = f"contains an event {shorten_value(line['event'])}, which version {version} does not write"
+            wrong = f"contains the event {shorten_value(line['event'])}, which version {version} does not write"
         if wrong is not None:
             damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
             return Contents(lines, whole_bytes, damage=damage)
@@ -198,7 +198,7 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
     if hash_before != before:
         return "does not continue the previous line, which was changed: restore it from a copy"
     if not (chained or first or line["event"] == "session_resumed"):
-        return "has previous, but earlier lines do not: they were changed; restore it from a copy"
+        return "has the key previous, but earlier lines do not: they were changed; restore it from a copy"
     return None
 
 
@@ -257,7 +257,7 @@ class Journal:
                 file = failing.enter_context(path.open("xb", buffering=0))
                 sync_folder(path.parent)
             except FileExistsError as error:
-                raise StoreError(f"{path} exists already: a journal is never overwritten; use a new session") from error
+                raise StoreError(f"{path} already exists: a journal is never overwritten; use a new session") from error
             except OSError as error:
                 raise cannot_write(path, error) from error
             failing.pop_all()
@@ -309,7 +309,9 @@ class Journal:
             can be appended to again.
         """
         if self.is_of_another_process:
-            raise StoreError(f"{self.path} is written by process {self._process}: a fork of it cannot write to it")
+            raise StoreError(
+                f"{self.path} is being written by process {self._process}: a fork of that process cannot write to it"
+            )
         if self.file.closed:
             raise StoreError(
                 f"{self.path} is closed: {event.event!r} occurred after the end of the session and was not recorded"
@@ -397,9 +399,11 @@ class Journal:
         except OSError as error:
             raise cannot_write(self.path, error) from error
         if not is_same_file or os.path.realpath(self.path) != self._real_path:
-            raise StoreError(f"{self.path} was moved, deleted or replaced while the session ran: put it back")
+            raise StoreError(f"{self.path} was moved, deleted or replaced while the session was running: put it back")
         if status.st_size != self._size and not torn:
-            raise StoreError(f"{self.path} was written by another program while the session ran: end this session")
+            raise StoreError(
+                f"{self.path} was written by another program while the session was running: end this session"
+            )
 
     def _write(self, content: bytes) -> bool:
         """Write a line after the last complete one; return whether an earlier failure requires waiting for the disk."""

@@ -640,10 +640,10 @@ def line_problem(line: Mapping[str, Any]) -> str | None:
     if lacking := [name for name in ("n", "event", "t_s", "at", *kind.required) if name not in line]:
         return f"({event}) lacks {', '.join(lacking)}"
     if kind.one_of and sum(name in line for name in kind.one_of) != 1:
-        return f"({event}) is not about one of {', '.join(kind.one_of)}"
+        return f"({event}) does not have exactly one of {', '.join(kind.one_of)}"
     for name in line:
         if not is_valid_value(known := _kind_name(line, name), line[name]):
-            return f"({event}) holds {name} {shorten_value(line[name])}, expected: {_KINDS[known][0].description}"
+            return f"({event}) has {name} {shorten_value(line[name])}; expected: {_KINDS[known][0].description}"
     return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
 
 

@@ -227,7 +227,7 @@ class SessionStore:
         self.opening.release()
         if failures:
             raise StoreError(
-                f"{failures[0]}; the journal is complete: liquid-study rebuild {self.folder.path} writes what is "
+                f"{failures[0]}; the journal is complete: run liquid-study rebuild {self.folder.path} to write what is "
                 "missing"
             ) from failures[0]
         self._over = True

@@ -258,11 +258,11 @@ def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterato
     if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
         yield folder.receipt, f"its status is {status!r}, but the journal's is {receipt.UNFINISHED!r}"
     if len(held.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
-        yield folder.receipt, "states more resumptions of the session than the journal"
+        yield folder.receipt, "contains more resumptions of the session than the journal"
     if ended:
         return
     if is_there(folder.checksums):
-        yield folder.checksums, "was written after the session ended, but the end is missing in the journal"
+        yield folder.checksums, "was written after the session ended, but the end is missing from the journal"
     rows = session_tables.SessionRows(lines)
     for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
         path, given = folder.table(place.study, name), len(rows.table(name))
@@ -276,11 +276,11 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
     if isinstance(lines[-1], events.SessionEnded):
         return
     if place_of(study, folder) in {session for _, session in read_list(study.fingerprints)}:
-        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but the end is missing in its journal"
+        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but the end is missing from its journal"
     of_trials = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
     for path in paths_in(folder.recordings):
         if path not in of_trials and RECORDING_NAME.fullmatch(path.relative_to(folder.path).as_posix()):
-            yield path, "belongs to a trial that never started in the journal"
+            yield path, "belongs to a trial that never started, according to the journal"
 
 
 def _count_rows(path: Path, root: Path) -> int:
@@ -334,7 +334,7 @@ def refuse_finished(folder: SessionFolder, done: Progress) -> None:
     if done.ended is not None and not is_there(folder.checksums):
         raise StoreError(
             f"{folder.path} is finished ({done.ended}), but its receipt, tables and checksums could not all be "
-            f"written: liquid-study rebuild {folder.path} writes them"
+            f"written: run liquid-study rebuild {folder.path} to write them"
         )
     if done.ended is not None:
         raise StoreError(
@@ -361,11 +361,11 @@ def _same_protocol(
     if is_upgraded and not changes:
         return
     if not changes:
-        changes.append("only comments, order or notation")
+        changes.append("only in comments, order or notation")
     listed = "; ".join(changes[:_SHOWN_DIFFERENCES])
     more = f"; and {len(changes) - _SHOWN_DIFFERENCES} more" if len(changes) > _SHOWN_DIFFERENCES else ""
     raise StoreError(
-        f"{place.folder.path} began with another protocol file and can be resumed only with that one: restore it, "
+        f"{place.folder.path} began with a different protocol file and can be resumed only with that file: restore it, "
         f"or use a new session number. Differences: {listed}{more}"
     )
 
@@ -399,7 +399,7 @@ def _recordings_found(folder: SessionFolder, lines: list[events.Event], key: Key
             if not is_there(samples):  # frames are written first and are not a recording by themselves
                 with contextlib.suppress(OSError):
                     frames.unlink(missing_ok=True)
-            yield lost_event(which, "the program ended before it was complete")
+            yield lost_event(which, "the program ended before the recording was complete")
 
 
 def _renew_receipt(folder: SessionFolder, lines: list[events.Event]) -> list[Path]:
@@ -422,7 +422,7 @@ def _renew_proof(place: Place, lines: list[events.Event], rewritten: list[Path])
     has_none = lines[-1].previous is not None and place_of(study, folder) not in listed_places
     noted = [folder.rebuilt] if has_none else []
     if has_none:
-        note_rebuilt(folder, f"{study.fingerprints.name} did not contain the fingerprint of the session")
+        note_rebuilt(folder, f"{study.fingerprints.name} did not contain the session's fingerprint")
     if not renew_checksums(folder, [*rewritten, *noted]):
         return []
     if has_none:

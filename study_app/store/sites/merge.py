@@ -89,7 +89,7 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
     present = () if merged is None else tuple(_read_source(name, merged.folder(name)) for name in merged.names)
     new = tuple(_read_source(name, path) for name, path in given.items())
     if empty := next((name for name, source in zip(given, new, strict=True) if not source.begun), None):
-        raise StoreError(f"site {empty}: {given[empty]} does not contain sessions yet: merge it later")
+        raise StoreError(f"site {empty}: {given[empty]} does not contain any sessions yet: merge it later")
     ran = new[0].protocol_hash if merged is None else merged.protocol_hash
     _check_alike((*present, *new), ran)
     _check_sessions((*present, *new))
@@ -118,7 +118,7 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
 
 def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
     if not given:
-        raise StoreError("sites are missing: specify each as A=DIR")
+        raise StoreError("no sites were specified: specify each as A=DIR")
     used = {} if merged is None else {name.lower(): name for name in merged.names}
     for name in given:
         if not ID_PATTERN.fullmatch(name) or len(name) > _MAX_SITE_LENGTH:
@@ -129,7 +129,7 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
         if fault := file_name_fault(name):
             raise StoreError(f"site {name!r} {fault}, so it cannot be the name of a folder: use another name")
         if (other := used.get(name.lower())) is not None:
-            held = "is merged already" if merged is not None and other in merged.names else "is given twice"
+            held = "has already been merged" if merged is not None and other in merged.names else "is specified twice"
             raise StoreError(f"site {name!r} {held} (case is ignored): use another name")
         used[name.lower()] = name
 
@@ -193,14 +193,14 @@ def _check_alike(sources: tuple[_Source, ...], protocol_hash: str) -> None:
     for other in sources:
         if other.study != first.study or other.protocol_hash not in ("", protocol_hash):
             raise StoreError(
-                f"site {other.name} ran the protocol {other.study} with SHA-256 {other.protocol_hash}, site "
-                f"{first.name} {first.study} with SHA-256 {protocol_hash}: only sites with exactly the same "
+                f"site {other.name} ran the protocol {other.study} with SHA-256 {other.protocol_hash}, but site "
+                f"{first.name} ran {first.study} with SHA-256 {protocol_hash}: only sites with exactly the same "
                 "protocol can be merged"
             )
         if other.key.drawn != first.key.drawn or other.pilot not in (None, first.pilot):
             raise StoreError(
-                f"site {other.name} holds {_kind(other)}, site {first.name} {_kind(first)}: only sessions of one kind "
-                "can be merged"
+                f"site {other.name} contains {_kind(other)}, but site {first.name} contains {_kind(first)}: only "
+                "sessions of the same kind can be merged"
             )
 
 
@@ -287,7 +287,9 @@ def _copy(source: _Source, to: Path, progress: ReportProgress | None) -> None:
         sync_folder(place)
     refuse_if_open(source.path)
     if _folder_state(source.path) != source.state:
-        raise StoreError(f"{source.path} was changed while it was copied: merge when no program uses it")
+        raise StoreError(
+            f"{source.path} was changed while it was being copied: merge again when no other program is using it"
+        )
 
 
 def _folder_state(path: Path) -> list[tuple[Path, int, int]]:

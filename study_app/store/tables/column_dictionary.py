@@ -13,24 +13,24 @@ _SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     (
         "Intervals",
         "subject-…_description-intervals_data.csv",
-        "one row per interval, in a study with designs",
+        "one row per interval, in studies with designs",
         INTERVALS,
     ),
     ("Participants", "study-…_description-participants_data.csv", "one row per session", PARTICIPANTS),
     (
-        "Participants, opened or pre-existing groups",
+        "Participants, groups",
         "study-…_description-participants_data.csv",
-        "a further column in a study with groups, and in every study after unblinding",
+        "an additional column in studies with groups, and in every study after unblinding",
         (GROUP,),
     ),
     (
-        "Participants, trials of intervals",
+        "Participants, interval trials",
         "study-…_description-participants_data.csv",
-        "differences in a study with trials of intervals",
+        "differences in studies with interval trials",
         tuple(column for column in with_missing_trials(PARTICIPANTS) if column not in PARTICIPANTS),
     ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),
-    ("Samples", "recordings/trial-….parquet", "one row per tick of the servo", SAMPLES),
+    ("Samples", "recordings/trial-….parquet", "one row per servo tick", SAMPLES),
     ("Frames", "recordings/trial-…_frames.parquet", "one row per frame shown", FRAMES),
 )
 """Title, file, meaning of a row, and columns of each table."""
@@ -57,7 +57,7 @@ def _section(title: str, file: str, row: str, lines: Sequence[str]) -> str:
 
 def _journal() -> str:
     head = (
-        "Every line has `n` (from 1, without a gap), `event`, `t_s` (on the session's clock), `at` (ISO 8601) "
+        "Every line has `n` (counting from 1, without gaps), `event`, `t_s` (on the session's clock), `at` (ISO 8601) "
         "and `previous` (SHA-256 of all bytes before it). `session_started` has `format` 2; in format 1 "
         "`previous` is missing.",
         "",

@@ -95,7 +95,7 @@ class SessionRows:
                 self._broke = line.what
             case events.DeviceReconnected() if self.trials:
                 withheld = self._broke == events.CAUSE_WITHHELD
-                failed = f"the device failed and was connected again ({self._broke})"
+                failed = f"the device failed and was reconnected ({self._broke})"
                 self._reconnected = f"{events.CAUSE_WITHHELD} and continued" if withheld else failed
                 _add_note(self.trials[-1], self._reconnected)
             case events.Note() if self.trials:
@@ -122,7 +122,7 @@ class SessionRows:
         trial = self.trials[self._places[which]]
         if trial.get("intervals") is None:
             raise StoreError(
-                f"the journal's line {line.n} is an interval of trial {line.trial}, which does not have "
+                f"line {line.n} of the journal is an interval of trial {line.trial}, which does not have "
                 "intervals: restore it from a copy"
             )
         trial["intervals"] += 1
@@ -203,7 +203,7 @@ def _interval_row(trial: Row, started: events.TrialStarted, line: events.Interva
     arrangement = started.arrangement
     if arrangement is not None and not (0 < number <= len(arrangement) and set(arrangement) <= set(_PRESENTED)):
         raise StoreError(
-            f"the journal's line {line.n} belongs to an interval that its trial does not have: restore it from a copy"
+            f"line {line.n} of the journal belongs to an interval that its trial does not have: restore it from a copy"
         )
     return row | {
         "interval": number,
@@ -262,7 +262,7 @@ def _trial_row(session: Row, group: str | None, line: events.TrialStarted) -> Ro
 
 def _never_started(line: events.OfAttempt) -> StoreError:
     return StoreError(
-        f"the journal's line {line.n} is about trial {line.trial}, which never started: restore it from a copy"
+        f"line {line.n} of the journal refers to trial {line.trial}, which never started: restore it from a copy"
     )
 
 

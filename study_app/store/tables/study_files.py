@@ -135,7 +135,7 @@ def update_participants(folder: StudyFolder, study: str) -> None:
     except StoreError as error:
         if not (isinstance(error.__cause__, PermissionError) and folder.participants(study).is_file()):
             raise
-        logging.getLogger(__name__).warning("%s; the next session writes it, or liquid-study rebuild", error)
+        logging.getLogger(__name__).warning("%s; the next session or liquid-study rebuild will write it", error)
 
 
 def table_bytes(folder: StudyFolder, rows: Sequence[csv_files.Row]) -> bytes:
@@ -282,7 +282,9 @@ def check_study(folder: StudyFolder, study: str) -> None:
     described = described_study(folder)
     if described is not None:
         if described != study:
-            raise StoreError(f"{folder.path} holds the study {described!r}, not {study!r}: use another results folder")
+            raise StoreError(
+                f"{folder.path} contains the study {described!r}, not {study!r}: use another results folder"
+            )
         refuse_earlier_columns(folder)
         return
     for above in folder.path.absolute().parents:

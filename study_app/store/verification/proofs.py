@@ -108,9 +108,9 @@ def write_proof(study: StudyFolder, say: Callable[[str], object]) -> None:
     def write() -> None:
         try:
             write_file(to, proof_text(study, server=settings.stamps).encode())
-            say(f"the proof of the study is in {to}")
+            say(f"the study's proof was written to {to}")
         except StoreError as error:
-            say(f"the proof of the study is not in {to}: {error}")
+            say(f"the study's proof was not written to {to}: {error}")
 
     thread = threading.Thread(target=write, name="proof", daemon=True)  # a network folder may never respond
     thread.start()
@@ -156,5 +156,6 @@ def _check_signature(path: Path, lines: str, public: str, signature: str) -> str
         raise StoreError(f"{path} was changed after it was signed") from error
     own = _signing_key(draws=False)
     if own is not None and own.public_key().public_bytes_raw() != key.public_bytes_raw():
-        raise StoreError(f"{path} is signed with a different key ({public}) from this computer's: it was replaced")
-    return f"is signed with {'the key of this computer' if own is not None else f'{public}: compare it with your key'}"
+        raise StoreError(f"{path} is signed with a key ({public}) that is not this computer's: it was replaced")
+    signer = "this computer's key" if own is not None else f"{public}: compare it with your key"
+    return f"is signed with {signer}"

@@ -67,7 +67,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
     markers = [text for name, stream in ours if name == MARKERS for text in _texts(stream)]
     sent = {text for texts in expected.values() for text in texts}
     if any(name == MARKERS for name, _ in ours) and sent.isdisjoint(markers):
-        findings.errors += (Finding(file.name, "it does not contain markers of this study's sessions"),)
+        findings.errors += (Finding(file.name, "it does not contain markers from this study's sessions"),)
     return said
 
 
@@ -82,7 +82,7 @@ def _read(file: Path) -> list[Any]:
         raise StoreError("reading an XDF file needs pyxdf: pip install 'liquid-study[lsl]'") from error
     logging.getLogger("pyxdf").setLevel(logging.CRITICAL)
     if not file.is_file():
-        raise StoreError(f"{file} is not a file: specify a recording with --xdf, for example from LabRecorder")
+        raise StoreError(f"{file} is not a file: specify a recording, for example one made with LabRecorder")
     try:
         with gzip.open(file) if file.suffix in {".gz", ".xdfz"} else file.open("rb") as opened:
             streams, _ = pyxdf.load_xdf(opened, synchronize_clocks=False, dejitter_timestamps=False)
@@ -111,21 +111,21 @@ def _check_markers(
             continue
         first, last = known_numbers[0], known_numbers[-1]
         if lost := [text for text in sent[first : last + 1] if text not in at]:
-            what = f"{file.name} lacks {counted(len(lost), 'marker')} of its journal"
+            what = f"{file.name} lacks {counted(len(lost), 'marker')} that its journal contains"
             findings.error(session.path, f"{what}; the first: {lost[0]}")
         span = texts[min(at.values()) : max(at.values()) + 1]
         if added := [text for text in span if text not in known and not text.startswith(_TARGET)]:
-            what = f"{file.name} has {counted(len(added), 'marker')} that its journal lacks; the first: {added[0]}"
+            what = f"{file.name} contains {counted(len(added), 'marker')} that its journal lacks; the first: {added[0]}"
             findings.error(session.path, f"{what}. Either the journal was changed, or another program sent them")
             unknown -= len(added)
         if outside := len(sent) - 1 - (last - first):
             when = f"{first} before the recording and {len(sent) - 1 - last} after it"
             findings.warning(session.path, f"{file.name} does not cover {outside} of its {len(sent)} markers: {when}")
         counts = f"{len(known_numbers)} of {len(sent)} recorded, {len(lost)} lost"
-        yield f"markers of {name}: {counts}; time within {_error_ms(session, stream, at):.2g} ms"
+        yield f"markers from {name}: {counts}; times agree within {_error_ms(session, stream, at):.2g} ms"
     if unknown:
         findings.warnings += (
-            Finding(file.name, (f"{counted(unknown, 'marker')} that do not belong to a session of this study")),
+            Finding(file.name, (f"{counted(unknown, 'marker')} that do not belong to any session of this study")),
         )
 
 
@@ -150,7 +150,7 @@ def _check_samples(file: Path, stream: Mapping[str, Any], findings: Findings) ->
     stamps_s = np.asarray(stream["time_stamps"], float)
     labels = [channel["label"][0] for channel in stream["info"]["desc"][0]["channels"][0]["channel"]]
     if "tick" not in labels:
-        yield f"samples: {len(stamps_s)} recorded; this version did not send tick numbers, which reveal lost samples"
+        yield f"samples: {len(stamps_s)} recorded, without the tick numbers that would reveal lost samples"
         return
     if len(stamps_s) == 0:
         yield "samples: none recorded"
@@ -162,7 +162,7 @@ def _check_samples(file: Path, stream: Mapping[str, Any], findings: Findings) ->
     if lost:
         first_s = stamps_s[int(np.argmax(gaps))] - stamps_s[0]
         loss = f"{counted(lost, 'sample')} lost in {counted(int(gaps.sum()), 'gap')}"
-        findings.errors += (Finding(file.name, f"{loss}; the first after {first_s:.3f} s of the stream"),)
+        findings.errors += (Finding(file.name, f"{loss}; the first after {first_s:.3f} s"),)
     late_s = intervals_s[(steps == 1) & (intervals_s > _LATE / float(stream["info"]["nominal_srate"][0]))]
     worst = f", at most {1e3 * late_s.max():.3g} ms between two ticks" if len(late_s) else ""
     yield f"samples: {len(stamps_s)} recorded, {lost} lost, {len(late_s)} late{worst}"
@@ -172,14 +172,14 @@ def _clock_drift(stream: Mapping[str, Any]) -> str:
     """Return a text about the drift of a stream's clock against the recorder's, from offsets between two resets."""
     times_s, values_s = (np.asarray(stream.get(name, ()), float) for name in ("clock_times", "clock_values"))
     if len(times_s) < 2:
-        return f"{counted(len(times_s), 'offset')} measured: too few for its drift"
+        return f"{counted(len(times_s), 'offset')} measured, too few to estimate the drift"
     resets = np.flatnonzero((np.diff(times_s) < 0) | (np.abs(np.diff(values_s)) > _RESET_S)) + 1
     parts = zip(np.split(times_s, resets), np.split(values_s, resets), strict=True)
     said = []
     for t_s, v_s in parts:
         slope, residual_s = _fit_line(t_s, v_s)
         if math.isfinite(slope):
-            span = f"over {np.ptp(t_s):.0f} s, offsets within {1e3 * residual_s:.2g} ms of a line"
+            span = f"over {np.ptp(t_s):.0f} s, offsets within {1e3 * residual_s:.2g} ms of a straight line"
             said.append(f"drift {1e6 * slope:+.2g} ppm {span}")
     return "; ".join([counted(len(resets), "reset"), *said])
 

@@ -59,8 +59,8 @@ def reproduce_session(session_folder: Path) -> Reproduced:
         recorded = recorded_trials(open_events(lines, key) if lines and events.start_of(lines).own_codes else lines)
     except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
         raise StoreError(
-            f"{folder.path}: the receipt, the key and the journal do not determine the session: verify the study's "
-            f"folder"
+            f"the receipt, the key and the journal of {folder.path} do not determine the session: verify the study's "
+            "folder"
         ) from None
     reproduction = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, place=place)])
     if lines and events.start_of(lines).intervals:
@@ -69,8 +69,8 @@ def reproduce_session(session_folder: Path) -> Reproduced:
         versions = ran["versions"]  # here receipts of 0.2.1 may have the rules as a text
         if compared.differences and str(ran.get("level_rules", versions.get("level rules"))) != str(LEVEL_RULES):
             reproduction.followed.append(
-                f"liquid-study {versions.get('liquid-study')} ran the session and used other rules to choose levels: "
-                f"run reproduce in that version"
+                f"the session was run by liquid-study {versions.get('liquid-study')}, which chose levels by different "
+                "rules: run reproduce in that version"
             )
     return reproduction
 
@@ -121,7 +121,7 @@ class _Compared:
         due = next_level(self._protocol, self._key, self._schedule, trial, trial_results(self._protocol, before))
         if isinstance(line, events.PassedOver):
             if due is not None:
-                self.differences.append(f"trial {trial.number}: skipped, although the answers required it")
+                self.differences.append(f"trial {trial.number} was skipped, although the answers required it")
             return
         presented = (line.level, line.standard, line.arrangement, bool(line.catch))
         follows = due is not None and presented == (
@@ -132,9 +132,9 @@ class _Compared:
         )
         if not follows:
             what = (
-                "presented, although it should have been skipped"
+                "it was presented, although it should have been skipped"
                 if due is None
-                else ("the answers require another level or arrangement")
+                else "the answers require a different level or arrangement"
             )
             self.differences.append(f"trial {trial.number}, attempt {line.attempt}: {what}")
         self._note(block, trial.number, follows)

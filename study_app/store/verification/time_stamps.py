@@ -52,7 +52,7 @@ def request_stamp(lines: str, server: str) -> str:
             if workstation.load_or_default()[0].stamp_root is not None:
                 _verify_stamp(answer, lines)
     except queue.Empty:
-        answer = TimeoutError(f"not within {WAITS_S:g} s")
+        answer = TimeoutError(f"no reply within {WAITS_S:g} s")
     except (client.VerificationError, ValueError, OSError) as error:
         answer = error
     if isinstance(answer, Exception):

@@ -39,10 +39,10 @@ from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 
-_BEGUN = "but receipt, tables, recordings or checksums show that the session began: restore it from a copy"
+_BEGUN = "but the receipt, tables, recordings or checksums show that the session began: restore it from a copy"
 _ROUNDED_S = 1.1e-6
 _CHANGED = "has changed since the session ended (its checksum differs)"
-_REBUILT_AFTER = "says that checksums or fingerprint were rewritten after the session ended"
+_REBUILT_AFTER = "states that the checksums or the fingerprint were rewritten after the session ended"
 INTERRUPTED = "the unblinding was interrupted: run liquid-study unblind again"
 _COMPARE = "compare it with fingerprints stored elsewhere: liquid-study verify --fingerprints FILE"
 
@@ -162,7 +162,7 @@ def _check_files(
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
         if (told := getattr(start, name)) != value:
-            findings.error(folder.journal, f"is of {name} {told!r}, but is stored with the files of {value!r}")
+            findings.error(folder.journal, f"belongs to {name} {told!r}, but is stored with the files of {value!r}")
     told = lines
     with findings.reading(folder.journal):
         told = open_events(lines, key)
@@ -181,7 +181,8 @@ def _check_files(
             _check_recordings(folder, told, key, hashes, findings, ended=ended)
     for name in system_files(folder):
         if name not in hashes:
-            findings.warning(folder.path / name, "is of an operating system, or a copy by a program that shares files")
+            what = "was made by an operating system, or is a copy made by a program that shares files"
+            findings.warning(folder.path / name, what)
     if is_there(folder.rebuilt):
         with findings.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
@@ -239,7 +240,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
     if missing.count:
         findings.warning(folder.path, str(missing))
     if done.reached_end and missing.exceed != (done.ended == events.INCOMPLETE):
-        findings.error(folder.journal, f"its status is {done.ended!r}, though {missing or 'no trial is missing'}")
+        findings.error(folder.journal, f"its status is {done.ended!r}, although {missing or 'no trial is missing'}")
     if done.ended is None:
         if not running:
             findings.warning(folder.path, "is unfinished: you can resume it")
@@ -260,7 +261,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     if missing := [name for name in receipt.FIELDS if name not in held]:
         findings.error(path, f"lacks {', '.join(missing)}")
     if key is not None and held["key_hash"] != key.hash:
-        findings.error(path, "contains the hash of another key")
+        findings.error(path, "contains the hash of a different key")
     if not lines:
         return
     start = events.start_of(lines)
@@ -278,8 +279,8 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
         findings.warning(
             path,
             (
-                f"lacks what the session was resumed with at {', '.join(lacking)}: the program was killed at "
-                "that time, or the entry was removed"
+                f"lacks the settings with which the session was resumed at {', '.join(lacking)}: the program was "
+                "killed at that time, or the entry was removed"
             ),
         )
     if key is not None and not _is_protocol(held, start, key):
@@ -292,7 +293,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
         findings.error(
-            path, (f"its status is {held.get('status')!r}, but the journal's is {last.status!r}; rebuild corrects it")
+            path, f"its status is {held.get('status')!r}, but the journal's is {last.status!r}; rebuild corrects it"
         )
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
     steps = sequence if isinstance(sequence, list) else []
@@ -403,7 +404,7 @@ def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *
         key = opened_key(place.study_folder)
         expected = table_files(place, lines, key)
     except StoreError as error:
-        findings.error(place.folder.journal, f"does not produce tables: {error}")
+        findings.error(place.folder.journal, f"cannot be converted into tables: {error}")
         return
     columns = table_columns(lines, opened=key is not None)
     for (path, content), name in zip(expected, columns, strict=True):
@@ -555,7 +556,7 @@ def _check_recordings(
         for planned in recordable(lines)[: None if ended else -1]:
             if planned not in known:
                 findings.warning(
-                    folder.recordings, f"{attempt_name(*planned)} does not have one, and the journal does not say why"
+                    folder.recordings, f"{attempt_name(*planned)} was not recorded, and the journal does not state why"
                 )
     of_trials = {
         path.relative_to(folder.path).as_posix()
@@ -564,7 +565,7 @@ def _check_recordings(
     }
     for name in sorted(name for name in hashes.keys() - listed if name.endswith(".parquet")):
         if name not in of_trials:
-            findings.error(folder.path / name, "is of a trial that the journal never started")
+            findings.error(folder.path / name, "belongs to a trial that never started, according to the journal")
         else:
             then = "" if ended else "; resuming the session adds it"
             findings.warning(folder.path / name, f"does not appear in the journal{then}")
@@ -617,7 +618,7 @@ def session_discrepancies(place: Place) -> tuple[Discrepancy, ...]:
         first.setdefault(finding.place, finding)
     if (of_journal := first.get(folder.journal.name)) is not None:
         first = {of_journal.place: of_journal}
-    remedy = f"liquid-study verify {place.study_folder.path} checks everything"
+    remedy = f"run liquid-study verify {place.study_folder.path} to check everything"
     return (
         *discrepancies,
         *(Discrepancy(folder.path / error.place, error.message, remedy) for error in first.values()),

@@ -124,7 +124,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
         _check_participants(study, name, sessions, findings)
     if early_journals := sum(session.row is not None and not session.chained for session in sessions):
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
-        findings.warning(study.data, f"{many} of format 1, whose lines cannot show whether an earlier line was changed")
+        findings.warning(study.data, f"{many} in format 1, whose lines cannot show whether an earlier line was changed")
     _check_fingerprints(study, sessions, early, withdrawn, findings)
     if copy is not None:
         _check_copy(study, sessions, withdrawn, *copy, findings)
@@ -164,9 +164,9 @@ def _check_contents(study: StudyFolder, findings: Findings) -> None:
     for version, contents in hashes.items():
         if len(contents) > 1:
             what = (
-                f"sessions of version {version} ran {len(contents)} different study files (protocol_hash in receipts)"
+                f"sessions with version {version} ran {len(contents)} different study files (protocol_hash in receipts)"
             )
-            findings.warning(study.data, f"{what}: change study.version with each change of the file")
+            findings.warning(study.data, f"{what}: change study.version whenever the file changes")
 
 
 def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection[str], findings: Findings) -> None:
@@ -183,13 +183,13 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
             if claim.path.lstat().st_size:
                 findings.error(claim.path, "was changed: restore it from a copy")
             else:
-                findings.warning(claim.path, "was reserved by a program that ended before it wrote it; it stays unused")
+                findings.warning(claim.path, "was reserved by a program that ended before writing it; it stays unused")
             continue
         if not is_unchanged(claim, key):
             findings.error(claim.path, "was changed: restore it from a copy")
         elif claim.participant in holders:
             first = holders[claim.participant].path.stem
-            findings.error(claim.path, f"is a second entry of participant {claim.participant}, who has entry {first}")
+            findings.error(claim.path, f"is a second entry for participant {claim.participant}, who has entry {first}")
         elif claim.participant not in begun and claim.participant not in withdrawn:
             findings.warning(claim.path, f"belongs to participant {claim.participant}, who does not have a session yet")
         holders.setdefault(claim.participant, claim)
@@ -317,7 +317,7 @@ def _check_copy(
         erased |= {*own, *(line for line in kept if line[1] == f"{study.exclusions.name}/sub-{participant}")}
         if (told_of := proof_of_withdrawal(tombstone)) not in kept:
             add = "write a new proof" if proof.told else f"add the line: {checked_line(*told_of)}"
-            advice = f"if {participant} asked for it, {add}"
+            advice = f"if {participant} requested it, {add}"
             findings.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
     copy = [line for line in kept if line not in erased]
     for record, place in copy:
@@ -352,7 +352,7 @@ def _compare_proofs(
             continue
         session, path = by_place.get(place), study.path / place
         if session is None:
-            findings.error(path, f"is missing, but {name} lists it: the session was deleted after its end")
+            findings.error(path, f"is missing, but {name} lists it: the session was deleted after it had ended")
             continue
         if proof != session.fingerprint:
             now = f"its fingerprint is {session.fingerprint}" if session.fingerprint else "it no longer has an end"
@@ -429,7 +429,7 @@ def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> N
                 )
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if key is not None and record["key_hash"] != key.hash:
-                findings.error(study.reveals, f"reveal {number} was with another key")
+                findings.error(study.reveals, f"unblinding {number} used a different key")
 
 
 def _check_blinding(study: StudyFolder, key: Key | None, findings: Findings) -> None:
@@ -464,7 +464,7 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
         for session in StudyFolder(folder).sessions():
             with contextlib.suppress(StoreError):  # reported when the site is checked
                 if (other := receipt.read(session.receipt)["protocol_hash"]) != merged.protocol_hash:
-                    findings.error(session.receipt, f"has protocol {other}, not {merged.protocol_hash} as merged")
+                    findings.error(session.receipt, f"has protocol {other}, but was merged with {merged.protocol_hash}")
             begun = describe_session(session).begun
             if begun and (twin := seen.get(begun)) is not None:
                 findings.error(
@@ -481,7 +481,7 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
     """Compare a site's folder with its entry in the list of sites; only withdrawn sessions may be missing."""
     study = StudyFolder(merged.folder(site.name))
     if (name := described_study(study)) not in (None, merged.study):
-        findings.error(study.path, f"is of study {name}, but {merged.manifest.name} lists sites of {merged.study}")
+        findings.error(study.path, f"contains study {name}, but {merged.manifest.name} lists sites for {merged.study}")
     with contextlib.suppress(StoreError):  # reported when the site is checked
         withdrawn, merged_at = list(tombstones(study).values()), datetime.fromisoformat(site.merged_at)
         before = site.withdrawals  # clocks of sites may differ, so times decide only for format 1
@@ -490,4 +490,4 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
         erased = sum(len(tombstone.sessions) for tombstone in withdrawn[before:])
         if (present := len(study.sessions())) + erased < site.sessions:
             which = f"{present} of the {site.sessions} sessions that {merged.manifest.name} lists"
-            findings.error(study.path, f"has {which}: restore the others from a copy")
+            findings.error(study.path, f"contains only {which}: restore the others from a copy")

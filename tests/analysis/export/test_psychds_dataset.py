@@ -110,7 +110,7 @@ def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) 
     copied = FileCopy(source, hashlib.sha256(FOOTAGE).hexdigest())
     for content, says in (
         (None, r"waves.mp4 cannot be read \(No such file"),
-        (b"other", "changed while it was copied"),
+        (b"other", "changed while it was being copied"),
     ):
         if content is not None:
             source.write_bytes(content)

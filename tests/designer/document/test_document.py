@@ -130,7 +130,7 @@ def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: p
     keeper.note_edit("x", (), 0.0)
     monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "file"))
     (tmp_path / "file").write_text("in the way", encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError, match="a file is in the place of a folder"):
+    with pytest.raises(StoreError, match="there is a file where a folder is needed"):
         keeper.write()
     (tmp_path / "file").unlink()
     assert keeper.write()

@@ -161,7 +161,7 @@ def test_the_ball_is_as_late_as_on_the_screen(opened, whole, qtbot):
     [
         (lambda file: file.write_bytes(b"PAR1" + file.read_bytes()[:400]), "is damaged"),
         (lambda file: file.unlink(), "restore"),
-        (None, "is sealed until the study is unblinded: liquid-study unblind"),
+        (None, "is sealed until the study is unblinded: run liquid-study unblind"),
     ],
 )
 def test_what_cannot_be_read_is_one_line(opened, sealed, whole, tmp_path, harm, words):

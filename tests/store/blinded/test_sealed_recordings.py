@@ -59,7 +59,7 @@ def test_recordings_of_about_one_length_are_equally_long_and_are_read_with_the_k
     assert samples.read_bytes().startswith(b"This file is sealed until the study is unblinded")
     for path in (samples, frames):
         assert path.stat().st_size == path.with_name(path.name.replace("001", "002")).stat().st_size
-    with pytest.raises(StoreError, match="sealed until the study is unblinded: liquid-study unblind"):
+    with pytest.raises(StoreError, match="sealed until the study is unblinded: run liquid-study unblind"):
         read_samples(samples)
     assert len(read_samples(samples, read_key(study).nonce)) == 2_500
     assert read_frames(frames, read_key(study).nonce)["painted_ns"].tolist() == [20]

@@ -93,7 +93,7 @@ def test_a_journal_is_neither_written_over_nor_continued_after_another_program(t
     with path.open("ab") as file:
         file.write(b'{"n":5}\n')
     before = path.read_bytes()
-    with pytest.raises(StoreError, match="exists already"):
+    with pytest.raises(StoreError, match="already exists"):
         Journal.create(path)
     with pytest.raises(StoreError, match="changed while it was being opened: close the other program"):
         Journal.reopen(path, contents, SessionClock())
@@ -110,7 +110,7 @@ def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path) -> None:
         for told, sentence in (
             ({"t_s": -0.001}, "(note) has t_s -0.001"),
             ({"t_s": 1e10}, "(note) has t_s 1e+10"),
-            ({"kind": 3}, "(note) holds kind 3, expected: text"),
+            ({"kind": 3}, "(note) has kind 3; expected: text"),
         ):
             note = journal_events.Note(kind=told.get("kind", "note"), text="x")
             with pytest.raises(StoreError, match=re.escape(f"line 1 {sentence}")):

@@ -112,7 +112,7 @@ def test_an_unwritable_results_folder_is_one_line(tmp_path: Path, start: Start) 
     (tmp_path / "file").write_text("no folder", encoding="utf-8", newline="\n")
     with pytest.raises(StoreError) as refusal:
         start(results=tmp_path / "file" / "study")
-    assert f"{Path('file', 'study')} cannot be written (a file is in the place of a folder)" in str(refusal.value)
+    assert f"{Path('file', 'study')} cannot be written (there is a file where a folder is needed)" in str(refusal.value)
     assert "\n" not in str(refusal.value)
     assert names_in(tmp_path) == ["file"]
 

@@ -182,7 +182,7 @@ def test_recordings_without_a_line_are_taken_up_if_whole_and_lost_if_not(
         ]
         assert open_events(resumed.lines, resumed.key)[told_of[1].n - 1].samples_recorded == 200
         assert len(read_samples(resumed.folder.path / told_of[1].recording, resumed.key.nonce)) == 200
-        assert told_of[2].reason == "the program ended before it was complete"
+        assert told_of[2].reason == "the program ended before the recording was complete"
         recorder = resumed.recorder
         assert recorder is not None
         recorder.start(3, 2, 1000.0)

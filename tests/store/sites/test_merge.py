@@ -67,7 +67,7 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
         return copytree(*words, **options)  # type: ignore[arg-type]
 
     monkeypatch.setattr("shutil.copytree", copy_while_a_session_ends)
-    with pytest.raises(StoreError, match="was changed while it was copied"):
+    with pytest.raises(StoreError, match="was changed while it was being copied"):
         merge_sites({"A": lab}, results / "pooled")
     assert list(results.iterdir()) == []
 
@@ -138,7 +138,7 @@ def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[s
     assert verify_study(pooled).is_sound
     assert (pooled / "sites/A/blinding/key.sealed").stat().st_mode & 0o777 == 0o600
     shutil.rmtree(pooled / "sites/A/data/sub-P002")
-    said = "sites/A: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
+    said = "sites/A: contains only 1 of the 2 sessions that sites.json lists: restore the others from a copy"
     assert said in list(map(str, verify_study(pooled).errors))
 
 
@@ -161,7 +161,7 @@ def test_a_withdrawal_by_a_computer_with_a_slow_clock_is_no_missing_session(
     withdraw(pooled / "sites/A", "P001", by="AK", reason="asked", now=slow)
     assert verify_study(pooled).is_sound
     shutil.rmtree(pooled / "sites/B/data/sub-P001")
-    said = "sites/B: has 1 of the 2 sessions that sites.json lists: restore the others from a copy"
+    said = "sites/B: contains only 1 of the 2 sessions that sites.json lists: restore the others from a copy"
     assert said in list(map(str, verify_study(pooled).errors))
 
 

@@ -17,7 +17,7 @@ from study_app.store.tables.study_files import check_study, write_description
     "line",
     [
         "| `part` | a whole number of at least 1 or n/a | Part of the study, as shown to the participant. |",
-        "| `simulated` | true or false | true if participant and device were simulated (a rehearsal). |",
+        "| `simulated` | true or false | true if the participant and the device were simulated (a rehearsal). |",
         "| `force_peak_n` | a number of at least 0 or n/a [N] | Largest magnitude of the force sent to the device. "
         "**Sealed until unblinding.** |",
         "| `page_shown` | `page` | A page of text was shown. |",

@@ -102,7 +102,7 @@ def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_
     said = CliRunner().invoke(commands, words).stdout.splitlines()
     told = "\n".join(map(str, verify_study(study, kept).errors))
     line = next(words for words in said if words.startswith("keep, with")).partition(":  ")[2]
-    assert f"the withdrawal of P002 is not in {kept}: if P002 asked for it, add the line: {line}" in told
+    assert f"the withdrawal of P002 is not in {kept}: if P002 requested it, add the line: {line}" in told
     kept.write_text(f"{kept.read_text('utf-8')}{line}\n", encoding="utf-8", newline="\n")
     assert "P002" not in "\n".join(map(str, verify_study(study, kept).errors))
 
@@ -113,7 +113,7 @@ def test_a_misread_line_is_named(study: Path) -> None:
     other = ("b" if first[2] != "b" else "c").join((first[:2], first[3:]))
     kept.write_text("\n".join([other, *rest]), encoding="utf-8", newline="\n")
     with pytest.raises(
-        StoreError, match=r"kept.txt, line 1 was misread: its last two characters belong to another line"
+        StoreError, match=r"kept.txt, line 1 was misread: its last two characters do not match the rest of the line"
     ):
         verify_study(study, kept)
 
@@ -124,7 +124,7 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
     assert (done.exit_code, done.stdout.strip()) == (0, str(kept)), done.output
     found = verify_study(study, kept)
     assert found.errors == ()
-    assert f"{kept} is signed with the key of this computer" in "\n".join(map(str, found.warnings))
+    assert f"{kept} is signed with this computer's key" in "\n".join(map(str, found.warnings))
     whole = kept.read_text("utf-8")
     kept.write_text("".join(whole.splitlines(keepends=True)[1:]), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="was changed after it was signed"):
@@ -133,7 +133,7 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
     kept.write_text(whole, encoding="utf-8", newline="\n")
     assert "compare it with your key" in "\n".join(read_proof(kept).told)
     proof_text(StudyFolder(study), sign=True)
-    with pytest.raises(StoreError, match=r"signed with a different key .* from this computer's: it was replaced"):
+    with pytest.raises(StoreError, match=r"signed with a key .* that is not this computer's: it was replaced"):
         verify_study(study, kept)
 
 
@@ -211,7 +211,7 @@ def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
     write_proof(StudyFolder(study), said.append)
     wait_for_proofs()
     kept = outside / "demo-proof.txt"
-    assert said == [f"the proof of the study is in {kept}"]
+    assert said == [f"the study's proof was written to {kept}"]
     found = verify_study(study, kept)
     assert found.errors == ()
     assert re.search(r"was stamped at 20\d\d-", "\n".join(map(str, found.warnings)))

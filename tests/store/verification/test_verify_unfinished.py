@@ -75,7 +75,7 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: 
     left = warned(verify_study(study))
     assert ".trial-002.parquet.0123abcd.tmp: is an incomplete file" in left
     assert "trial-001.parquet: does not appear in the journal; resuming the session adds it" in left
-    assert "recordings: trial 1, attempt 1 does not have one, and the journal does not say why" in left
+    assert "recordings: trial 1, attempt 1 was not recorded, and the journal does not state why" in left
 
 
 @pytest.mark.slow

@@ -164,7 +164,7 @@ def test_an_export_among_the_copies_is_listed_and_not_changed(study: Path, resul
     done = erase(study, also=[tmp_path])
     assert done.folders == (study,)
     assert done.left == tuple(
-        f"{one} is an export with data of {PERSON}: delete it, and create it again" for one in (named, shared)
+        f"{one} is an export that contains data from {PERSON}: delete it and create it again" for one in (named, shared)
     )
     assert contents(shared) == before
 

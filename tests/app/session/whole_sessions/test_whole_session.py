@@ -137,7 +137,7 @@ def test_what_cannot_begin_leaves_nothing_behind(short_demo, results, monkeypatc
     with pytest.raises(refused) as error:
         app.run(short_demo, **{"participant": "P001", "windowed": True, "results": results} | wrong)
     assert "\n" not in str(error.value)
-    assert ("a file is in the place of a folder" in str(error.value)) == ("results" in wrong)
+    assert ("there is a file where a folder is needed" in str(error.value)) == ("results" in wrong)
     assert not results.exists()
     assert window(OperatorWindow) is None
 
