@@ -135,7 +135,7 @@ commands() {
     expect "liquid-study, version" study --version
     expect "demo  A first look" study studies
     expect "Expected duration" study check demo
-    expect "is a device on Windows" study new con --no-window
+    expect "is reserved for a device on Windows" study new con --no-window
     expect "rows" study simulate demo --liquid thin --path circle --to 'C:\study\motion.csv'
     expect "2 simulated participants" study rehearse demo --participants 2 --answers-only
     expect "1 simulated participant" study rehearse demo --participants 1

@@ -99,7 +99,7 @@ def number_between(low: float, high: float) -> Returns:
 
 def instance_of(kind: type) -> Returns:
     """Return a permission for instances of a class."""
-    return Returns(f"of the class {kind.__name__}", lambda value: isinstance(value, kind))
+    return Returns(f"an instance of {kind.__name__}", lambda value: isinstance(value, kind))
 
 
 def are_numbers(values: Any) -> bool:
@@ -192,7 +192,7 @@ class Registry(Mapping[str, T], Generic[T]):
         if self._key == "name" and not isinstance(found, self._base):
             raise StudyError(f"{place} is not a {self._base.__name__} but a {type(found).__name__}")
         if self._key != "name" and not (isinstance(found, type) and issubclass(found, self._base)):
-            raise StudyError(f"{place} is not a class that extends {self._base.__name__}")
+            raise StudyError(f"{place} is not a subclass of {self._base.__name__}")
         if self._key != "name" and (lacking := getattr(found, "__abstractmethods__", None)):
             raise StudyError(f"{place} lacks {', '.join(sorted(lacking))}: define them")
         name, begins = getattr(found, self._key, ""), f"{_canonical(package)}:"
@@ -204,12 +204,12 @@ class Registry(Mapping[str, T], Generic[T]):
             name = "" if kind is None else kind.default
             if not re.fullmatch(rf"{begins}[a-z][a-z0-9_]*", str(name)):
                 raise StudyError(
-                    f"its kind is {name!r}: call it '{begins}' and lowercase letters, digits or underscores"
+                    f"its kind is {name!r}: use '{begins}' followed by lowercase letters, digits or underscores"
                 )
         if not isinstance(name, str) or not name:
             raise StudyError(f"{place} does not have {self._key}: add it")
         if name in self.own or name in others:
-            raise StudyError(f"{self.kind} '{name}' exists already: rename it")
+            raise StudyError(f"{self.kind} '{name}' already exists: rename it")
         return name
 
     def _checked(self, found: Any, plug_in: PlugIn) -> Any:

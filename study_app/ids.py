@@ -35,10 +35,10 @@ def file_name_fault(name: str) -> str:
     Examples
     --------
     >>> [file_name_fault(name) for name in ("con", "aux.toml", "waves.", "why?.mp4", "control")]
-    ['is a device on Windows', 'is a device on Windows', 'ends with "."', 'contains "?"', '']
+    ['is reserved for a device on Windows', 'is reserved for a device on Windows', 'ends with "."', 'contains "?"', '']
     """
     if _RESERVED.fullmatch(name):
-        return "is a device on Windows"
+        return "is reserved for a device on Windows"
     if name.endswith((".", " ")) and name not in {".", ".."}:
         return f'ends with "{name[-1]}"'
     letter = next((letter for letter in name if letter in '<>:"|?*'), "")

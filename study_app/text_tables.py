@@ -98,12 +98,12 @@ def split(text: str, names: Collection[str], *, comment: str = "") -> TextTable:
 def wrong_length(fields: Sequence[str], columns: int) -> str:
     """Return what is wrong with a row's number of fields, or ""; empty fields at its end are ignored."""
     if len(fields) < columns:
-        return f"has {counted(len(fields), 'field')}, fewer than the {columns} of the header"
+        return f"has {counted(len(fields), 'field')}, fewer than the {columns} in the header"
     if any(fields[columns:]):
         hint = (
             "write decimal points" if len(fields) == 2 * columns else "remove the additional fields or add column names"
         )
-        return f"has {len(fields)} fields, more than the {columns} of the header: {hint}"
+        return f"has {len(fields)} fields, more than the {columns} in the header: {hint}"
     return ""
 
 
@@ -123,7 +123,8 @@ def decimal_sign_of(lines: Iterable[Line], places: Collection[int]) -> str:
         if "." in field and readings_of(field):
             other, comma = commas[0]
             raise ValueError(
-                f"line {number}: {_shown(field)} has a point, but {_shown(comma)} in line {other} has a comma"
+                f"line {number}: {_shown(field)} has a decimal point, but {_shown(comma)} in line {other} has a "
+                "decimal comma"
             )
     if all(len(readings_of(field)) == 2 for _, field in commas):
         number, field = commas[0]
@@ -174,7 +175,9 @@ def rows_of(table: TextTable, places: Sequence[int]) -> list[list[float]]:
         first = table.lines[0]
         if not any(map(readings_of, _at(first.fields, places))):
             texts = ", ".join(map(_shown, _at(first.fields, places)))
-            raise ValueError(f"line {first.number}: {texts}: not a number; remove a row of units, and use SI units")
+            raise ValueError(
+                f"line {first.number} does not contain a number ({texts}): remove a row of units, and use SI units"
+            )
         sign = decimal_sign_of(table.lines, places)
     return [_numbers_at(line, places, columns, sign) for line in table.lines]
 

@@ -30,11 +30,11 @@ def test_a_study_has_no_reserved_name(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
     assert free_short_name((), "con") == "con2"
     assert free_short_name((), "com1") not in RESERVED
-    with pytest.raises(StudyError, match='"nul" is a device on Windows; "nul2" is free'):
+    with pytest.raises(StudyError, match='"nul" is reserved for a device on Windows; "nul2" is free'):
         check_free_name("nul")
     file = tmp_path / "control.toml"
     file.write_bytes(source_bytes("demo").replace(b'name = "demo"', b'name = "con"', 1))
-    with pytest.raises(ProtocolError, match='"con" is a device on Windows'):
+    with pytest.raises(ProtocolError, match='"con" is reserved for a device on Windows'):
         load(str(file))
 
 
@@ -45,12 +45,12 @@ def test_a_study_names_no_file_that_windows_cannot_have(tmp_path: Path, name: st
     )
     file = tmp_path / "mine.toml"
     file.write_text(study, encoding="utf-8", newline="\n")
-    with pytest.raises(ProtocolError, match=r"liquids\.syrup\.file.* (is a device on Windows|contains|ends with)"):
+    with pytest.raises(ProtocolError, match=r"liquids\.syrup\.file.* (is reserved for|contains|ends with)"):
         load(str(file))
 
 
 def test_a_site_has_no_reserved_name(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="site 'Com3' is a device on Windows"):
+    with pytest.raises(StoreError, match="site 'Com3' is reserved for a device on Windows"):
         merge_sites({"Com3": tmp_path / "lab"}, tmp_path / "pooled")
 
 

@@ -310,7 +310,6 @@ def _first_problem(error: ValidationError, document: dict[str, Any]) -> str:
 
 def _unusable_file(path: Path, why: str) -> StoreError:
     return StoreError(
-        f"this machine's settings in {path} cannot be used ({why}): correct or delete the file, or set "
-        f"{FOLDER_VARIABLE} "
-        "to another folder"
+        f"this machine's settings in {path} cannot be used: {why}. Correct or delete the file, or set "
+        f"{FOLDER_VARIABLE} to another folder"
     )

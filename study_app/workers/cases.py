@@ -75,7 +75,7 @@ class ProcessExecutor(ProcessPoolExecutor):
 
 def _lost_process() -> WorkerError:
     return WorkerError(
-        "a worker process ended unexpectedly, or could not be started (it was killed, or the memory was exhausted): "
+        "a worker process ended unexpectedly, or could not be started (it was killed, or the memory ran out): "
         "try again with fewer --workers"
     )
 
@@ -104,8 +104,8 @@ class ClusterExecutor(Executor):
             from distributed import Client  # noqa: PLC0415 - an extra
         except ImportError as error:
             raise WorkerError(
-                "a cluster needs the package distributed, which is not installed: pip install 'liquid-study[cluster]', "
-                "or compute here with --workers"
+                "a cluster requires the package distributed, which is not installed: run pip install "
+                "'liquid-study[cluster]', or compute on this computer with --workers"
             ) from error
         for name in _LOGGERS:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
@@ -143,7 +143,7 @@ class ClusterExecutor(Executor):
         """Wait for all cases, or cancel them after an exception; a failure of the cluster is one line."""
         self.shutdown(cancel_futures=kind is not None)
         if isinstance(error, CancelledError):
-            why = f"the cluster at {self.address} was lost: start it again, then the same command"
+            why = f"the cluster at {self.address} was lost: start it again, then repeat the command"
         elif type(error).__name__ == "KilledWorker":
             why = (
                 f"the cluster at {self.address} lost several workers during the same case: give its workers more memory"
@@ -175,7 +175,7 @@ def _compute(expected: Mapping[str, str], fn: Callable[..., T], args: tuple[Any,
     )
     if differing:
         raise WorkerError(
-            f"the worker on {socket.gethostname()} has {differing}: install the same versions on every worker, since "
+            f"the worker on {socket.gethostname()} has {differing}: install the same versions on every worker, because "
             "results could differ"
         )
     return _run(fn, args, kwargs)
@@ -249,5 +249,5 @@ def _receive_greeting(connection: socket.socket) -> None:
 def _no_scheduler(address: str, why: str) -> WorkerError:
     return WorkerError(
         f"no Dask scheduler answers at {address} ({why}): start one there with dask scheduler, correct the address, or "
-        "compute here with --workers"
+        "compute on this computer with --workers"
     )

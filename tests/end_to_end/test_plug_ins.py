@@ -323,7 +323,7 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
             QUESTION.replace(' = "toy-plug:toy"', ""),
             "its kind does not have a default: set the default to the value of the Literal",
         ),
-        ("Toy = 3", "toy_plug:Toy is not a class that extends Question"),
+        ("Toy = 3", "toy_plug:Toy is not a subclass of Question"),
         (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': call it 'toy-plug:' and"),
         (QUESTION.replace('"toy_plug:MEASURE"', "LATER"), "NameError: name 'LATER' is not defined"),
         (QUESTION.replace("def problem", "x: slice\n\n        def problem"), "PydanticSchemaGenerationError"),
@@ -417,7 +417,7 @@ VIEW = "return self._shown(GridView"
 @pytest.mark.parametrize(
     ("name", "old", "new", "said"),
     [
-        ("question Grid", VIEW, f"{VIEW[:6]} None and {VIEW[7:]}", "returned None, not of the class ItemView"),
+        ("question Grid", VIEW, f"{VIEW[:6]} None and {VIEW[7:]}", "returned None, not an instance of ItemView"),
         ("task Circle", LIMIT, "math.nan", "limit_s of task toy-plug:circle returned nan, not a number from 0.1"),
         ("task Circle", ANGLE, "angle = math.nan\n", "returned (nan, nan, 0.0), not three coordinates [m] or None"),
         ("task Circle", ANGLE, "raise SystemExit(5)\n", "SystemExit: 5"),

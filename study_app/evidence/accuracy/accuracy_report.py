@@ -79,8 +79,8 @@ def draw(accuracy: Accuracy) -> Figure:
 
 
 _KEY: Final = (
-    "Points show the greatest error of each model over its references; a thin line extends to the smallest. "
-    "The ring marks the model that the program runs. For connected points, there is no model that is both "
+    "Points show each model's largest error across its references; a thin line extends to the smallest. "
+    "The ring marks the model that the program runs. Connected points are models for which no other model is both "
     "faster and more accurate. The effect of fewer ticks per second on stability is not shown. "
 )
 
@@ -101,9 +101,9 @@ def _draw_acting(figure: Figure, accuracy: Accuracy, down_pt: float, height_pt: 
     """Draw the error of the force on the hand against the time of a tick, by estimator and delay."""
     _write_heading(
         figure,
-        "Error of the force that acts on the hand, delay included",
-        f"{accuracy.acting_liquid}; a middle hand moves a handle of 0.2 kg at random, about 1.6 Hz with the power of "
-        "±20 mm. Numbers: ticks of delay. Bars: least error of any linear estimator.",
+        "Error of the force that acts on the hand, including the delay",
+        f"{accuracy.acting_liquid}; a middle hand moves a 0.2 kg handle randomly, at about 1.6 Hz and with the power "
+        "of a ±20 mm oscillation. Numbers: ticks of delay. Bars: smallest error of any linear estimator.",
         down_pt,
         height_pt,
     )
@@ -114,7 +114,7 @@ def _draw_acting(figure: Figure, accuracy: Accuracy, down_pt: float, height_pt: 
     axes.minorticks_off()
     axes.tick_params(labelsize=_SMALL, pad=2)
     axes.set_title("Error [% of the force]", fontsize=_SMALL, pad=4, x=-0.075)
-    axes.set_xlabel("Computation time of one tick [ns]", fontsize=_SMALL + 0.4, labelpad=2)
+    axes.set_xlabel("Computation time per tick [ns]", fontsize=_SMALL + 0.4, labelpad=2)
     estimators = tuple(dict.fromkeys(it.estimator for it in accuracy.acting))  # cheapest first
     times = [it.ns for it in accuracy.acting]
     margin_ns = 0.25 * (max(times) - min(times)) + 5
@@ -217,7 +217,8 @@ class _Panel:
         axes.spines["bottom"].set_visible(lowest)
         axes.axvline(_BUDGET_NS, color=style.TEXT, linewidth=0.8, linestyle=(0, (1, 1.5)))
         if lowest and last:
-            axes.set_xlabel("Computation time of 1 ms of motion (one tick at 1 kHz)", fontsize=_SMALL + 0.4, labelpad=2)
+            label = "Time taken to compute 1 ms of motion (one tick at 1 kHz)"
+            axes.set_xlabel(label, fontsize=_SMALL + 0.4, labelpad=2)
         for row, other in zip(self._front, self._front[1:], strict=False):
             times, errors = (row.ns_per_ms, other.ns_per_ms), (100 * row.error.rms, 100 * other.error.rms)
             axes.plot(times, errors, color=style.ZERO, linewidth=1.2, zorder=2)
@@ -361,7 +362,7 @@ def evidence(accuracy: Accuracy) -> Evidence:
         acting = [
             (it.estimator, it.delay, _count(it.ns), _digits(it.error), _digits(it.least)) for it in accuracy.acting
         ]
-        headings = ("estimator", "ticks of delay", "ns per tick", "error [%]", "least error [%]")
+        headings = ("estimator", "ticks of delay", "ns per tick", "error [%]", "smallest error [%]")
         parts.append(
             f"## The force on the hand, {accuracy.acting_liquid}\n\n{Table(headings, acting, left=1).markdown()}"
         )
@@ -372,12 +373,13 @@ def evidence(accuracy: Accuracy) -> Evidence:
 
 
 _WHAT: Final = (
-    "Times are computation times of one thread, excluding other programs: medians over repeats, in one interleaved "
-    "run, of the median and the 99th percentile of batches of 1,000 ticks. RMS errors are in % of the RMS reference "
-    "force, greatest errors in % of the greatest. Direction is the RMS angle while the reference force is perceptible. "
-    "Rows with fewer ticks per second show only the error of the force, not its effect on stability. Unsteady drag is "
-    "compared with each motion of the fluid solver with constants fitted to the other motions. ● no other model is "
-    "both faster, in real time, and more accurate, each by its greatest error; ◎ the model that the program runs."
+    "Times are computation times of one thread, without the time taken by other programs: the median and the 99th "
+    "percentile of batches of 1,000 ticks, each as the median over the repeats of one interleaved run. RMS errors are "
+    "given in % of the RMS reference force, maximum errors in % of the maximum reference force. Direction is the RMS "
+    "angle while the reference force is perceptible. Rows with fewer ticks per second show only the error of the "
+    "force, not the effect on stability. For each motion of the fluid solver, the constants of unsteady drag were "
+    "fitted to the other motions. ●: no other model is both faster and more accurate, judged by the largest error of "
+    "each; ◎: the model that the program runs."
 )
 _HEADINGS: Final = (
     "", "model", "ns per tick", "p99", "RMS error [N]", "max [N]", "RMS [%]", "max [%]", "direction [°]",

@@ -47,7 +47,7 @@ def test_every_bad_row_is_named_by_number_and_line(tmp_path):
     rows = ["0,0,0,0", "0.001,x,0,0", "0.002,0,0", "0.003,nan,0,0", "0.004,0,0,1_0", "0.004,1e999,0,0", "0.006,0,0,0"]
     assert problems(tmp_path, *rows) == [
         "line 3: row 2: 'x' is not a finite number",
-        "line 4: row 3: has 3 fields, fewer than the 4 of the header",
+        "line 4: row 3: has 3 fields, fewer than the 4 in the header",
         "line 5: row 4: 'nan' is not a finite number",
         "line 6: row 5: '1_0' is not a finite number",
         "line 7: row 6: '1e999' is not a finite number",

@@ -230,4 +230,4 @@ def test_a_table_with_more_fields_than_its_header_is_refused(tmp_path):
     )
     with pytest.raises(StudyError) as refusal:
         identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", "flow_index")
-    assert str(refusal.value) == f"{path}, line 2: has 4 fields, more than the 2 of the header: write decimal points"
+    assert str(refusal.value) == f"{path}, line 2: has 4 fields, more than the 2 in the header: write decimal points"

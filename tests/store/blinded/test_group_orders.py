@@ -115,7 +115,7 @@ def test_sixteen_participants_have_each_order_four_times_in_each_group(tmp_path:
 
 def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> None:
     source, study = source_of(PREEXISTING), StudyFolder(tmp_path / "s")
-    with pytest.raises(StudyError, match=r"group is missing: .* the group of P001: experts, novices"):
+    with pytest.raises(StudyError, match=r"the group is missing: .* the group of P001 with --group: experts, novices"):
         begun(study.path, source, "P001")
     with pytest.raises(
         StudyError, match="group 'expert': grouped does not have this group; permitted: experts, novices"
@@ -159,7 +159,7 @@ def test_a_group_is_refused_where_groups_are_randomised_or_there_are_none(tmp_pa
 def test_a_replacement_needs_a_participant_of_the_same_group(tmp_path: Path) -> None:
     folder, source = tmp_path / "s", source_of(PREEXISTING)
     begun(folder, source, "P001", group="experts").close()
-    with pytest.raises(StudyError, match="P001 is in group experts, P002 in group novices"):
+    with pytest.raises(StudyError, match="P001 is in group experts, but P002 is in group novices"):
         begun(folder, source, "P002", group="novices", row_of="P001")
     with pytest.raises(StudyError, match="row of 'P009': this ID does not exist in this folder"):
         begun(folder, source, "P002", group="novices", row_of="P009")
@@ -233,5 +233,5 @@ def test_a_folder_of_an_earlier_version_goes_on_by_the_numbers_of_ids(tmp_path: 
         assert not reproduce_session(store.folder.path).differences[1:], "only the trials that were not run"
     assert orders["P002"] != orders["P003"] or orders["P004"] != orders["P003"]
     assert orders["P060"] == orders["P003"]
-    with pytest.raises(StudyError, match="the number in the ID assigns rows"):
+    with pytest.raises(StudyError, match="the number in an ID assigns the row"):
         begun(study.path, source, "P061", row_of="anna")

@@ -95,7 +95,7 @@ def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
         ({"participant": "test"}, "is reserved for pilot sessions"),
         ({"participant": "P008", "session": 0}, "it must be from 1 to 99"),
         ({"participant": "P008", "simulated": True}, "must not be mixed"),
-        ({"participant": "P008", "protocol": OTHER}, "holds the study 'brackish', not 'other'"),
+        ({"participant": "P008", "protocol": OTHER}, "contains the study 'brackish', not 'other'"),
     ],
 )
 def test_a_refusal_touches_nothing(tmp_path: Path, finished: Start, again: dict[str, Any], sentence: str) -> None:

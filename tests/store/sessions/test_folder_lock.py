@@ -88,7 +88,7 @@ def test_a_program_that_may_live_is_not_disturbed(tmp_path: Path, holder: str) -
     marker = other(tmp_path)
     marker.write_text(holder.replace("HOST", json.dumps(platform.node())), encoding="utf-8", newline="\n")
     assert is_open(tmp_path)
-    with pytest.raises(StoreError, match=r"if that program is gone, delete .*\.open-0123abcd\.json"):
+    with pytest.raises(StoreError, match=r"if that program is no longer running, delete .*\.open-0123abcd\.json"):
         lock_folder(tmp_path)
     assert markers(tmp_path) == (marker,)
 

@@ -27,7 +27,9 @@ def test_a_table_or_receipt_that_cannot_be_written_at_the_end_is_reported_and_th
         path = store.folder.table("brackish", of) if of else store.folder.receipt
         path.unlink()
         path.mkdir()
-        with pytest.raises(StoreError, match=rf"{path.name} cannot be written .*: liquid-study rebuild .* writes what"):
+        with pytest.raises(
+            StoreError, match=rf"{path.name} cannot be written .*: run liquid-study rebuild .* to write what"
+        ):
             store.finish("completed")
         assert journal.read(store.folder.journal)[-1].event == "session_ended"
         assert of is None or receipt.read(store.folder.receipt)["status"] == status

@@ -113,4 +113,6 @@ def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error
         receipt.write(path, held | change)
         assert "sub-P009/ses-01/receipt.json: " in told(verify_study(study)), change
     receipt.write(path, held | {"resumed": []})  # so does a program leave it that is killed while it resumes
-    assert "sub-P009/ses-01/receipt.json: lacks what the session was resumed with" in warned(verify_study(study))
+    assert "sub-P009/ses-01/receipt.json: lacks the settings with which the session was resumed" in warned(
+        verify_study(study)
+    )
