@@ -135,7 +135,7 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
     folder = StudyFolder(tmp_path / "other")
     folder.session("P001", 1).path.mkdir(parents=True)
     write_description(folder, small.protocol().study)
-    with pytest.raises(StoreError, match="holds the study 'small', not 'demo'"):
+    with pytest.raises(StoreError, match="contains the study 'small', not 'demo'"):
         rehearsal.rehearse("demo", participants=1, seed=1, results=folder.path)
 
 

@@ -111,7 +111,7 @@ def test_a_rehearsals_key_follows_from_its_seed_and_does_not_mix_with_a_real_one
     assert (one.hash != three.hash, one.drawn) == (True, "seed")
     with pytest.raises(StoreError, match="one contains a rehearsal, which must not be mixed with real sessions"):
         open_or_draw_key(tmp_path / "one", protocol)
-    with pytest.raises(StoreError, match="real holds real sessions: they must not be mixed with a rehearsal"):
+    with pytest.raises(StoreError, match="real contains real sessions, which must not be mixed with a rehearsal"):
         open_or_draw_key(tmp_path / "real", protocol, stream(1, "blinding").random)
 
 

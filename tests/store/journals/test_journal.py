@@ -78,7 +78,7 @@ def test_a_broken_a_missing_and_a_doubled_line_are_damage_and_a_torn_tail_is_non
         held = b"".join(b"#" + line[1:] if number in broken else line for number, line in enumerate(lines))
         for tail in (b"", b'{"n":5,"ev'):
             path.write_bytes(held + tail)
-            with pytest.raises(StoreError, match=rf"journal\.jsonl, line {broken[0] + 1}: damaged; restore it from a"):
+            with pytest.raises(StoreError, match=rf"journal\.jsonl, line {broken[0] + 1} is damaged: restore"):
                 read(path)
             assert (len(scan(path).lines), scan(path).torn_bytes) == (broken[0], 0)
     for order in ((0, 1, 3), (0, 1, 1, 2), (1, 2, 3)):
