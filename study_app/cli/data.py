@@ -373,8 +373,8 @@ def proof(
 ) -> None:
     """Print a proof of a study: one line for each session, withdrawal, unblinding and exclusion.
 
-    Keep the lines where nobody who can change the results can change them; verify --fingerprints compares the study
-    with them.
+    Keep the lines where they cannot be changed by people who can change the results; verify --fingerprints compares
+    the study with them.
     """
     from study_app.store import workstation
     from study_app.store.atomic import write_file

@@ -43,7 +43,7 @@ def devices(context: click.Context) -> None:
 
 @devices.command("list")
 def list_devices() -> None:
-    """List every device, with whether it is connected, what it can do, and why it cannot be used."""
+    """List every device: whether it is connected, what it can do and, if it cannot be used, why."""
     from study_app.devices.registry import all_devices, backends
 
     of = {device.name: f"; {device.kind}, {device.degrees_of_freedom} degrees of freedom" for device in all_devices()}
@@ -323,7 +323,7 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
     "--triggers", metavar="PORT", help=("Send trigger codes to a port, such as serial:/dev/ttyUSB0; off disables them.")
 )
 def outlets(markers: str | None, samples: str | None, triggers: str | None) -> None:
-    """Print what sessions on this machine send to other programs; use the options to change it."""
+    """Print what sessions on this machine send to other programs; use the options to change this."""
     from study_app.errors import OutletError
     from study_app.outlets.session_outlets import is_port, port_examples
     from study_app.store import workstation

@@ -392,7 +392,7 @@ _LOAD = click.Choice(("none", "gui", "gui+cpu"))
     default=10.0,
     show_default=True,
     metavar="S",
-    help=("Duration of the measurement of each loop, or of each delay."),
+    help="Measurement time for each loop or delay.",
 )
 @click.option(
     "--load",
@@ -606,7 +606,7 @@ def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
-    """Measure how often the report's verdicts are wrong, in simulated studies with no effects, some, or all of them.
+    """Measure how often the report's verdicts are wrong, in simulated studies with none, some or all of the effects.
 
     The report's own tests are applied to simulated rek2024 studies with 5, 12 and 24 participants, whose answers come
     from the rehearsals' answer model or from an ordinal probit model with random effects. Every rate is printed with

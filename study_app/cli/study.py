@@ -26,7 +26,7 @@ from study_app.number_text import counted
 
 SEED = click.IntRange(0, 2**31 - 1)
 _WINDOWED = click.option(
-    "--windowed", is_flag=True, help="Show the participant's window in a frame instead of full screen."
+    "--windowed", is_flag=True, help="Show the participant's window as a normal window instead of full screen."
 )
 _SCREEN = click.option("--screen", type=click.IntRange(1), help="Number of the participant's screen.")
 _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Name or initials of the operator.")
@@ -168,7 +168,7 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
 
 @click.command(cls=TakesDeviceOptions)
 @FILE
-@click.option("--participant", metavar="ID", required=True, help="ID in letters and digits, such as P007.")
+@click.option("--participant", metavar="ID", required=True, help="Participant ID (letters and digits), such as P007.")
 @SESSION
 @click.option("--seed", type=SEED, help="Seed for all random choices; default: drawn at random, shown and recorded.")
 @click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True, help="Haptic or input device.")

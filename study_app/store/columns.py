@@ -183,7 +183,7 @@ _TRIALS: tuple[Column, ...] = (
     _count("targets_reached", "Number of targets reached.", sealed=True),
     _count("targets", "Number of targets to reach; n/a if the task does not have a fixed number of targets."),
     _count("ticks", "Number of servo ticks during the trial.", sealed=True),
-    _measure("tick_rate_hz", "Servo rate that was achieved.", "Hz", of_trial="mean"),
+    _measure("tick_rate_hz", "Achieved servo rate.", "Hz", of_trial="mean"),
     _measure("lateness_p99_ms", "99th percentile of the lateness of servo ticks.", "ms", of_trial="max"),
     _measure("worst_gap_ms", "Longest time between two servo ticks.", "ms", of_trial="max"),
     _count("overruns", "Number of servo deadlines that were skipped because a tick took too long."),

@@ -212,7 +212,9 @@ def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str, 
         json.dumps(held | {"row_of": "P002" if row_of == "P001" else "P001"}), encoding="utf-8", newline="\n"
     )
     assert any("code" in line for line in reproduce_session(store.folder.path).differences)
-    assert any("row_of: differ from the journal" in str(one) for one in verify_study(square.parent / "results").errors)
+    assert any(
+        "differs from the journal in row_of" in str(one) for one in verify_study(square.parent / "results").errors
+    )
 
 
 def test_resumed_session_keeps_the_row(square: Path) -> None:

@@ -355,8 +355,8 @@ def check_participant(participant: str, *, pilot: bool = False) -> None:
     """
     if not ID_PATTERN.fullmatch(participant) or len(participant) > _MAX_ID_LENGTH:
         raise StoreError(
-            f"participant ID {participant!r} cannot be used: only letters A-Z, a-z and digits 0-9 are "
-            f"permitted, at most {_MAX_ID_LENGTH}, without dashes, spaces or underscores; for example P007"
+            f"participant ID {participant!r} cannot be used: use at most {_MAX_ID_LENGTH} letters A-Z, a-z and digits "
+            "0-9, without dashes, spaces or underscores, such as P007"
         )
     if not pilot and participant.lower() in _RESERVED_IDS:
         raise StoreError(

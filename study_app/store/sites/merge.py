@@ -123,8 +123,8 @@ def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
     for name in given:
         if not ID_PATTERN.fullmatch(name) or len(name) > _MAX_SITE_LENGTH:
             raise StoreError(
-                f"site {name!r} cannot be used as a name: only letters A-Z, a-z and digits 0-9 are permitted, at most "
-                f"{_MAX_SITE_LENGTH}; for example A or Utrecht"
+                f"site {name!r} cannot be used as a name: use at most {_MAX_SITE_LENGTH} letters A-Z, a-z and digits "
+                "0-9, such as A or Utrecht"
             )
         if fault := file_name_fault(name):
             raise StoreError(f"site {name!r} {fault}, so it cannot be the name of a folder: use another name")

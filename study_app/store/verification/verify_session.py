@@ -186,9 +186,8 @@ def _check_files(
     if is_there(folder.rebuilt):
         with findings.reading(folder.rebuilt):
             for line in read_own(folder.rebuilt, study_root(folder.rebuilt)).decode("utf-8", "replace").splitlines():
-                findings.warning(
-                    folder.rebuilt, f"{events.shorten_value(line)}; only a copy of {FINGERPRINTS} proves more"
-                )
+                proof = f"only a copy of {FINGERPRINTS} can prove that the data are unchanged"
+                findings.warning(folder.rebuilt, f"{events.shorten_value(line)}; {proof}")
     return CheckedSession(
         place=place,
         readable=True,
@@ -272,7 +271,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
         differing = ["the settings with which the session began"]
     if differing:
-        findings.error(path, f"{', '.join(differing)}: differ from the journal")
+        findings.error(path, f"differs from the journal in {', '.join(differing)}")
     told = {str(entry.get("at")) for entry in held.get("resumed", ()) if isinstance(entry, dict)}
     again = [line.at for line in lines if isinstance(line, events.SessionResumed) and line.receipt_hash is not None]
     if lacking := [at for at in again if at not in told]:

@@ -322,7 +322,7 @@ def _check_copy(
     copy = [line for line in kept if line not in erased]
     for record, place in copy:
         if not place.startswith("data/") and (record, place) not in recorded:
-            what = f"lacks what {path} lists as {record} ({place}): it was deleted or changed"
+            what = f"lacks {record} ({place}), which {path} lists: it was deleted or changed"
             findings.error(study.path / place.partition("/")[0], what)
     _compare_proofs(study, sessions, copy, str(path), findings)
     known = {place for _, place in copy}
@@ -355,7 +355,7 @@ def _compare_proofs(
             findings.error(path, f"is missing, but {name} lists it: the session was deleted after it had ended")
             continue
         if proof != session.fingerprint:
-            now = f"its fingerprint is {session.fingerprint}" if session.fingerprint else "it no longer has an end"
+            now = f"its fingerprint is {session.fingerprint}" if session.fingerprint else "its end is missing"
             findings.error(path, f"is not the session that {name} lists as {proof}: it has been changed ({now})")
 
 
