@@ -212,7 +212,7 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**workstation_results(results, day), "report": report})
     workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
-    click.echo("Saved in this machine's settings: the receipts of later sessions include it, and Devices shows it.")
+    click.echo("Saved in this machine's settings: receipts of later sessions include the results; Devices shows them.")
 
 
 def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:

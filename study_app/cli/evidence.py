@@ -453,7 +453,7 @@ def timing(
     if other and spin_us is not None:
         raise StudyError(f"--spin applies only to the servo's loops: omit it with --{other}")
     if other in {"lsl", "triggers"}:
-        check_seconds(seconds, "outlets are measured")
+        check_seconds(seconds, "outlets can be measured")
     if other == "delays":
         _choose_display()
     make_output_folder(to)
@@ -661,7 +661,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
-    """Recover the known thresholds of simulated observers, with methods and analysis alone and with the whole program.
+    """Recover known thresholds of simulated observers, with methods and analysis alone, then with the whole program.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
     analyses many studies with 20 observers whose thresholds differ by a factor of 1.2; in magnitude estimation, the

@@ -34,7 +34,7 @@ def kinds_markdown() -> str:
         ("Methods", ("`kind`", "next level"), _kind_descriptions(methods.KINDS)),
         ("Effects", ("effect", "description", "`auto`", "not with"), _effect_rows()),
         ("Limiters", ("bit", "limiter", "column", "meaning"), _limiter_rows()),
-        ("Trigger codes", ("code", "event of the journal"), ((str(code), f"`{name}`") for name, code in CODES.items())),
+        ("Trigger codes", ("code", "journal event"), ((str(code), f"`{name}`") for name, code in CODES.items())),
         ("Devices", ("`--device`", "device", "kind", "options"), _device_rows()),
         ("Checks of a device, in order", ("`devices doctor`", "without it", "cause; remedy"), _check_rows()),
         (

@@ -213,7 +213,7 @@ _TRIALS: tuple[Column, ...] = (
         "Largest number of ticks between a servo command and the moment at which its force acts, during the task.",
         of_trial="max",
     ),
-    _count("loop_delay_changes", "Number of times that loop_delay_ticks changed during the task."),
+    _count("loop_delay_changes", "Number of times the loop delay changed during the task."),
     *(
         _count(f"limiter_{limiter.name}", f"Number of servo ticks in which {limiter.meaning}.", sealed=True)
         for limiter in sorted(LIMITERS)

@@ -141,8 +141,8 @@ def _refuse_other_conditions(study: StudyFolder, key: Key, protocol: Protocol) -
     if key.tables_hash != _tables_hash(protocol):
         raise StoreError(
             f"{study.key} was sealed for conditions that differ from this protocol (its liquids, conditions, stimuli, "
-            "blocks or groups were changed): undo that change to continue the study, or set another study.name, or use "
-            "another results folder, for the changed protocol"
+            "blocks or groups were changed): undo that change to continue the study, or choose a different study.name "
+            "or results folder for the changed protocol"
         )
 
 

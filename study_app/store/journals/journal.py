@@ -196,7 +196,7 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
         needed = chained or (first and line.get("format", 1) > 1)
         return "does not contain the key previous: it was changed; restore it from a copy" if needed else None
     if hash_before != before:
-        return "does not continue the previous line, which was changed: restore it from a copy"
+        return "does not match the previous line, which was changed: restore it from a copy"
     if not (chained or first or line["event"] == "session_resumed"):
         return "has the key previous, but earlier lines do not: they were changed; restore it from a copy"
     return None

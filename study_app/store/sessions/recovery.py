@@ -267,7 +267,7 @@ def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterato
     for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
         path, given = folder.table(place.study, name), len(rows.table(name))
         if (row_count := _count_rows(path, place.study_folder.path)) > given + spare:
-            yield path, f"has {row_count} rows, but the journal has {given}"
+            yield path, f"has {row_count} rows, but the journal contains {given}"
 
 
 def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[tuple[Path, str]]:

@@ -266,7 +266,7 @@ def refuse_earlier_columns(folder: StudyFolder) -> None:
     """Raise StoreError for a study whose tables an earlier version wrote; the message says how to upgrade it."""
     if has_earlier_columns(folder):
         raise StoreError(
-            f"{folder.path} has tables of an earlier version of the program: run liquid-study upgrade {folder.path}"
+            f"{folder.path} has tables from an earlier version of the program: run liquid-study upgrade {folder.path}"
         )
 
 

@@ -125,7 +125,7 @@ def _check_markers(
         yield f"markers from {name}: {counts}; times agree within {_error_ms(session, stream, at):.2g} ms"
     if unknown:
         findings.warnings += (
-            Finding(file.name, (f"{counted(unknown, 'marker')} that do not belong to any session of this study")),
+            Finding(file.name, f"contains {counted(unknown, 'marker')} from outside this study's sessions"),
         )
 
 

@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.store import workstation
 from study_app.store.atomic import read_regular
 
-_EXTRA: Final = "needs the optional extra proofs: pip install 'liquid-study[proofs]'"
+_EXTRA: Final = "from the optional extra proofs: pip install 'liquid-study[proofs]'"
 WAITS_S: Final = 10.0
 _LONGEST: Final = 1_000_000
 """Greatest length of a time-stamp server's answer [bytes]."""
@@ -25,7 +25,7 @@ def optional_library(name: str) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        raise StoreError(f"a proof needs {name.partition('.')[0]} {_EXTRA}") from error
+        raise StoreError(f"a proof requires {name.partition('.')[0]} {_EXTRA}") from error
 
 
 def request_stamp(lines: str, server: str) -> str:
@@ -77,9 +77,9 @@ def check_granted(answer: bytes, request: Any) -> None:
         )
     token = response.tst_info
     if token.message_imprint.message != request.message_imprint.message:
-        raise ValueError("the token belongs to another text")
+        raise ValueError("the token was issued for another text")
     if token.nonce != request.nonce:
-        raise ValueError("the token belongs to another request")
+        raise ValueError("the token was issued for another request")
 
 
 def _post_request(server: str, question: bytes, answers: queue.SimpleQueue[bytes | Exception]) -> None:

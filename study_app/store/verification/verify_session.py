@@ -149,7 +149,8 @@ def _check_files(
         findings.warning(folder.path, "is open in another program")
     else:
         for path in (*temporary_files(folder.path), *temporary_files(folder.recordings)):
-            findings.warning(path, "is an incomplete file left by a program that was killed; rebuild removes it")
+            what = "is an incomplete file left by a program that was killed; the command rebuild removes it"
+            findings.warning(path, what)
         if is_there(folder.crash) and folder.crash.stat().st_size:
             findings.warning(folder.crash, "shows how the program crashed: send it to the developers")
     contents = _check_journal(folder, findings, running=running)
@@ -162,7 +163,7 @@ def _check_files(
     expected = {"participant": folder.participant, "session": folder.number, "study": place.study}
     for name, value in expected.items():
         if (told := getattr(start, name)) != value:
-            findings.error(folder.journal, f"belongs to {name} {told!r}, but is stored with the files of {value!r}")
+            findings.error(folder.journal, f"belongs to {name} {told!r}, but is stored with the files for {value!r}")
     told = lines
     with findings.reading(folder.journal):
         told = open_events(lines, key)
@@ -244,7 +245,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
         if not running:
             findings.warning(folder.path, "is unfinished: you can resume it")
     elif not isinstance(contents.lines[-1], events.SessionEnded):
-        findings.error(folder.journal, "lines follow the session's end")
+        findings.error(folder.journal, "contains lines after the session's end")
     return contents
 
 
@@ -292,7 +293,9 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
         findings.error(
-            path, f"its status is {held.get('status')!r}, but the journal's is {last.status!r}; rebuild corrects it"
+            path,
+            f"its status is {held.get('status')!r}, but the journal's is {last.status!r}; the command rebuild "
+            "corrects it",
         )
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
     steps = sequence if isinstance(sequence, list) else []
@@ -432,7 +435,7 @@ def check_table(
     try:
         content = read_regular(path)
     except OSError:
-        findings.error(path, "is missing or cannot be read; rebuild creates it again")
+        findings.error(path, "is missing or cannot be read; the command rebuild creates it again")
         return
     written = journal.as_written(content)
     if content != written == expected:
@@ -443,7 +446,7 @@ def check_table(
     follows = all(map(may_differ, differing))
     if differing:
         report = findings.warning if follows else findings.error
-        report(path, f"differs from the journal, from line {differing[0]}; rebuild creates it again")
+        report(path, f"differs from the journal, starting at line {differing[0]}; the command rebuild creates it again")
     if not (differing and follows):  # a row may be partly written: earlier versions wrote in place
         for problem in csv_files.table_problems(content, columns):
             findings.error(path, problem)
@@ -486,7 +489,8 @@ def _check_checksums(
     opened_hashes |= {line.frames_sha256: line.opened_frames_sha256 for line in kept}
     if not is_there(folder.checksums):
         findings.error(
-            folder.checksums, "is missing: was the program killed at the end of the session? rebuild creates it"
+            folder.checksums,
+            "is missing: the program may have been killed at the end of the session; the command rebuild creates it",
         )
         return
     with findings.reading(folder.checksums):

@@ -286,7 +286,8 @@ def _check_fingerprints(
             and not session.running
             and place_of(study, session.place.folder) not in known
         ):
-            findings.error(path, f"lacks {place_of(study, session.place.folder)}, which has ended; rebuild adds it")
+            place = place_of(study, session.place.folder)
+            findings.error(path, f"lacks {place}, which has ended; the command rebuild adds it")
 
 
 def _check_copy(

@@ -59,7 +59,7 @@ def test_a_table_changed_by_hand_is_named_with_what_mends_it(copy: StudyFolder) 
     path = another_answer(session)
     (line,) = told(copy)
     assert line.startswith(
-        f"{path} differs from the journal, from line 2; rebuild creates it again: liquid-study verify"
+        f"{path} differs from the journal, starting at line 2; the command rebuild creates it again: run liquid-study"
     )
     rebuild_session(session.path)
     assert told(copy) == []
@@ -119,7 +119,7 @@ def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
     name = path.relative_to(copy.path).as_posix()
     if command == "export":
         codebook = json.loads((tmp_path / "out" / "codebook.json").read_text(encoding="utf-8"))
-        what = "differs from the journal, from line 2; rebuild creates it again"
+        what = "differs from the journal, starting at line 2; the command rebuild creates it again"
         assert codebook["doubts"] == [{"file": name, "what": what}]
     else:
         caption = (tmp_path / "out" / "liquids.txt").read_text(encoding="utf-8")

@@ -90,7 +90,9 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     findings = verify_study(study)
     assert findings.errors == ()
     for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
-        assert f"{path}: differs from the journal, from line 2; rebuild creates it again" in warned(findings)
+        assert f"{path}: differs from the journal, starting at line 2; the command rebuild creates it again" in warned(
+            findings
+        )
     Files(study).replace(PARTICIPANTS, "withdrawn", "completed")
     assert f"{PARTICIPANTS}: differs from the journal" in told(verify_study(study))
 
