@@ -161,7 +161,9 @@ class DeviceDescriptor:
             )
         for called, value, permitted in (("icon", self.icon, get_args(Icon)), ("kind", self.kind, get_args(Kind))):
             if value not in permitted:
-                raise DeviceError(f"{called} {value!r} of device '{self.name}': choose one of {', '.join(permitted)}")
+                raise DeviceError(
+                    f"device '{self.name}' has the unknown {called} {value!r}: choose one of {', '.join(permitted)}"
+                )
 
     @property
     def simulated(self) -> bool:

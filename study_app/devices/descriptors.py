@@ -12,9 +12,9 @@ from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, Devic
 _FIRMWARE: Final = DeviceOption(
     name="firmware",
     title="Falcon's firmware",
-    help="The Falcon's own program, needed if the Falcon was switched off after its last use. The owner of the Falcon "
-    "has the file.",
-    about="A Falcon needs its firmware after it was turned on, and the licence does not allow us to include it. "
+    help="The Falcon's firmware file, needed if the Falcon has been switched off since its last use. The Falcon's "
+    "owner has this file.",
+    about="A Falcon needs its firmware each time it is turned on, and the licence does not allow us to supply it. "
     "Choose your own firmware file; it is loaded only if the Falcon needs it.",
     hint="loaded only if the Falcon needs it",
     placeholder="Not needed if the firmware is already loaded",
@@ -24,10 +24,11 @@ BY_COMMAND: Final = replace(_FIRMWARE, in_windows=False)
 _DHD_LIBRARY: Final = DeviceOption(
     name="dhd-library",
     title="Force Dimension's library",
-    help="Path of the Force Dimension SDK's library (libdrd.so, libdrd.dylib, drd64.dll).",
-    about="The Force Dimension SDK is installed by its user. Choose its library if it is not found by itself.",
-    hint="only if it is not found by itself",
-    placeholder="Not needed if the library is at its usual place",
+    help="Path of the Force Dimension SDK's library (libdrd.so, libdrd.dylib or drd64.dll).",
+    about="You must install the Force Dimension SDK yourself. Choose its library here if it is not found "
+    "automatically.",
+    hint="only if it is not found automatically",
+    placeholder="Not needed if the library is in its usual location",
     file_filter="Libraries (*.so* *.dylib *.dll);;All files (*)",
 )
 

@@ -69,7 +69,7 @@ class Report:
         if not self.well:
             return f"Found: {len(self.found)}."
         if self.unseen:
-            return f"Nothing wrong was found. Not checked: {'; '.join(finding.tested for finding in self.unseen)}."
+            return f"{_NOTHING_WRONG} Not checked: {'; '.join(finding.tested for finding in self.unseen)}."
         return _NOTHING_WRONG
 
 

@@ -163,7 +163,7 @@ class FramedDevice(Device):
             self.close()
         if self.exchange.inside:
             raise DeviceError(
-                f"a call to the device '{self.name}' does not return: turn it off, and start this program again"
+                f"a call to the device '{self.name}' does not return: turn the device off, and restart this program"
             )
         self.connection = self._connect()
         try:
@@ -259,7 +259,7 @@ class FramedDevice(Device):
 
     def take_fault(self, fault: str) -> None:
         """Simulate a fault, if the device is emulated."""
-        raise DeviceError(f"'{self.name}' cannot be given faults: only {self.name}-emulated can")
+        raise DeviceError(f"faults can be simulated only with {self.name}-emulated, not with '{self.name}'")
 
 
 def framed_device(name: str, request: OpenRequest) -> FramedDevice | None:

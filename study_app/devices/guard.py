@@ -77,7 +77,7 @@ class Guard:
             child.wait()
             _close(child)
             raise DeviceError(
-                f"the guard process of the device '{self._name}' does not start, so no force may be sent: reinstall "
+                f"the guard process for the device '{self._name}' does not start, so forces cannot be sent: reinstall "
                 "liquid-study"
             )
         self.child = child
@@ -183,7 +183,7 @@ def watch_program(name: str, ends_force: str, *arguments: str) -> int:
             end_force(*arguments)
         except DeviceError as error:
             if time.perf_counter() > ends_s:
-                sys.stderr.write(f"the device '{name}' may still push: {error}; turn it off\n")
+                sys.stderr.write(f"the device '{name}' may still exert force: {error}; turn it off\n")
                 return 2
         else:
             return 0

@@ -245,17 +245,18 @@ class HandOrders:
         try:
             times, places = np.asarray(t_s, np.float64), np.asarray(position_m, np.float64)
         except (TypeError, ValueError) as error:
-            raise DeviceError(f"a motion needs numbers: {error}") from error
+            raise DeviceError(f"a motion's times and positions must be numbers: {error}") from error
         if times.ndim != 1 or times.size == 0 or places.shape != (times.size, 3):
             raise DeviceError(
-                f"a motion needs times (n,) and positions (n, 3) with n > 0, got {times.shape} and {places.shape}"
+                f"a motion needs times (n,) and positions (n, 3) with n > 0, not {times.shape} and {places.shape}"
             )
         if not (np.isfinite(times).all() and np.isfinite(places).all()):
             raise DeviceError("a motion's times and positions must be finite numbers")
         if (np.diff(times) <= 0.0).any():
             row = int(np.argmax(np.diff(times) <= 0.0)) + 1
             raise DeviceError(
-                f"a motion's times must increase; row {row} is at {times[row]} s, after {times[row - 1]} s"
+                f"a motion's times must increase: row {row} is at {times[row]} s, but the row before is at "
+                f"{times[row - 1]} s"
             )
         motion = records(_MOTION_ROW, times.size)
         motion.t_s, motion.position_m = times, places
@@ -269,7 +270,7 @@ class HandOrders:
         Without ``duration_s`` the reach takes 0.3 s plus 4 s per metre.
         """
         if duration_s is not None and not duration_s > 0.0:
-            raise DeviceError(f"a reach must last longer than 0 s, got {duration_s} s")
+            raise DeviceError(f"a reach must last longer than 0 s, not {duration_s} s")
         nanoseconds = 0 if duration_s is None else max(1, round(duration_s * 1e9))
         self._post(REACH, target_m=self._inside(x_m, y_m, z_m), duration_ns=nanoseconds)
 

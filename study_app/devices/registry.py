@@ -55,7 +55,7 @@ def descriptor_of(name: str) -> DeviceDescriptor:
         known = ", ".join(device.usage for device in all_devices())
         raise DeviceNotFound(f"device '{name}' is not known; choose one of: {known}")
     if descriptor.argument_required and not argument:
-        raise DeviceNotFound(f"device '{kind}' needs more than its name: specify it as {descriptor.usage}")
+        raise DeviceNotFound(f"device '{kind}' needs an argument after its name: specify it as {descriptor.usage}")
     return descriptor
 
 
@@ -84,7 +84,7 @@ def open_device(name: str, **request: Any) -> Device:
     if lacking := [part for part in ("read", "write", "failure") if not hasattr(opened, part)]:
         opened.close()
         raise DeviceError(
-            f"device '{name}' does not have '{lacking[0]}': let {type(opened).__name__} inherit "
+            f"device '{name}' does not have '{lacking[0]}': derive {type(opened).__name__} from "
             "study_app.devices.base.Device"
         )
     return opened
@@ -112,7 +112,9 @@ def doctor_of(name: str) -> Doctor:
     doctor = descriptor_of(name).doctor
     if doctor is None:
         examined = ", ".join(device.usage for device in all_devices() if device.doctor is not None)
-        raise DeviceError(f"the doctor cannot examine '{name}', only {examined}: see 'liquid-study devices list'")
+        raise DeviceError(
+            f"the doctor cannot examine '{name}'; it examines only {examined}: see 'liquid-study devices list'"
+        )
     return doctor
 
 
@@ -146,7 +148,7 @@ def backends() -> list[Backend]:
             f"{plug_in.name} ({plug_in.package})",
             "entry point",
             state=NOT_AVAILABLE,
-            can=f"a device of the plug-in {plug_in.package}",
+            can=f"a device from the plug-in {plug_in.package}",
             why=f"it cannot be used ({plug_in.fault}): update or uninstall the package {plug_in.package}",
         )
         for plug_in in DEVICES.plug_ins
@@ -160,5 +162,5 @@ def _probe_device(device: DeviceDescriptor) -> list[Backend]:
     except Exception as error:  # noqa: BLE001 - shown: one device must not hide the others
         reason = " ".join(str(error).split()) or type(error).__name__
         return [
-            Backend(device.usage, device.title, state=NOT_AVAILABLE, can="", why=f"it cannot be looked for: {reason}")
+            Backend(device.usage, device.title, state=NOT_AVAILABLE, can="", why=f"the search for it failed: {reason}")
         ]

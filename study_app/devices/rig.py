@@ -101,7 +101,7 @@ class RigSettings:
 
     def __post_init__(self) -> None:
         if not self.force_limit_n > 0:  # the safety layer would push with a negative one
-            raise DeviceError(f"a force limit of {self.force_limit_n:g} N is not possible: specify more than 0")
+            raise DeviceError(f"the force limit must be greater than 0 N, not {self.force_limit_n:g} N")
 
 
 def study_settings(study: Protocol, random: Random, options: Mapping[str, str | Path] | None = None) -> RigSettings:

@@ -115,7 +115,7 @@ class TestCalibrate:
     def test_what_an_emulated_one_weighs_is_kept_by_its_number(self, tmp_path):
         told = liquid_study("calibrate", "--device", "falcon-emulated", "--grams", "400")
         assert told.exit_code == 0, told.output
-        assert "Hang the weight of 400 g" in told.output
+        assert "Hang the 400 g weight" in told.output
         assert "motor units per newton metre" in told.output
         assert len([line for line in told.output.splitlines() if " +0.0" in line or " -0.0" in line]) >= 20
         file = calibration_file("EMULATED-WEIGHED")

@@ -131,7 +131,11 @@ class TestDeviceOfAnotherPackage:
         ("toy_broken:TOY", "TOY = 3", "toy_broken:TOY is not a DeviceDescriptor but a int"),
         ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"mouse"'), "device 'mouse' already exists: rename it"),
         ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"Toy 1"'), "the device name 'Toy 1' is not permitted"),
-        ("toy_broken:TOY", DESCRIPTOR.replace('"simulated"', '"dreamt"'), "kind 'dreamt' of device 'toy-hand'"),
+        (
+            "toy_broken:TOY",
+            DESCRIPTOR.replace('"simulated"', '"dreamt"'),
+            "device 'toy-hand' has the unknown kind 'dreamt'",
+        ),
     ],
 )
 def test_a_broken_entry_point_is_one_row_and_every_other_device_stays(site, qtbot, value, source, reason):
@@ -165,7 +169,7 @@ def test_a_device_that_cannot_be_looked_for_hides_no_other(site):
     )
     found = {one.name: one for one in backends()}
     assert found["toy-hand"].why == (
-        "it cannot be looked for: the plug-in toy_blind 1.0 failed (ZeroDivisionError: division by zero): "
+        "the search for it failed: the plug-in toy_blind 1.0 failed (ZeroDivisionError: division by zero): "
         "update or uninstall the plug-in"
     )
     assert {"mouse", "falcon", "scripted"} <= set(found)

@@ -55,7 +55,7 @@ def test_an_unplugged_device_is_reconnected_and_its_trial_presented_again(sessio
     assert "Plug in the device" in told["lost"]["advice"]
     assert told["lost"]["banner_in_window"]
     assert "device" not in told["lost"]["page"]
-    assert "none is connected" in told["still unplugged"]
+    assert "no Falcon is connected" in told["still unplugged"]
     assert not told["button while connecting"]
     assert (told["reconnected"]["force"], told["reconnected"]["held"]) == (False, "force")
     assert not told["resumed by the participant"]
@@ -76,7 +76,7 @@ def test_panels_that_fail_are_told_and_the_session_goes_on(session: tuple[dict[s
     assert told["force with failed panels"]
     assert not told["trouble with failed panels"]
     last = [row for row in rows(results) if row["trial"] == "1"][-1]
-    assert "a part of the operator's window failed: ValueError: no such curve" in last["notes"]
+    assert "part of the operator's window failed: ValueError: no such curve" in last["notes"]
     assert "no such colour" in last["notes"]
 
 

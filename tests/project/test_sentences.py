@@ -43,8 +43,6 @@ FINE = {
     "`velocity_lag_s` is None, because the library filters.": "is no, has no, gives no",
     "warning: output created at X outside the workspace (X): X": "two colons",
     "the TCP connection is refused or times out": "refuse",  # the term of networks
-    "it is not connected or has no power, another program uses it, or the user does not have access to USB": "is no, "
-    "has no, gives no",
 }
 OUT = {"compile", "match", "search", "sub", "findall", "split", "fullmatch", "setStyleSheet", "setObjectName", "debug"}
 

@@ -29,9 +29,9 @@ from study_app.haptics.runtime.servo import Servo
 
 RUNNING, OSCILLATES, MOVED, SILENT_DEVICE, SILENT_HOST, STOP_BUTTON = range(6)
 ENDED: Final = {
-    OSCILLATES: "the handle oscillates",
+    OSCILLATES: "the handle oscillated",
     MOVED: "the handle moved too far",
-    SILENT_DEVICE: "the device does not report new positions",
+    SILENT_DEVICE: "the device did not report new positions",
     SILENT_HOST: "the program did not respond",
     STOP_BUTTON: "the stop button was pressed",
 }

@@ -57,7 +57,7 @@ _NOT_FREE: Final = (
 )
 _ENDED: Final = {
     "oscillation": "it oscillated",
-    "operator": "the operator ended it",
+    "operator": "the operator stopped it",
     "most": "stable up to the largest damping tried",
 }
 
@@ -140,9 +140,9 @@ def run_bench(
     lasts = durations or Durations()
     with Stand(device, clock) as stand:
         _wait_for_answer(
-            stand, ask("let-go", "Let go of the handle and keep clear of it until you are asked for the scale.")
+            stand, ask("let-go", "Let go of the handle and keep clear of it until you are asked to use the scale.")
         )
-        progress(f"At rest, without force: {lasts.rest_s:g} s.")
+        progress(f"Measuring at rest, without force, for {lasts.rest_s:g} s.")
         samples, _ = stand.run(lasts.rest_s)
         regular, still = regularity(samples, RATE_HZ), noise(samples)
         motions = tuple(_measure_motion(stand, axis, lasts, progress) for axis in range(3))
@@ -169,7 +169,7 @@ def _measure_motion(stand: Stand, axis: int, lasts: Durations, progress: Callabl
     stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
     most_n = min(_WAVE_N, stand.limit_n / 2)
-    progress(f"Mass and friction along {_AXES[axis]}: {lasts.wave_s:g} s of up to {most_n:.1f} N.")
+    progress(f"Measuring mass and friction along {_AXES[axis]} for {lasts.wave_s:g} s with up to {most_n:.1f} N.")
     sweep = (_TO_HZ - _FROM_HZ) / (lasts.wave_s / 2)
     stretches = []
     for wave_n in (most_n, _WEAKER * most_n):
@@ -186,8 +186,10 @@ def _measure_damping(
     """Move the handle back and forth while the damping increases, until it oscillates, is stopped or is greatest."""
     stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
-    progress(f"Stable damping along {_AXES[axis]}: up to {_MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s.")
-    answered = ask("damping", "It ends when the handle oscillates; press Enter to end it earlier.")
+    progress(
+        f"Measuring stable damping along {_AXES[axis]}: it rises to {_MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s."
+    )
+    answered = ask("damping", "The measurement ends when the handle oscillates; press Enter to end it earlier.")
     stand.excite(
         _hold_excitation(
             integral_per_s=0.0,
@@ -213,11 +215,11 @@ def _measure_damping(
 def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
     """Push down on a scale and ask for its reading."""
     request = (
-        "Rest the handle on a kitchen scale, near the middle of its range, and set the scale to zero. Without "
-        "a scale, type 'no'."
+        "Rest the handle, near the middle of its range, on a kitchen scale, and set the scale to zero. If you do not "
+        "have a scale, type 'no'."
     )
     if _wait_for_answer(stand, ask("scale", request)).lower().startswith("n"):
-        progress("Force against a scale: omitted.")
+        progress("Force on a scale: not measured.")
         return None
     sent_n, shown_g = [], []
     for level_n in _LEVELS_N:
@@ -225,7 +227,9 @@ def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[
             continue
         stand.excite(Excitation(push_n=(0.0, -level_n, 0.0), reach_m=_SLIP_M))
         samples, _ = stand.run(lasts.push_s)
-        answer = _wait_for_answer(stand, ask("grams", f"{level_n:g} N downward: what does the scale show, in grams?"))
+        answer = _wait_for_answer(
+            stand, ask("grams", f"The device pushes down with {level_n:g} N: what does the scale show, in grams?")
+        )
         shown_g.append(_grams(answer))
         sent_n.append(-float(samples.device_force_n[-len(samples) // 4 :, 1].mean()))
     stand.rest()
@@ -235,7 +239,7 @@ def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[
 def _wait_for_answer(stand: Stand, answered: Callable[[], str | None]) -> str:
     _, answer = stand.run(_PATIENCE_S, answered=answered)
     if answer is None:
-        raise DeviceError(f"there was no answer for {_PATIENCE_S:g} s, so the bench ended; the force is zero")
+        raise DeviceError(f"there was no answer within {_PATIENCE_S:g} s, so the bench ended; the force is zero")
     return answer
 
 
@@ -244,7 +248,7 @@ def _grams(answer: str) -> float:
         return float(answer.replace(",", ".").removesuffix("g").strip())
     except ValueError:
         raise DeviceError(
-            f"'{answer}' is not a reading of a scale, so the bench ended: type grams, such as 102"
+            f"'{answer}' is not a scale reading, so the bench ended: enter a number of grams, such as 102"
         ) from None
 
 
@@ -287,43 +291,45 @@ def _lines(results: Found, day: str) -> Iterator[str]:
     yield from (f"{day}{serial}; liquid-study {__version__}; {_system()}.", "")
     yield from ("## Loop", "", "| | median | 99 % | greatest |", "| --- | ---: | ---: | ---: |")
     yield f"| lateness of a tick [ms] | {_row(regular.lateness_ms, 3)} |"
-    yield f"| duration of a tick, with reading and writing [ms] | {_row(regular.busy_ms, 3)} |"
+    yield f"| duration of a tick, including reading and writing [ms] | {_row(regular.busy_ms, 3)} |"
     yield ""
     least, most = regular.delay_ticks
     delay = f"{least}" if least == most else f"{least} to {most}"
     yield (
-        f"{regular.ticks} ticks; {100 * regular.new_share:.2f} % with a new position, at most "
-        f"{regular.longest_gap_ms:.2f} ms apart; the driver's delay: {delay} ticks; {results.overruns} overruns."
+        f"{regular.ticks} ticks; {100 * regular.new_share:.2f} % had a new position, and new positions were at "
+        f"most {regular.longest_gap_ms:.2f} ms apart; the driver's delay was {delay} ticks; {results.overruns} "
+        "overruns."
     )
     yield from ("", "## At rest, without force", "", "| | x | y | z |", "| --- | ---: | ---: | ---: |")
     yield f"| standard deviation of the position [µm] | {_row(still.position_um, 2)} |"
-    yield f"| its range [µm] | {_row(still.peak_um, 2)} |"
+    yield f"| range of the position [µm] | {_row(still.peak_um, 2)} |"
     yield from ("", f"Velocity (EWMA, weight 0.1): {still.velocity_mmps:.3f} mm/s RMS; drift {still.drift_um:.1f} µm.")
     yield from ("", "## Mass, damping, friction", "", "| | x | y | z |", "| --- | ---: | ---: | ---: |")
     for label, name, digits in (
         ("apparent mass [kg]", "mass_kg", 3),
         ("damping [N·s/m]", "damping_nspm", 2),
         ("Coulomb friction [N]", "friction_n", 3),
-        ("delay from sending a force to motion [ms]", "delay_ms", 1),
-        ("encoder count, from the noise in motion [µm]", "count_um", 1),
+        ("delay between sending a force and motion [ms]", "delay_ms", 1),
+        ("encoder count, estimated from the noise in motion [µm]", "count_um", 1),
         ("proportion of force variance explained", "explained", 4),
     ):
         yield f"| {label} | {_row(tuple(getattr(motion, name) for motion in results.motions), digits)} |"
     if not results.fits:
         yield from ("", _NOT_FREE)
-    yield from ("", "## Greatest stable damping", "", "| axis | N·s/m | ended |", "| --- | ---: | --- |")
+    yield from ("", "## Largest stable damping", "", "| axis | N·s/m | why it ended |", "| --- | ---: | --- |")
     for axis, damping in zip(_AXES, results.damping, strict=True):
         yield f"| {axis} | {damping.damping_nspm:.0f} | {_ENDED[damping.ended]} |"
     yield from (
         "",
-        (f"The handle was free while a damper grew; more than {_SHAKE_N:g} N RMS above 20 Hz counts as oscillation."),
+        "The handle was free while the damping was increased; more than "
+        f"{_SHAKE_N:g} N RMS above 20 Hz counts as oscillation.",
     )
     yield from ("", "## Force on a scale", "")
     gain = results.gain
     yield (
         "Not measured."
         if gain is None
-        else f"{gain.gain:.3f} N measured per newton sent, downward; offset {gain.offset_n:+.3f} N; greatest residual "
+        else f"{gain.gain:.3f} N measured per newton sent, downward; offset {gain.offset_n:+.3f} N; largest residual "
         f"{gain.residual_n:.3f} N; {gain.readings} readings."
     )
     yield from ("", "## What the device reports", "", "```json")

@@ -136,12 +136,12 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
 
     def get_configuration_descriptor(self, dev: Emulator, config: int) -> Any:
         if config != 0:
-            raise IndexError(f"a Falcon has one configuration, number 0, not {config}")
+            raise IndexError(f"a Falcon has only configuration 0, not {config}")
         return SimpleNamespace(**_CONFIGURATION)
 
     def get_interface_descriptor(self, dev: Emulator, intf: int, alt: int, config: int) -> Any:
         if (intf, alt) != (0, 0):
-            raise IndexError(f"a Falcon has one interface, number 0, not {intf}, {alt}")
+            raise IndexError(f"a Falcon has only interface 0 with alternate setting 0, not {intf} with {alt}")
         return SimpleNamespace(**_INTERFACE)
 
     def get_endpoint_descriptor(self, dev: Emulator, ep: int, intf: int, alt: int, config: int) -> Any:

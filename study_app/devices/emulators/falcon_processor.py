@@ -100,7 +100,7 @@ class Faults:
 
     def chance(self, name: str, chance: float) -> None:
         if not 0.0 <= chance <= 1.0:
-            raise DeviceError(f"the chance of fault '{name}' must be 0 to 1, not {chance}")
+            raise DeviceError(f"the probability of the fault '{name}' must be from 0 to 1, not {chance}")
         self._state.chance[_place(name)] = chance
 
     def once(self, name: str, times: int = 1) -> None:

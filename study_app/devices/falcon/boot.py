@@ -79,7 +79,7 @@ def _refuse_other_files(data: bytes) -> None:
     if not data:
         raise _refusal("it is empty")
     if begin.startswith((b"<!doctype", b"<html", b"<?xml")):
-        raise _refusal("it is a web page (a page about the file or an error), not the file itself")
+        raise _refusal("it is a web page (perhaps a page about the file or an error message), not the file itself")
     if begin.startswith(b"version https://git-lfs"):
         raise _refusal("it is only a Git LFS pointer: fetch the file itself with 'git lfs pull'")
     if begin.startswith(b":") or _HEX_DUMP.fullmatch(data):
@@ -88,14 +88,14 @@ def _refuse_other_files(data: bytes) -> None:
 
 def _refuse_wrong_header(data: bytes) -> None:
     if len(data) < _HEADER_BYTES:
-        raise _refusal(f"it is cut short: {len(data)} bytes are less than its header of {_HEADER_BYTES}")
+        raise _refusal(f"it is truncated: it has {len(data)} bytes, but the header alone needs {_HEADER_BYTES}")
     key, *reserved = struct.unpack_from(f"<{1 + _RESERVED_WORDS}H", data)
     if key == int.from_bytes(BOOT_KEY.to_bytes(2, "little"), "big"):
-        raise _refusal("the two bytes of each of its words are swapped")
+        raise _refusal("the two bytes in each of its words are swapped")
     if key != BOOT_KEY:
         raise _refusal(f"it begins with the key 0x{key:04X}, not 0x{BOOT_KEY:04X}")
     if any(reserved):
-        raise _refusal("its header contains numbers instead of zeros")
+        raise _refusal("its header contains other values where zeros are required")
 
 
 def _blocks(data: bytes) -> tuple[Block, ...]:
@@ -104,21 +104,25 @@ def _blocks(data: bytes) -> tuple[Block, ...]:
     while True:
         number = len(blocks) + 1
         if len(data) < at + 2:
-            raise _refusal(f"it is cut short: after {len(blocks)} blocks, at byte {len(data)}, the end mark is missing")
+            raise _refusal(
+                f"it is truncated: it ends at byte {len(data)}, after {len(blocks)} blocks, without an end mark"
+            )
         (word_count,) = struct.unpack_from("<H", data, at)
         if word_count == 0:
             break
         end = at + _BLOCK_HEAD.size + 2 * word_count
         if len(data) < end:
-            raise _refusal(f"it is cut short in block {number}: {len(data)} bytes, but block {number} needs {end}")
+            raise _refusal(
+                f"it is truncated in block {number}: it has {len(data)} bytes, but that block ends at byte {end}"
+            )
         _, high, low = _BLOCK_HEAD.unpack_from(data, at)
         blocks.append(Block(high << 16 | low, word_count))
         at = end
     if not blocks:
-        raise _refusal("it does not contain any block to load")
+        raise _refusal("it does not contain any blocks to load")
     extra = len(data) - at - 2
     if extra:
-        raise _refusal(f"{extra} bytes follow its end mark at byte {at}")
+        raise _refusal(f"{extra} bytes follow the end mark at byte {at}")
     return tuple(blocks)
 
 
@@ -147,7 +151,7 @@ class BootFailure(DeviceFailure):
     def __init__(self, step: str, attempt: int, reason: str) -> None:
         self.step, self.attempt, self.reason = step, attempt, reason
         attempts = "1 attempt" if attempt == 1 else f"{attempt} attempts"
-        check_file = "; check that the file is a Falcon's firmware" if step == "start" else ""
+        check_file = "; check that the file contains Falcon firmware" if step == "start" else ""
         super().__init__("upload", str(FAILURES.failure("upload", f"in {attempts}: {reason}{check_file}")))
 
 
@@ -269,7 +273,7 @@ def boot_falcon(
             if attempt == attempts:
                 raise BootFailure(ended.step, attempt, ended.reason) from None
             if progress is not None:
-                progress(f"Loading the firmware, attempt {attempt} of {attempts}: {ended.reason}; trying again.")
+                progress(f"Attempt {attempt} of {attempts} to load the firmware failed: {ended.reason}. Trying again.")
             transport.reopen()
             transport.pause(_BETWEEN_ATTEMPTS_S)
         else:
@@ -283,7 +287,7 @@ def _attempt_boot(transport: Transport, firmware: bytes) -> None:
     _upload(transport, firmware)
     configure(transport)
     if not is_running(transport):
-        raise _Ended("start", "the firmware was sent, but the Falcon does not answer")
+        raise _Ended("start", "the firmware was sent, but the Falcon does not respond")
 
 
 def _ping(transport: Transport) -> None:
@@ -314,7 +318,7 @@ def _send_autobaud(transport: Transport) -> None:
     came = _Line(transport).until(lambda data: data.endswith(constants.AUTOBAUD), _STEP_S)
     if not came.endswith(constants.AUTOBAUD):
         heard = f"answers with {came[:8].hex(' ')}" if came else "does not answer"
-        raise _Ended("autobaud", f"its boot loader {heard} to the byte that sets the speed")
+        raise _Ended("autobaud", f"after the byte that sets the speed, its boot loader {heard}")
 
 
 def _upload(transport: Transport, firmware: bytes) -> None:
@@ -343,7 +347,7 @@ def _send(transport: Transport, data: bytes, step: str) -> None:
     except UsbFailure as failure:
         if failure.kind != "timeout":
             raise
-        raise _Ended(step, "the bridge does not accept the bytes") from failure
+        raise _Ended(step, "the bridge did not accept the data in time") from failure
 
 
 def _set_line(transport: Transport, divisor: int) -> None:

@@ -84,14 +84,14 @@ def fit(
     """
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
-        raise DeviceError("a calibration needs three numbers per pose (counts, force and motor units)")
+        raise DeviceError("a calibration needs three encoder counts, force components and motor values for each pose")
     if len(counts) < _LEAST_POSES:
         raise DeviceError(
-            f"a calibration needs {_LEAST_POSES} poses or more, not {len(counts)}: measure at more places"
+            f"a calibration needs at least {_LEAST_POSES} poses, not {len(counts)}: measure at more positions"
         )
     if np.ptp(pulled_n, axis=0).max() < 0.5:
         raise DeviceError(
-            "a calibration needs two weights half a newton apart (one may be zero): also hang another weight"
+            "a calibration needs two weights at least 0.5 N apart (one may be zero): also measure another weight"
         )
     offset_rad = 0.0
     for _ in range(_STEPS):
@@ -106,9 +106,9 @@ def fit(
     gain = 1.0 / share if share else math.inf
     if not _GAINS[0] <= gain <= _GAINS[1] or abs(offset_rad) >= _OFFSETS_RAD:
         raise DeviceError(
-            f"these weights would mean {gain:.0f} motor units per newton metre and arms {math.degrees(offset_rad):.1f} "
-            f"degrees off; {_GAINS[0]:.0f} to {_GAINS[1]:.0f} and less than 15 degrees are possible: check the "
-            "weights, and that nothing touches the grip"
+            f"these weights imply {gain:.0f} motor units per newton metre and an arm offset of "
+            f"{math.degrees(offset_rad):.1f} degrees; only {_GAINS[0]:.0f} to {_GAINS[1]:.0f} units and less than 15 "
+            "degrees are plausible: check the weights, and make sure that nothing touches the grip"
         )
     residual_n = math.sqrt(float(left @ left) / len(counts))
     day = (measured or date.today()).isoformat()
@@ -141,7 +141,8 @@ def _solve(geometry: mechanics.Geometry, offset_rad: float, counts: Any, pulled_
         place_m[:] = mechanics.START_M
         if mechanics.forward(mechanism, theta, place_m) != mechanics.REACHED:
             raise DeviceError(
-                f"pose {row + 1}: encoders {count.astype(int).tolist()} are not a possible pose of {geometry.name!r}"
+                f"pose {row + 1}: the geometry {geometry.name!r} cannot reach the encoder counts "
+                f"{count.astype(int).tolist()}"
             )
         mechanics.jacobian(mechanism, theta, place_m, rates)
         pushed[row] = -rates.T @ held[row]
@@ -173,8 +174,8 @@ def save_calibration(serial: str, calibration: Calibration) -> Path:
         fresh.replace(file)
     except OSError as error:
         raise DeviceError(
-            f"the calibration cannot be stored in {file.parent}: {error.strerror}; set {FOLDER_VARIABLE} to a folder "
-            "that can be written"
+            f"the calibration cannot be saved in {file.parent}: {error.strerror}; set {FOLDER_VARIABLE} to a writable "
+            "folder"
         ) from error
     return file
 
@@ -196,7 +197,7 @@ def load_calibration(serial: str) -> Calibration | None:
 
 
 def _unusable_file(file: Path) -> DeviceError:
-    return DeviceError(f"the Falcon's calibration in {file} cannot be used: delete the file, or calibrate again")
+    return DeviceError(f"the Falcon's calibration in {file} cannot be used: delete the file or calibrate again")
 
 
 PLACES_M: Final = (
@@ -280,7 +281,7 @@ class Grip:
         answer = device.read.ctypes(device.context, self._now_ns, reading)
         if answer == READ_LOST:
             device.check()
-            raise usb_failure(ERROR_NO_DEVICE, "weighing with it")
+            raise usb_failure(ERROR_NO_DEVICE, "weighing")
         if answer == READ_NEW:
             self._blind = 0
             self._update_motion(self._read_m, elapsed_s)
@@ -322,7 +323,8 @@ class Grip:
             if still >= _STILL_TICKS:
                 return
         raise DeviceError(
-            "the grip does not come to rest: let nothing touch it, hang the weight on a short string, and start again"
+            "the grip does not come to rest: make sure that nothing touches it, hang the weight on a short string, "
+            "and start again"
         )
 
     def weigh(self) -> tuple[Any, Any]:
@@ -340,17 +342,20 @@ def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
     """Measure without load at all positions, then with a weight of ``weight_n`` newtons; return the measurements."""
     if not LEAST_N <= weight_n <= MOST_N:
         raise DeviceError(
-            f"a weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g is {weight_n:.2f} N: use a weight of "
-            f"{LEAST_N:g} to {MOST_N:g} N, 110 to 600 g"
+            f"a weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g exerts {weight_n:.2f} N: use a weight that exerts "
+            f"{LEAST_N:g} to {MOST_N:g} N (110 to 600 g)"
         )
     notes: list[tuple[Any, float, Any]] = []
     grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
     notes += _measure_round(grip, 0.0)
     grip.wait(
-        ask("hang", f"Hang the weight of {1000 * weight_n / GRAVITY_MPS2:.0f} g on the grip, and let it hang still.")
+        ask(
+            "hang",
+            f"Hang the {1000 * weight_n / GRAVITY_MPS2:.0f} g weight on the grip, and wait until it hangs still.",
+        )
     )
     notes += _measure_round(grip, weight_n)
-    grip.wait(ask("take-off", "Take the weight off and hold the grip: its motors are turned off now."))
+    grip.wait(ask("take-off", "Take off the weight and hold the grip: its motors will now be turned off."))
     return _as_notes(notes)
 
 
@@ -374,14 +379,14 @@ def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
         counts, units = grip.weigh()
         notes.append((counts, 0.0, units))
         request = (
-            f"Place {number} of {len(PLACES_M)}: pull straight down with the scale until it shows 200 to 500 g, and "
-            "hold it there"
+            f"Position {number} of {len(PLACES_M)}: pull straight down with the scale until it shows 200 to 500 g, and "
+            "keep it there"
         )
         grip.wait(ask("pull", request))
         counts, units = grip.weigh()
         notes.append((counts, _read_scale(grip, ask), units))
-        grip.wait(ask("let-go", "Take the scale off, and let go."))
-    grip.wait(ask("take-off", "Hold the grip: its motors are turned off now."))
+        grip.wait(ask("let-go", "Take off the scale and let go."))
+    grip.wait(ask("take-off", "Hold the grip: its motors will now be turned off."))
     return _as_notes(notes)
 
 
@@ -396,7 +401,7 @@ def _read_scale(grip: Grip, ask: Ask) -> float:
             load_n = -1.0
         if 0.0 < load_n <= MOST_N:
             return load_n
-        question = f"'{reading}' is not a reading of the scale in grams, above 0 and up to 600. What did it show?"
+        question = f"'{reading}' is not a number of grams above 0 and up to 600. What did the scale show?"
 
 
 def _as_notes(notes: list[tuple[Any, float, Any]]) -> Notes:

@@ -25,7 +25,7 @@ from study_app.haptics.model.layout import new_command, new_reading
 PATIENCE_S: Final = 120.0
 _ADVICES: Final = 6  # number of advice lines in that time
 _MOVED: Final = 60  # counts of an arm that show motion of the grip: two degrees
-STROKES: Final = "Homing (red light): pull the grip of the Falcon all the way out, then push it all the way in."
+STROKES: Final = "Homing (red light): pull the Falcon's grip all the way out, then push it all the way in."
 PULL_OUT: Final = "Homed (blue light): now pull the grip all the way out once more."
 READY: Final = "The Falcon is ready (green light)."
 _FARTHEST = 1700  # counts, slightly more than are used in practice
@@ -147,7 +147,7 @@ class FalconDevice(FramedDevice):
             f"opened, serial number {serial}" if serial else "opened",
             f"program: {facts['firmware']}",
             f"round trip {min(facts['round_trip_ms'].values()):.2f} ms; event character "
-            f"{'kept' if facts['event_character'] else 'of no use'}",
+            f"{'kept' if facts['event_character'] else 'not used'}",
             f"calibration: {used['measured'] if isinstance(used, dict) else 'none'}",
             f"incomplete replies: {self._broken_share:.2%}",
         )
@@ -183,7 +183,7 @@ class FalconDevice(FramedDevice):
                     for size in (self.workspace_m, mechanics.WORKSPACE_M)
                 )
                 raise DeviceError(
-                    f"a workspace of {asked} mm exceeds the reach of a Falcon, about {known} mm: reduce the "
+                    f"a workspace of {asked} mm exceeds a Falcon's reach (about {known} mm): reduce the "
                     f"protocol's workspace_mm"
                 )
 
@@ -199,7 +199,7 @@ class FalconDevice(FramedDevice):
         except OSError as error:
             raise FAILURES.failure("firmware-file", f"{self._firmware} cannot be read: {error.strerror}") from error
         image = boot.check_firmware(data)
-        unknown = f"SHA-256 {image.sha256[:16]}…, which is not a version known to work"
+        unknown = f"SHA-256 {image.sha256[:16]}…, which is not known to work"
         self._progress(f"Loading the Falcon's firmware, {image.name or unknown}.")
         return boot.boot_falcon(transport, data, progress=self._progress).sha256
 
@@ -243,7 +243,7 @@ class FalconDevice(FramedDevice):
         self.read.ctypes(self.context, now_ns, int(self.reading.ctypes.data))
         self.write.ctypes(self.context, int(self._command.ctypes.data))
         if self.exchange.ended != RUNS:
-            raise usb_failure(ERROR_NO_DEVICE, "homing it")
+            raise usb_failure(ERROR_NO_DEVICE, "homing")
         self.check()
         if self._cancelled is not None and self._cancelled():
             raise DeviceError("homing the Falcon was cancelled")

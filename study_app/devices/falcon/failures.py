@@ -67,7 +67,7 @@ class UsbFailure(DeviceFailure):
         libusb = "" if code is None else f", libusb error {code}"
         tables = FAILURES, failures_on("win32"), failures_on("linux")
         table = next(table for table in tables if mode in {known.id for known in table.modes})
-        super().__init__(mode, str(table.failure(mode, where + libusb)))
+        super().__init__(mode, str(table.failure(mode, f"while {where}{libusb}")))
 
 
 class FalconNotFound(UsbFailure, DeviceNotFound):

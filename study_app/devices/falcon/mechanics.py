@@ -120,7 +120,7 @@ def geometry_named(name: str) -> Geometry:
     """
     if name not in GEOMETRIES:
         known = ", ".join(GEOMETRIES)
-        raise DeviceError(f"the Falcon does not have a geometry {name!r}; choose one of: {known}")
+        raise DeviceError(f"{name!r} is not a known Falcon geometry; choose one of: {known}")
     return GEOMETRIES[name]
 
 

@@ -105,7 +105,7 @@ def end_torque(name: str) -> None:
     transport = open_transport(name)
     try:
         if not send_zero_torque(transport):
-            raise DeviceError("it does not accept packets")
+            raise DeviceError("the device does not accept packets")
     finally:
         transport.close()
 
@@ -164,14 +164,14 @@ class PyUsbTransport(Transport):
                 _claim(device)
             serial = _serial_of(device)
             if self.serial not in {None, serial}:
-                raise FalconNotFound("not-found", f"looking for number {self.serial}")
+                raise FalconNotFound("not-found", f"looking for serial number {self.serial}")
         except UsbFailure:
             usb.util.dispose_resources(device)
             raise
         self._device, self.serial = device, serial
 
     def control(self, request: int, value: int) -> None:
-        with _failures("setting the bridge"):
+        with _failures("configuring the USB bridge"):
             self._open_device().ctrl_transfer(constants.REQUEST_TYPE, request, value, 0, None, _CONTROL_TIMEOUT_MS)
 
     def write(self, data: bytes, timeout_s: float) -> None:
@@ -183,7 +183,7 @@ class PyUsbTransport(Transport):
     def read(self, size: int, timeout_s: float) -> bytes:
         """Return the bytes of one read, b"" at the time-out."""
         if size <= 0 or size % constants.USB_PACKET:
-            raise ValueError(f"a read asks for a multiple of {constants.USB_PACKET} bytes, not {size}")
+            raise ValueError(f"the size of a read must be a multiple of {constants.USB_PACKET} bytes, not {size}")
         try:
             with _failures("receiving"):
                 return bytes(self._open_device().read(constants.ENDPOINT_IN, size, constants.milliseconds(timeout_s)))
@@ -214,7 +214,7 @@ class PyUsbTransport(Transport):
 
     def _open_device(self) -> Any:
         if self._device is None:
-            raise FalconLost("no-device", "using it after it was closed")
+            raise FalconLost("no-device", "using it after it had been closed")
         return self._device
 
 
@@ -357,7 +357,7 @@ class FtdiTransport(Transport):
         raise FalconNotFound("not-found", "looking for it with FTDI's driver")
 
     def control(self, request: int, value: int) -> None:
-        self._check(_SETTERS[request](self._library, self._opened(), value), "setting the bridge")
+        self._check(_SETTERS[request](self._library, self._opened(), value), "configuring the USB bridge")
 
     def write(self, data: bytes, timeout_s: float) -> None:
         handle, sent = self._opened(), ctypes.c_uint32()
@@ -369,7 +369,7 @@ class FtdiTransport(Transport):
     def read(self, size: int, timeout_s: float) -> bytes:
         """Wait for a first byte and return the available bytes as one packet of the bridge; b"" at the time-out."""
         if size <= 0 or size % constants.USB_PACKET:
-            raise ValueError(f"a read asks for a multiple of {constants.USB_PACKET} bytes, not {size}")
+            raise ValueError(f"the size of a read must be a multiple of {constants.USB_PACKET} bytes, not {size}")
         self._set_timeout(milliseconds(timeout_s))
         data = self._receive(min(max(self._waiting(), 1), _DATA_BYTES))
         if len(data) == 1:  # more bytes may have arrived while waiting
@@ -419,12 +419,14 @@ class FtdiTransport(Transport):
 
     def _set_timeout(self, timeout_ms: int) -> None:
         if timeout_ms != self._timeout_ms:
-            self._check(self._library.FT_SetTimeouts(self._opened(), timeout_ms, timeout_ms), "setting the bridge")
+            self._check(
+                self._library.FT_SetTimeouts(self._opened(), timeout_ms, timeout_ms), "configuring the USB bridge"
+            )
             self._timeout_ms = timeout_ms
 
     def _opened(self) -> Any:
         if self._handle is None:
-            raise FalconLost("no-device", "using it after it was closed")
+            raise FalconLost("no-device", "using it after it had been closed")
         return self._handle
 
     @staticmethod
@@ -446,7 +448,7 @@ def load_d2xx() -> Any:
 
 def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     """Return the state of libusb, or another backend of pyusb, on a platform."""
-    can = "force up to 8 N; needs firmware after it was turned on, and homing"
+    can = "force up to 8 N; needs its firmware and homing each time the device is turned on"
     by = f"libusb {_version()}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
     if usb is None:
@@ -458,7 +460,7 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     why = ""
     if None in serials:
         cause = failures_on(platform).mode("driver" if platform == "win32" else "permission").cause
-        why = f"one does not report its serial number; perhaps {cause}: run liquid-study devices doctor"
+        why = f"one of them does not report its serial number, perhaps because {cause}: run liquid-study devices doctor"
     return Backend(
         "falcon", by, state="connected: " + ", ".join(serial or "unnamed" for serial in serials), can=can, why=why
     )
@@ -469,7 +471,7 @@ def probe_ftdi(d2xx: Any = None, platform: str = sys.platform) -> Backend:
     can = "the same device through FTDI's or Novint's driver; used automatically if libusb cannot open the device"
     if platform != "win32":
         return Backend(
-            "falcon", "ftd2xx", state=NOT_AVAILABLE, can=can, why="only for Windows, if drivers block libusb"
+            "falcon", "ftd2xx", state=NOT_AVAILABLE, can=can, why="only on Windows, where drivers may block libusb"
         )
     try:
         load_d2xx() if d2xx is None else d2xx

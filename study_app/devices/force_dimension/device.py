@@ -56,8 +56,8 @@ class ForceDimensionDevice(FramedDevice):
     ) -> None:
         if serial and not serial.isdecimal():
             raise DeviceError(
-                f"'{serial}' is not a serial number of a Force Dimension device: specify digits, as the device's label "
-                "shows them, such as force-dimension:10233"
+                f"'{serial}' is not a Force Dimension serial number: specify the digits on the device's label, such as "
+                "force-dimension:10233"
             )
         super().__init__(new_exchange(force_limit_n), workspace_m, force_limit_n, exchange_functions())
         self._serial, self._path = serial, library
@@ -102,5 +102,5 @@ class ForceDimensionDevice(FramedDevice):
             f"velocity threshold {facts.get('velocity_threshold')}, "
             f"watchdog {'none' if watchdog_s is None else f'{1000 * watchdog_s:.1f} ms'}",
             f"readings rejected by the time guard: {counters['guarded']}",
-            f"forces beyond the capacity of the motors: {counters['saturated']}",
+            f"forces beyond the motors' capacity: {counters['saturated']}",
         )

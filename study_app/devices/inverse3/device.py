@@ -55,7 +55,7 @@ class Inverse3Device(FramedDevice):
         if math.hypot(*workspace_m) > _REACH_M:
             asked = " x ".join(f"{2000 * half:g}" for half in workspace_m)
             raise DeviceError(
-                f"a workspace of {asked} mm exceeds the reach of an Inverse3, a ball of {2000 * _REACH_M:g} mm: "
+                f"a workspace of {asked} mm exceeds an Inverse3's reach (a sphere {2000 * _REACH_M:g} mm in diameter): "
                 f"reduce the protocol's workspace_mm"
             )
         super().__init__(new_exchange("", force_limit_n, 1), workspace_m, force_limit_n, exchange_functions())
@@ -84,7 +84,7 @@ class Inverse3Device(FramedDevice):
         self.exchange.filled = left.size
         self.exchange.handle, self.exchange.send, self.exchange.receive = connection.calls()
         if not facts["service_settings"]["confirmed"] and self._progress is not None:
-            self._progress("The service did not confirm its settings: compare them in Haply Hub.")
+            self._progress("The service did not confirm its settings: check them in Haply Hub.")
         return facts
 
     def _finish(self, connection: service.Link) -> AtClose:
@@ -118,7 +118,8 @@ def address(where: str) -> tuple[str, int, str]:
     host, port = parts[:2]
     if len(parts) > 3 or not host or not port.isdecimal() or not 0 < int(port) < 65536:
         raise DeviceError(
-            f"'{where}' is not an address of the Inverse Service: specify inverse3, inverse3:ID, inverse3:HOST:PORT or "
+            f"'{where}' is not a valid address for the Inverse Service: specify inverse3, inverse3:ID, "
+            "inverse3:HOST:PORT or "
             "inverse3:HOST:PORT:ID, with a port from 1 to 65535"
         )
     return host, int(port), parts[2] if len(parts) == 3 else ""

@@ -93,7 +93,7 @@ def _differing(place: str, value: Any, required: Any) -> list[str]:
             inner = value.get(key) if isinstance(value, Mapping) else None
             paths += _differing(name, inner, wanted)
         return paths
-    return [] if value == required else [f"{place} is {shortened(value)}, and {required!r} is required"]
+    return [] if value == required else [f"{place} is {shortened(value)}, but must be {required!r}"]
 
 
 _ROUND_TRIPS: Final = 50
@@ -148,10 +148,10 @@ class Messages:
     def _receive_more(self, mode: str) -> None:
         """Receive more of a message; one longer than `LONGEST` is the failure of a ``mode``."""
         if len(self._came) >= LONGEST:
-            raise FAILURES.failure(mode, f"more than {LONGEST:,} bytes at once")
+            raise FAILURES.failure(mode, f"a message of more than {LONGEST:,} bytes")
         more = self._link.receive(LONGEST - len(self._came))
         if not more:
-            raise FAILURES.failure("closed", "while it was opened")
+            raise FAILURES.failure("closed", "while it was being opened")
         self._came += more
 
     def send(self, message: Mapping[str, Any]) -> None:
@@ -168,11 +168,11 @@ class Messages:
                 raise FAILURES.failure("protocol")
             opcode, length = (int(value) for value in self._header)
             if length > LONGEST:
-                raise FAILURES.failure("protocol", f"a message of {length:,} bytes, and {LONGEST:,} are permitted")
+                raise FAILURES.failure("protocol", f"a message of {length:,} bytes; at most {LONGEST:,} are permitted")
             if size != INCOMPLETE and len(self._came) >= size + length:
                 text, self._came = self._came[size : size + length], self._came[size + length :]
                 if opcode == CLOSE:
-                    raise FAILURES.failure("closed", "while it was opened")
+                    raise FAILURES.failure("closed", "while it was being opened")
                 if opcode == TEXT:
                     return _object(text)
                 continue
@@ -195,7 +195,7 @@ def _object(text: bytes) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:
         raise FAILURES.failure("not-json", shortened(str(error))) from None
     if not isinstance(message, dict):
-        raise FAILURES.failure("not-json", "it is not an object")
+        raise FAILURES.failure("not-json", "it is not a JSON object")
     return message
 
 
@@ -239,8 +239,9 @@ def _find_device(message: Mapping[str, Any], wanted_id: str = "", *, inventory: 
         if not wanted_id or name == wanted_id:
             if not ID.fullmatch(name):
                 raise DeviceError(
-                    f"the Inverse Service lists a device whose ID {name[:16]!r} has {len(name)} characters; 1 to 64 "
-                    "printable ASCII characters are permitted, no spaces, quotes or backslashes: update this program"
+                    f"the Inverse Service lists a device with the ID {name[:16]!r} ({len(name)} characters); an ID "
+                    "must have "
+                    "1 to 64 printable ASCII characters, without spaces, quotes or backslashes: update this program"
                 )
             config, status = entry.get("config"), entry.get("status", {})
             if inventory and not (isinstance(config, dict) and "filters" in config):

@@ -79,7 +79,7 @@ class SocketLink(io.RawIOBase):
     def _in_time(self) -> Iterator[None]:
         """Limit a call to the remaining time, and convert its errors."""
         left_s = self._until_s - time.perf_counter()
-        late = FAILURES.failure("no-reply", f"not all within {self._within_s:g} s")
+        late = FAILURES.failure("no-reply", f"it did not finish within {self._within_s:g} s")
         if left_s <= 0.0:
             raise late
         try:
@@ -133,7 +133,7 @@ PORTS: Final = (10001, 10000)
 """Ports of HTTP: docs.haply.co 3.5.x, "Device Configuration" uses the first, "Settings Reference" names the second."""
 ID: Final = re.compile(r"[!#-\[\]-~]{1,64}")
 """Permitted ids, which are inserted unescaped: printable ASCII without spaces, quotes and backslashes."""
-_CAN: Final = "force through the Inverse Service 3.5 or later (Haply Hub); not yet tested on hardware"
+_CAN: Final = "force through Inverse Service 3.5 or later (Haply Hub); not yet tested on hardware"
 
 
 def probe(host: str = "127.0.0.1", ports: tuple[int, ...] = PORTS) -> Backend:
@@ -173,7 +173,7 @@ def check_force_scale(answer: Any) -> float:
         where = f"within {ANSWER_S:g} s" if answer is None else f"in {shortened(answer)}"
         raise FAILURES.failure("unknown-scale", f"no number {where}")
     if scale != 1:
-        raise FAILURES.failure("settings", f"devices/force_scale is {shortened(scale)}, and 1 is required")
+        raise FAILURES.failure("settings", f"devices/force_scale is {shortened(scale)}, but must be 1")
     return 1.0
 
 

@@ -119,15 +119,15 @@ _UDEV_RULES: Final = (
     'KERNEL=="hidraw*", KERNELS=="*:046D:C62[5679B].*", TAG+="uaccess"',
 )
 _CANNOT_OPEN: Final = {
-    "linux": "this account may not open it: put "
+    "linux": "this account does not have permission to open it: put "
     + " and ".join(f"'{rule}'" for rule in _UDEV_RULES)
-    + " into /etc/udev/rules.d/60-spacemouse.rules, run 'sudo udevadm control --reload' and plug it in again",
+    + " into /etc/udev/rules.d/60-spacemouse.rules, run 'sudo udevadm control --reload', then plug it in again",
     "darwin": "3Dconnexion's helper may be using it: quit 3DconnexionHelper (Activity Monitor), or remove 3DxWare",
-    "win32": "another program uses it: close that program and 3DxWare",
+    "win32": "another program is using it: close that program and 3DxWare",
 }
 _NO_MOTION_INTERFACE: Final = (
-    "is connected, but does not have an interface that reports motion (usage page 1, usage 8): switch the "
-    "mouse itself on and pair it, or use its cable"
+    "is connected, but does not have an interface that reports motion (usage page 1, usage 8): switch on "
+    "the mouse itself and pair it, or use its cable"
 )
 
 
@@ -140,7 +140,9 @@ def load_hid() -> Any:
             return import_module(name)
         except (ImportError, OSError) as error:
             reason = str(error)
-    raise DeviceError(f"a SpaceMouse needs the package hidapi, which cannot be loaded ({reason}): pip install hidapi")
+    raise DeviceError(
+        f"a SpaceMouse needs the package hidapi, which cannot be loaded ({reason}): run 'pip install hidapi'"
+    )
 
 
 def find_space_mice(hid: Any) -> list[tuple[Model, dict[str, Any]]]:
@@ -156,7 +158,7 @@ def choose_interface(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Mo
     """Return the first interface that reports motion; an interface without usage information counts as such."""
     if not interfaces:
         raise DeviceNotFound(
-            "no SpaceMouse is connected: connect it, or turn it on; known models are "
+            "no SpaceMouse is connected: connect one or turn it on; the known models are "
             + ", ".join(m.name for m in MODELS)
         )
     usages = [(interface.get("usage_page") or 0, interface.get("usage") or 0) for _, interface in interfaces]

@@ -107,7 +107,7 @@ class ServedTransport:
         self._ask("note_claim")
 
     def control(self, request: int, value: int) -> None:
-        _check(self._ask("control", request, value), "setting the bridge")
+        _check(self._ask("control", request, value), "configuring the USB bridge")
 
     def write(self, data: bytes, timeout_s: float) -> None:
         _check(self._ask("write", data, milliseconds(timeout_s))[0], "sending")
@@ -137,7 +137,7 @@ class ServedTransport:
 
     def _ask(self, *request: Any) -> Any:
         if self._connection is None:
-            raise FalconLost("no-device", "using it after it was closed")
+            raise FalconLost("no-device", "using it after it had been closed")
         try:
             self._connection.send(request)
             return self._connection.recv()
@@ -166,6 +166,6 @@ def end_torque(path: str) -> None:
     transport = ServedTransport(path)
     try:
         if not send_zero_torque(transport):
-            raise DeviceError("it does not accept packets")
+            raise DeviceError("the device does not accept packets")
     finally:
         transport.close()

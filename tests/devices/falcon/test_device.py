@@ -87,14 +87,14 @@ class TestOpening:
             assert "secret" not in described
         loading = [line for line in told if line.startswith("Loading")]
         assert len(loading) == 2
-        assert f"SHA-256 {digest[:16]}…, which is not a version known to work" in loading[0]
+        assert f"SHA-256 {digest[:16]}…, which is not known to work" in loading[0]
         assert loading[1] == "Loading the Falcon's firmware, nvent_firmware.bin."
 
     def test_a_workspace_beyond_its_reach_is_refused(self):
         with pytest.raises(
             DeviceError,
             match=(
-                r"200 x 60 x 60 mm exceeds the reach of a Falcon, about 100 x 60 x 60 "
+                r"200 x 60 x 60 mm exceeds a Falcon's reach \(about 100 x 60 x 60 "
                 r"mm"
             ),
         ):

@@ -195,7 +195,7 @@ def test_a_falcon_that_has_gone_is_told_of(tmp_path, monkeypatch, capsys):
         assert watch_program("falcon", ENDS_TORQUE, str(tmp_path / "none")) == 2
     said = capsys.readouterr()
     assert said.out == "ready\n"
-    assert said.err.startswith("the device 'falcon' may still push: ")
+    assert said.err.startswith("the device 'falcon' may still exert force: ")
     assert said.err.endswith("; turn it off\n")
 
 

@@ -82,7 +82,7 @@ class TestOpening:
 
     def test_settings_that_differ_are_named_with_their_value(self, service: Service) -> None:
         service.config["torque_scaling"]["enabled"] = False
-        with pytest.raises(DeviceError, match=r"torque_scaling\.enabled is False, and True is required"):
+        with pytest.raises(DeviceError, match=r"torque_scaling\.enabled is False, but must be True"):
             EmulatedInverse3(service=service).open()
 
     def test_a_service_that_does_not_confirm_is_used_and_the_receipt_says_so(
@@ -92,7 +92,7 @@ class TestOpening:
         lines: list[str] = []
         with EmulatedInverse3(progress=lines.append) as device:
             assert device.describe()["service_settings"]["confirmed"] is False
-        assert lines == ["The service did not confirm its settings: compare them in Haply Hub."]
+        assert lines == ["The service did not confirm its settings: check them in Haply Hub."]
 
     @pytest.mark.parametrize("device_id", ["A" * 65, "A" * 4000, "", 'A"B', "A\\B", "A B", "é1"])
     def test_an_id_that_does_not_fit_into_a_command_is_refused_in_a_line(
@@ -101,7 +101,7 @@ class TestOpening:
         message = service.inventory()
         message["inverse3"][0]["device_id"] = device_id
         monkeypatch.setattr(service, "inventory", lambda: message)
-        words = rf"ID .* has {len(device_id)} characters; 1 to 64 .* permitted"
+        words = rf"ID .* \({len(device_id)} characters\); an ID must have 1 to 64 "
         with pytest.raises(DeviceError, match=words) as refused:
             EmulatedInverse3(service=service).open()
         assert "\n" not in str(refused.value)

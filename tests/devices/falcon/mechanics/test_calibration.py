@@ -51,7 +51,7 @@ class TestFit:
         no_pose = counts.copy()
         no_pose[2] = 9000
         for given, words in (
-            ((counts[:4], forces_n[:4], units[:4]), "5 poses or more, not 4"),
+            ((counts[:4], forces_n[:4], units[:4]), "at least 5 poses, not 4"),
             (weighed(6616.0, 0.0, 1.0, weights_n=(4.9,) * 5), "two weights"),
             ((counts, forces_n * 10, units), "check the weights"),
             ((no_pose, forces_n, units), "pose 3"),

@@ -24,7 +24,7 @@ FAILURES = FailureTable(
         FailureMode(
             id="rate",
             tested="it keeps up with 1 kHz",
-            symptom="it gives fewer than 900 new positions per second",
+            symptom="it delivers fewer than 900 new positions per second",
             cause="the computer is too slow",
             cure="close other programs",
             known_by="new positions per second while it runs",
