@@ -178,7 +178,7 @@ def test_the_estimator_of_a_scene_file_is_kalman_unless_it_states_one(tmp_path: 
 @pytest.mark.parametrize("kind", ["line", "foaw", "lead"])
 def test_an_estimator_that_left_is_refused_with_its_place_and_what_to_write(tmp_path: Path, kind: str) -> None:
     liquid = f'[scene]\nvelocity = {{ kind = "{kind}" }}\n[liquids.water]\ndensity_kg_m3 = 1000\n'
-    with pytest.raises(ProtocolError, match=f'"{kind}" was removed from the program') as refused:
+    with pytest.raises(ProtocolError, match=f'"{kind}" has been removed from the program') as refused:
         load_scene(written(tmp_path / "water.toml", f"format = 2\n{liquid}"), "water")
     (problem,) = refused.value.problems
     assert (problem.place, problem.line, problem.hint) == ("scene.velocity.kind", 3, 'write "ewma", "kalman" or "raw"')

@@ -116,7 +116,7 @@ def new_handle(
 ) -> Any:
     """Return the record of a handle that is held, at rest in the middle of its workspace."""
     if not 0 <= delay <= MOST_DELAY:
-        raise StudyError(f"a handle's delay is 0 to {MOST_DELAY} ticks, not {delay}")
+        raise StudyError(f"a handle's delay must be from 0 to {MOST_DELAY} ticks, not {delay}")
     handle = records(HANDLE, 1)
     handle.held = 1
     handle.hand_kg = hand_kg

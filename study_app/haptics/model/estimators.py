@@ -70,7 +70,10 @@ class Withdrawn(Frozen):
     @property
     def refusal(self) -> tuple[str, str]:
         """The reason why no force is computed, and the remedy."""
-        return f'the velocity estimator "{self.kind}" was removed from the program', 'write "ewma", "kalman" or "raw"'
+        return (
+            f'the velocity estimator "{self.kind}" has been removed from the program',
+            'write "ewma", "kalman" or "raw"',
+        )
 
 
 class DeviceVelocity(Frozen):

@@ -265,7 +265,9 @@ def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, floa
         for names, why in (effect.bars(Extremes(scene, liquid)),)
         for name in names
     }
-    return barred | dict.fromkeys(_NEVER_BY_ITSELF, "not determined by density and viscosity: list it to use it")
+    return barred | dict.fromkeys(
+        _NEVER_BY_ITSELF, "not determined by density and viscosity: list it in effects to use it"
+    )
 
 
 def _named_verdicts(liquid: Liquid, bound_of: Mapping[Effect, float]) -> dict[Effect, tuple[bool, str]]:
@@ -291,7 +293,8 @@ def _chosen_verdicts(
             left_out_n = with_it_n
             judged[effect] = False, _omission_reason(bound_of[effect], left_out_n, budget_n)
         else:
-            judged[effect] = True, f"omitting it would remove {with_it_n:.3g} N, more than {budget_n:.3g} N"
+            judged[effect] = True, f"omitting it would raise the omitted force to {with_it_n:.3g} N, above the "
+            f"limit of {budget_n:.3g} N"
     for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:
         carrier = next(it for it in NAMED[name].through if it not in barred)
         if not judged[carrier][0]:
@@ -309,7 +312,7 @@ def _chosen_verdicts(
 def _omission_reason(bound_n: float, left_out_n: float, budget_n: float) -> str:
     if bound_n == 0.0:
         return "does nothing here"
-    return f"{left_out_n:.3g} N omitted in total, within {budget_n:.3g} N"
+    return f"{left_out_n:.3g} N omitted in total, within the {budget_n:.3g} N allowed"
 
 
 def _tables(scene: Scene, liquid: Liquid) -> dict[Effect, tuple[Any, str]]:
@@ -329,7 +332,7 @@ def _heading(scene: Scene, liquid: Liquid) -> str:
     box = f"up to {motion.speed_mps:g} m/s and {motion.acceleration_mps2:g} m/s² in the scene"
     if motion.depth_m is not None:
         least, greatest = (f"{depth_m:g}".replace("-", "−") for depth_m in motion.depth_m)
-        box += f", centre {least} to {greatest} m deep"
+        box += f", ball centre {least} to {greatest} m deep"
     how = "effects chosen" if liquid.effects == "auto" else "effects named"
     return f"{liquid.id}: {how}; {box}"
 

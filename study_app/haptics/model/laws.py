@@ -105,7 +105,13 @@ _INDICES: Final = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _SHAPES: Final = (1.354, 1.413, 1.458, 1.442, 1.420, 1.382, 1.320, 1.240, 1.140, 1.0)
 
 _StressPa: TypeAlias = Annotated[
-    float, within(0, 5000, "materials with more are solids; toothpaste has 50 to 200 Pa", what="Yield stress τ_y [Pa].")
+    float,
+    within(
+        0,
+        5000,
+        "materials with a higher yield stress are solids; toothpaste has 50 to 200 Pa",
+        what="Yield stress τ_y [Pa].",
+    ),
 ]
 _ConsistencyPaSn: TypeAlias = Annotated[
     float, within(1e-4, 1e5, "water has 0.001 Pa·s, ketchup 10 Pa·sⁿ", what="Consistency K [Pa·sⁿ].")
@@ -120,7 +126,7 @@ _FlowIndex: TypeAlias = Annotated[
     ),
 ]
 _TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "below this a liquid is Newtonian; above this it is a solid")]
-_ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at 0.1 to 100 per second")]
+_ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at rates of 0.1 to 100 per second")]
 
 
 class HerschelBulkley(Frozen):
@@ -137,7 +143,7 @@ class Carreau(Frozen):
 
     kind: Literal["carreau"] = "carreau"
     zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η₀ at low shear rates [Pa·s].")
-    time_constant_s: _TimeS = Field(description="Time constant λ: shear thinning begins at the rate 1/λ [s].")
+    time_constant_s: _TimeS = Field(description="Time constant λ [s]; shear thinning begins at the rate 1/λ.")
     flow_index: _FlowIndex
 
 

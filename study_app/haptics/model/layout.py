@@ -58,7 +58,7 @@ LIMITERS: Final = (
     _Limiter(
         bit=LIMITER_SLOPE, name="slope", label="Slope", meaning="the slope limit reduced the change of force with speed"
     ),
-    _Limiter(bit=LIMITER_NORM, name="norm", label="Force", meaning="the force was cut to the force limit"),
+    _Limiter(bit=LIMITER_NORM, name="norm", label="Force", meaning="the force was reduced to the force limit"),
     _Limiter(
         bit=LIMITER_ENERGY,
         name="energy",
@@ -83,14 +83,15 @@ LIMITERS: Final = (
         name="estimator",
         label="Velocity filter",
         meaning=(
-            "EWMA estimated the velocity because the Kalman filter's innovations were too large or the delay changed"
+            "the velocity was estimated by EWMA because the Kalman filter's innovations were too large or the delay "
+            "changed"
         ),
     ),
     _Limiter(
         bit=LIMITER_SATURATED,
         name="saturated",
         label="Saturated motors",
-        meaning="the device's motors saturated: its force was between zero and the recorded force",
+        meaning="the device's motors saturated, so its force was between zero and the recorded force",
     ),
 )
 """Every limiter, in the order in which windows show them."""
@@ -174,7 +175,9 @@ _CODE: Final = partial(SampleField, stored=np.int32)
 
 SAMPLE_FIELDS: Final = (
     SampleField(
-        "tick", "Tick number, counted from the start of the servo; missing numbers are lost samples.", stream="tick"
+        "tick",
+        "Tick number, counted from the start of the servo; missing numbers indicate lost samples.",
+        stream="tick",
     ),
     SampleField("time_ns", "Time at which the device was read, on the servo's clock.", unit="ns"),
     SampleField(
@@ -196,33 +199,33 @@ SAMPLE_FIELDS: Final = (
     ),  # device, hand frame
     _SPEED(
         "velocity_mps",
-        "Velocity in the scene from which the force was computed; resolution 1/4096 m/s, *.",
+        "Velocity in the scene from which the force was computed (resolution: 1/4096 m/s), *.",
         column="velocity_*_mps",
         stream="velocity_*",
     ),  # after estimator and compression
     _SPEED(
-        "wake_mps", "Velocity of the liquid's wake in the scene; resolution 1/4096 m/s, *.", column="wake_*_mps"
+        "wake_mps", "Velocity of the liquid's wake in the scene (resolution: 1/4096 m/s), *.", column="wake_*_mps"
     ),  # as used by this tick's drag
     _FORCE(
         "device_force_n",
-        "Force that the device applied to the hand; resolution 1/16384 N, *.",
+        "Force that the device applied to the hand (resolution: 1/16384 N), *.",
         column="device_force_*_n",
         stream="force_*",
     ),
     _FORCE(
         "command_n",
-        "Force that the servo commanded and the device did not apply, *.",
+        "Force that the servo commanded but the device did not apply, *.",
         column="undelivered_*_n",
         beside="device_force_n",
         since=2,
     ),
     _FORCE(
         "force_n",
-        "Force of the liquid that was held back, *; the force of the liquid is device_force + withheld.",
+        "Part of the liquid's force that was held back, *; the liquid's force is device_force + withheld.",
         column="withheld_*_n",
         beside="device_force_n",
     ),  # sum of the effects on the body, before slope limit and safety
-    _CODE("buttons", "Pressed buttons of the device, as bits."),  # button 1 is bit 0
+    _CODE("buttons", "Device buttons that were pressed, as bits."),  # button 1 is bit 0
     _CODE("limiters", "Limiters that acted, as bits in the order of the trial's limiter columns.", stream="limiters"),
     _CODE(
         "delay_ticks",
@@ -232,7 +235,7 @@ SAMPLE_FIELDS: Final = (
         since=2,
         before=ASSUMED_TICKS,
     ),  # in writes
-    _CODE("scene", "Number of the presented scene; 0 without a scene.", minimum=0),
+    _CODE("scene", "Number of the scene presented; 0 if there is none.", minimum=0),
     _CODE(
         "status",
         "State of the servo.",
@@ -245,14 +248,14 @@ SAMPLE_FIELDS: Final = (
     ),
     _CODE(
         "measured",
-        "What the device measured itself, as bits: 1 velocity, 2 orientation, 4 gripper, 8 time.",
+        "Quantities that the device itself measured, as bits: 1 velocity, 2 orientation, 4 gripper, 8 time.",
         minimum=0,
         maximum=15,
         since=3,
     ),
     _VECTOR(
         "device_velocity_mps",
-        "Velocity of the hand, as the device measured it (NaN if not measured), *.",
+        "Velocity of the hand as measured by the device (NaN if not measured), *.",
         column="device_velocity_*_mps",
         unit="m/s",
         stored=np.float64,
@@ -261,7 +264,7 @@ SAMPLE_FIELDS: Final = (
     ),
     _VECTOR(
         "orientation",
-        "Orientation of the handle in the hand frame: * of a unit quaternion; NaN if not measured.",
+        "Orientation of the handle in the hand frame: component * of a unit quaternion; NaN if not measured.",
         column="orientation_*",
         parts=_QUATERNION,
         measured=MEASURED_ORIENTATION,
@@ -269,7 +272,7 @@ SAMPLE_FIELDS: Final = (
     ),
     SampleField(
         "gripper_m",
-        "Opening of the gripper; NaN if not measured.",
+        "Gripper opening; NaN if not measured.",
         kind=np.float64,
         unit="m",
         stored=np.float32,

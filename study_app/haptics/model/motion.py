@@ -51,7 +51,7 @@ class Motion:
                 f"a motion consists of times (n,), positions (n, 3) and optionally velocities (n, 3), not {shapes}"
             )
         if not all(np.isfinite(values).all() for values in (self.t_s, *vectors)):
-            raise StudyError("a motion contains only finite numbers")
+            raise StudyError("a motion must contain only finite numbers")
         if not (np.diff(self.t_s) > 0).all():
             raise StudyError(f"time must increase, but does not at row {int(np.argmin(np.diff(self.t_s) > 0)) + 2}")
 
@@ -124,7 +124,7 @@ def _numbers(path: Path, lines: tuple[Line, ...], columns: int) -> Floats:
                 problems.append(Problem(f"row {number}", message, line=line))
     if len(problems) > _MOST_PROBLEMS:
         more = len(problems) - _MOST_PROBLEMS
-        problems = [*problems[:_MOST_PROBLEMS], Problem("rows", f"{more} more such errors")]
+        problems = [*problems[:_MOST_PROBLEMS], Problem("rows", f"and {more} more errors like these")]
     if problems:
         raise ProtocolError(str(path), tuple(problems))
     return np.array(rows)
@@ -145,7 +145,7 @@ def programmed_motion(name: str, *, rate_hz: float = 1000.0, **parameters: float
     if name not in _PATHS:
         near = difflib.get_close_matches(name, NAMES, n=1)
         meant = f"did you mean {near[0]!r}? " if near else ""
-        raise StudyError(f"unknown path {name!r}: {meant}there are {', '.join(NAMES)}")
+        raise StudyError(f"unknown path {name!r}: {meant}the known paths are {', '.join(NAMES)}")
     return _PATHS[name](rate_hz, **parameters)
 
 

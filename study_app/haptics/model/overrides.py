@@ -64,7 +64,7 @@ def value_of(scene: Scene, name: str) -> float:
     table, field = _places(_tables(_tree(scene)), name)[0]
     value = table[field]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise StudyError(f"{_shown(name)} is not a number: it is {_shown(value)}")
+        raise StudyError(f"{_shown(name)} is not a number, but {_shown(value)}")
     return float(value)
 
 
@@ -123,7 +123,9 @@ def _places(tables: Tables, name: str) -> list[tuple[dict[str, Any], str]]:
     known = sorted(leaves - _FIXED - {"kind"} - tables.keys())
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
-    raise StudyError(f"this scene does not have the parameter {_shown(name)!r}: {meant}it has {', '.join(known)}")
+    raise StudyError(
+        f"this scene does not have the parameter {_shown(name)!r}: {meant}its parameters are {', '.join(known)}"
+    )
 
 
 def _set_field(table: dict[str, Any], field: str, value: object) -> None:

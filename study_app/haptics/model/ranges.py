@@ -42,7 +42,9 @@ DensityKgM3: TypeAlias = Annotated[
 ViscosityPaS: TypeAlias = Annotated[
     float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100", what="Dynamic viscosity [Pa·s].")
 ]
-DiameterM: TypeAlias = Annotated[float, within(1e-3, 1, "a hand moves the ball", 0.068, "Diameter of the ball [m].")]
+DiameterM: TypeAlias = Annotated[
+    float, within(1e-3, 1, "the ball is moved by hand", 0.068, "Diameter of the ball [m].")
+]
 DragCoefficient: TypeAlias = Annotated[
     float,
     within(0, 10, "a wing has 0.04, a sphere 0.47, a plate 1.2", 0.47, "Drag coefficient in the constant drag law."),
@@ -52,7 +54,7 @@ Alpha: TypeAlias = Annotated[
     within(
         0.001,
         1,
-        "at 0.001 the velocity lags the hand by 1 s; 1 does not smooth",
+        "at 0.001 the velocity lags 1 s behind the hand; at 1 it is not smoothed",
         what="Weight of the newest difference at 1 kHz.",
     ),
 ]
@@ -72,16 +74,19 @@ Decay: TypeAlias = Annotated[
 Exponent: TypeAlias = Annotated[
     float,
     within(
-        0.05, 10, ("outside this range a wake is full at once or never begins"), what="Response exponent y of the wake."
+        0.05,
+        10,
+        ("outside this range a wake is complete at once or never begins"),
+        what="Response exponent y of the wake.",
     ),
 ]
-Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand keeps moving within a second")]
+Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand's motion changes within a second")]
 TailLength: TypeAlias = Annotated[
     int,
     within(
         1,
         100_000,
-        "elements, one per millisecond: at most 100 s",
+        "one element per millisecond, so at most 100 s",
         what="Number N of velocities that the wake stores, one per millisecond.",
     ),
 ]
@@ -90,7 +95,7 @@ TailScaling: TypeAlias = Annotated[
     within(
         1,
         1e9,
-        "elements; at least as many as the length",
-        what=("Divisor S of the sum of stored velocities, at least N."),
+        "at least as many elements as the length",
+        what=("Divisor S for the sum of the stored velocities, at least N."),
     ),
 ]

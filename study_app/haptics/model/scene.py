@@ -55,7 +55,7 @@ class Box(Frozen):
 
     kind: Literal["box"] = "box"
     centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="Centre of the box [m].")
-    size_m: tuple[Extent, Extent, Extent] = Field(description="Full sizes along x, y, z [m].")
+    size_m: tuple[Extent, Extent, Extent] = Field(description="Full size along x, y and z [m].")
 
 
 class Cylinder(Frozen):
@@ -68,7 +68,7 @@ class Cylinder(Frozen):
 
 
 Region: TypeAlias = Annotated[
-    Everywhere | Box | Cylinder, Field(discriminator="kind", description="Where the liquid is, in the scene.")
+    Everywhere | Box | Cylinder, Field(discriminator="kind", description="Location of the liquid in the scene.")
 ]
 
 
@@ -80,7 +80,7 @@ class _Liquid(Frozen):
     viscosity_pa_s: ViscosityPaS | None = None
     region: Region = Everywhere()
     effects: Effects = Field(
-        default=("drag",), description='Its effects; "auto" selects them by their size (scene.accuracy).'
+        default=("drag",), description='The liquid\'s effects; "auto" selects them by their size (scene.accuracy).'
     )
 
     @model_validator(mode="after")
@@ -115,9 +115,9 @@ class _Liquid(Frozen):
                 raise ValueError(problem)
 
 
-_DOC = """A region with a fluid, and the effects it calls for; ``"auto"`` lets ``haptics.model.gate`` choose them.
+_DOC = """A region with a fluid, and its effects; ``"auto"`` lets ``haptics.model.gate`` choose them.
 
-    The table of an effect that is not called for may stand; it means nothing.
+    The table of an effect that is not selected is permitted, but it is ignored.
     """
 
 if TYPE_CHECKING:
@@ -173,9 +173,9 @@ __all__ = [
     "Withdrawn",
 ]
 RateHz: TypeAlias = Annotated[
-    float, within(50, 5000, ("a slower servo is never stable; a faster servo cannot finish a tick"))
+    float, within(50, 5000, ("a slower servo is never stable; a faster servo cannot finish its ticks in time"))
 ]
-SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a stroke of 60 mm is then 0.6 mm to 6 m in the scene")]
+SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a 60 mm stroke then covers 0.6 mm to 6 m in the scene")]
 FADE_S = 0.05
 _HAND_SPEED_MPS = 0.3
 _HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
@@ -226,7 +226,7 @@ class ForceLink(Frozen):
 def too_long_delay(rate_hz: float) -> str:
     """Return the error message of a link that does not fit."""
     return (
-        f"delay and jitter of the force must be below {1000 * STORED_FORCES / rate_hz:g} ms together at {rate_hz:g} Hz"
+        f"the force's delay and jitter together must be below {1000 * STORED_FORCES / rate_hz:g} ms at {rate_hz:g} Hz"
     )
 
 
@@ -251,8 +251,8 @@ class Knee(Frozen):
 
     law: Literal["sqrt", "square", "none"] = Field(
         default="sqrt",
-        description="sqrt: above the threshold as √(1 + 2 excess) − 1; square: as the square of the excess; none: "
-        "speeds are not reduced.",
+        description="sqrt: speeds above the threshold grow as √(1 + 2 excess) − 1; square: they grow as the square of "
+        "the excess; none: speeds are not reduced.",
     )
     threshold_mps: Annotated[
         float,
@@ -285,20 +285,23 @@ class MotionBox(Frozen):
     """
 
     speed_mps: Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] | None = Field(
-        default=None, description="Greatest speed [m/s]."
+        default=None, description="Maximum speed [m/s]."
     )
     acceleration_mps2: (
         Annotated[float, within(0.001, 1e5, "a hand accelerates at 0.01 to 100 m/s², times the scale")] | None
-    ) = Field(default=None, description="Greatest acceleration [m/s²].")
+    ) = Field(default=None, description="Maximum acceleration [m/s²].")
     depth_m: tuple[Coordinate, Coordinate] | None = Field(
         default=None,
-        description="Least and greatest depth of the ball's centre below a liquid's top face [m]; negative: above.",
+        description="Minimum and maximum depth of the ball's centre below a liquid's top face [m]; negative if "
+        "above it.",
     )
 
     @model_validator(mode="after")
     def _least_depth_comes_first(self) -> Self:
         if self.depth_m is not None and self.depth_m[0] > self.depth_m[1]:
-            raise ValueError(f"depth_m is the least depth, then the greatest, not {list(self.depth_m)}")
+            raise ValueError(
+                f"depth_m must be the minimum depth followed by the maximum depth, not {list(self.depth_m)}"
+            )
         return self
 
 

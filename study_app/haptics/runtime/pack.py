@@ -176,7 +176,7 @@ def pack_into(model: Model, scene: Scene, *, dynamics: Dynamics = UNKNOWN) -> No
         The scene does not fit, or requires a given velocity, which a device does not have.
     """
     if isinstance(scene.velocity, Given):
-        raise StudyError('velocity "given" is for motions from a file; a device needs an estimator such as "ewma"')
+        raise StudyError('velocity "given" is only for motions from a file; a device needs an estimator such as "ewma"')
     scene = _for_device(scene, dynamics)
     if len(scene.liquids) > len(model.liquids):
         raise StudyError(

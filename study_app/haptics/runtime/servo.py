@@ -20,13 +20,13 @@ from study_app.haptics.runtime.thread import LoopThread
 _ELEMENTS = 10_000
 
 _FAULTS = {
-    STATUS_DEVICE_LOST: "stopped responding or lost its guard; turn it off if it pushes, and reconnect it",
+    STATUS_DEVICE_LOST: "stopped responding or lost its guard process; turn it off if it pushes, and reconnect it",
     STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable",
     STATUS_NON_FINITE: "would have received a non-finite force (NaN or infinite); check the scene's parameters",
 }
 
 
-_STUCK = "or the computer blocked the servo, without a tick for 75 ms; turn the device off if it pushes"
+_STUCK = "or the computer blocked the servo, which has not run a tick for 75 ms; turn the device off if it pushes"
 
 
 class Servo:
@@ -82,7 +82,7 @@ class Servo:
         if not self.loop.clock.runs:
             raise StudyError("a servo on a virtual clock does not run by itself: call advance(ticks)")
         if self.loop.live:
-            raise StudyError("this servo has been started already: stop it first")
+            raise StudyError("this servo has already been started: stop it first")
         self.prepare()
         self.loop.start()
 
@@ -123,7 +123,7 @@ class Servo:
             The servo has stopped itself.
         """
         if not self.may_adjust(scene):
-            raise StudyError("the scene differs from the current scene in more than numbers: load it instead")
+            raise StudyError("the scene differs from the current scene in more than its numbers: load it instead")
         return self._present(scene, goes_on=True)
 
     def may_adjust(self, scene: Scene) -> bool:
@@ -133,14 +133,15 @@ class Servo:
     def _present(self, scene: Scene, *, goes_on: bool) -> int:
         if scene.rate_hz != self.rate_hz:
             raise StudyError(
-                f"the scene is made for {scene.rate_hz:g} Hz but the servo runs at {self.rate_hz:g} Hz: set the same "
+                f"the scene is designed for {scene.rate_hz:g} Hz, but the servo runs at {self.rate_hz:g} Hz: set "
+                "the same "
                 "rate_hz for both"
             )
         needed = elements_needed(scene)
         if needed > self.elements:
             raise StudyError(
-                f"the scene needs {needed} wake elements but the servo has room for {self.elements}: "
-                "make the servo with more elements, or the wake's length shorter"
+                f"the scene needs {needed} wake elements, but the servo has room for {self.elements}: "
+                "create the servo with more elements, or shorten the wake"
             )
         self.check()
         with self._loading:

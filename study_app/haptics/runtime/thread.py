@@ -208,7 +208,8 @@ class LoopThread:
 
     def _silence(self) -> ServoFault:
         return ServoFault(
-            f"the servo is stuck: its device '{self._driver.name}' has not responded for {_PATIENCE_S:g} s; turn it off"
+            f"the servo is stuck: its device '{self._driver.name}' has not responded for {_PATIENCE_S:g} s; turn "
+            "the device off"
         )
 
     def _new_safety(self) -> Any:
@@ -218,8 +219,9 @@ class LoopThread:
         if delay_ticks > MOST_DELAY:
             raise DeviceError(
                 f"the device '{driver.name}' answers {delay_ticks} ticks late at {self._rate_hz:g} Hz, but "
-                f"forces are unstable beyond {MOST_DELAY}: connect it without a hub, close other programs on "
-                "the bus, restart"
+                f"forces are unstable beyond {MOST_DELAY} ticks: connect the device without a hub, close other "
+                "programs "
+                "that use the bus, and restart"
             )
         return new_safety(driver.force_limit_n, delay_ticks)
 

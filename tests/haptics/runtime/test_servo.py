@@ -89,13 +89,13 @@ def test_rest_takes_the_force_to_zero_without_a_step(servo, probe):
 
 
 def test_a_scene_of_another_rate_is_refused_by_name(servo):
-    with pytest.raises(StudyError, match="500 Hz but the servo runs at 1000 Hz"):
+    with pytest.raises(StudyError, match="500 Hz, but the servo runs at 1000 Hz"):
         servo.load(Scene(rate_hz=500))
 
 
 def test_a_wake_longer_than_the_servo_has_room_for_is_refused(probe):
     servo = Servo(probe, clock=VirtualClock(), elements=1699)
-    with pytest.raises(StudyError, match="1700 wake elements but the servo has room for 1699"):
+    with pytest.raises(StudyError, match="1700 wake elements, but the servo has room for 1699"):
         servo.load(WATER)
 
 

@@ -32,7 +32,7 @@ class Channel(Frozen):
     """A horizontal current between two parallel walls, fastest midway between them and zero at the walls."""
 
     kind: Literal["channel"] = "channel"
-    centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="A point on the middle line [m].")
+    centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="A point on the centre line [m].")
     heading_deg: Annotated[
         float,
         within(

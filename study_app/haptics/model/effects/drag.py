@@ -36,8 +36,8 @@ _DampingNspm: TypeAlias = Annotated[
     float,
     within(
         *DAMPING_NSPM,
-        "a hand cannot feel a damper below 0.01 N·s/m, and loops above 200 are never stable",
-        what="Damping b of the linear law [N·s/m].",
+        "people cannot feel damping below 0.01 N·s/m, and no loop is stable above 200",
+        what="Damping b in the linear law [N·s/m].",
     ),
 ]
 
@@ -59,7 +59,7 @@ class Drag(Frozen):
     @model_validator(mode="after")
     def _damping_of_the_linear_law(self) -> Self:
         if (self.law == "linear") != (self.damping_nspm is not None):
-            needs = "belongs to" if self.damping_nspm is not None else "is missing: it is required by"
+            needs = "is used only by" if self.damping_nspm is not None else "is missing: it is required by"
             raise ValueError(f'damping_nspm {needs} the drag law "linear"')
         return self
 
@@ -106,7 +106,7 @@ def _choose(extremes: Extremes) -> tuple[Drag, str]:
         return extremes.liquid.drag, "linear law, as stated in the file"
     law, accuracy = cheapest_law(extremes), extremes.scene.accuracy
     if extremes.liquid.viscosity_pa_s is None:
-        return Drag(law=law), "constant law, because the liquid does not state a viscosity"
+        return Drag(law=law), "constant law, because the liquid's viscosity is not specified"
     if law == REFERENCE:
         return Drag(law=law), f"law {law}"
     return Drag(law=law), f"law {law}, within {100 * accuracy.relative:g} % or {accuracy.absolute_n:g} N of {REFERENCE}"

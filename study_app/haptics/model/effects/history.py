@@ -45,7 +45,7 @@ class History(Frozen):
     ] = 0.05
     smoothing_s: Smoothing | None = Field(
         default=None,
-        description="Time over which velocities are smoothed first [s]; the default depends on the velocity estimator.",
+        description="Time over which velocities are first smoothed [s]; the default depends on the velocity estimator.",
     )
 
 
@@ -130,13 +130,13 @@ EFFECT = Effect(
     fill=_fill,
     rows=(
         Rows(
-            "intervals of histories",
+            "history intervals",
             {"intervals": _INTERVAL},
             lambda liquid, rate_hz: _intervals(liquid.history.window_s, rate_hz),
             lambda rate_hz: _intervals(_LONGEST_WINDOW_S, rate_hz),
         ),
         Rows(
-            "exponentials of histories",
+            "history exponentials",
             {"exponentials": _EXPONENTIAL},
             lambda liquid, rate_hz: EXPONENTIALS,
             lambda rate_hz: EXPONENTIALS,

@@ -27,7 +27,7 @@ class LocalWake(Frozen):
     reach_m: Extent | None = Field(
         default=None,
         description=(
-            "Radius around a point of the wake within which that point acts [m]; default: one diameter of the body."
+            "Radius around a wake point within which that point acts [m]; the default is one diameter of the body."
         ),
     )
     spreading_m2ps: Annotated[
@@ -96,7 +96,7 @@ EFFECT = Effect(
     parameters=_PARAMETERS,
     state=_STATE,
     fill=_fill,
-    rows=(Rows("cells of local wakes", {"cells": _CELL}, lambda liquid, rate_hz: CELLS, lambda rate_hz: CELLS),),
+    rows=(Rows("local-wake cells", {"cells": _CELL}, lambda liquid, rate_hz: CELLS, lambda rate_hz: CELLS),),
     adjustable=False,  # its cells depend on its parameters
     open_values={"reach_m": lambda scene: scene.body.diameter_m},
     start=start_tail,

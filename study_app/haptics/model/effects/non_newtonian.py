@@ -32,7 +32,7 @@ _START: Final[dict[str, dict[str, float]]] = {
     },
 }
 """Initial values in the lab: ketchup, shampoo, slime and cornstarch in water."""
-_NOT_MODELLED: Final = "not modelled: thixotropy, impact, fracture, yielding by unsteady flow"
+_NOT_MODELLED: Final = "not modelled: thixotropy, impact, fracture, and yielding in unsteady flow"
 
 
 def steady_n(scene: Scene, liquid: Liquid, speed_mps: float, steepest_nspm: float = math.inf) -> tuple[float, float]:
@@ -129,7 +129,7 @@ EFFECT = Effect(
     bound_n=_bound_n,
     exerted_n=_exerted_n,
     extent="area",
-    bars=lambda extremes: (_REPLACES, "non-Newtonian drag instead: the liquid has the parameters of a flow curve"),
+    bars=lambda extremes: (_REPLACES, "replaced by non-Newtonian drag, because the liquid has flow curve parameters"),
     note=lambda liquid: f"; {liquid.non_newtonian.kind}, {_NOT_MODELLED}",
     model=laws.Rheology,
     missing='kind = "herschel-bulkley", "carreau", "maxwell" or "shear-thickening", ...',

@@ -40,8 +40,8 @@ def _bars(extremes: Extremes) -> tuple[tuple[str, ...], str]:
     if extremes.reynolds <= _HIGHEST_REYNOLDS:
         return tuple(
             it.name for it in _IN_PLACE_OF
-        ), f"unsteady drag instead: {reynolds}, not over {_HIGHEST_REYNOLDS:g}"
-    return ("unsteady_drag", "history"), f"{reynolds}, over {_HIGHEST_REYNOLDS:g}: no solution of the flow confirms it"
+        ), f"replaced by unsteady drag: {reynolds}, which does not exceed {_HIGHEST_REYNOLDS:g}"
+    return ("unsteady_drag", "history"), f"{reynolds}; above {_HIGHEST_REYNOLDS:g} no flow solution confirms it"
 
 
 def _problem(liquid: Liquid) -> str | None:

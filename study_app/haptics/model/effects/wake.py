@@ -60,7 +60,7 @@ class Wake(Frozen):
             0,
             100,
             "a hand turns within its reach",
-            what="Length of path over which directions are compared [m]; 0: neighbouring elements.",
+            what="Path length over which directions are compared [m]; 0: neighbouring elements.",
         ),
     ] = 0.068
     decay: Decay = 0.999975
@@ -70,11 +70,11 @@ class Wake(Frozen):
             0,
             10,
             "a tail of coarser elements would never move",
-            what="Least motion between two stored elements [m]; 0: every tick is stored.",
+            what="Smallest motion between two stored elements [m]; 0: every tick is stored.",
         ),
     ] = 0.0
     axes: Literal["xz", "xyz"] = Field(
-        default="xz", description="xz: vertical motion does not enter the tail; xyz: it does."
+        default="xz", description="xz: the wake ignores vertical motion; xyz: it includes vertical motion."
     )
 
     @model_validator(mode="after")
@@ -86,8 +86,8 @@ def within_scaling(wake: W) -> W:
     """Return the wake; raise ValueError if it could move faster than the body (N > S)."""
     if wake.length > wake.scaling:
         raise ValueError(
-            f"length {wake.length} exceeds scaling {wake.scaling:g}: the wake would outrun the body; "
-            "lower length or raise scaling"
+            f"length {wake.length} exceeds scaling {wake.scaling:g}, so the wake would outrun the body: "
+            "reduce length or increase scaling"
         )
     return wake
 

@@ -66,7 +66,7 @@ class SystemClock:
     def __init__(self, spin_us: float | None = None) -> None:
         self.spin_us = platform.SPIN_US if spin_us is None else spin_us
         if not 0.0 <= self.spin_us <= _MOST_SPIN_US:
-            raise StudyError(f"a spin lasts 0 to {_MOST_SPIN_US:g} µs before a deadline, not {spin_us:g}")
+            raise StudyError(f"a spin before a deadline must last from 0 to {_MOST_SPIN_US:g} µs, not {spin_us:g}")
         self.memory = platform.open_clock(round(1000 * self.spin_us))
         self.now, self.sleep = _system_functions()
         self.context = int(self.memory.ctypes.data)

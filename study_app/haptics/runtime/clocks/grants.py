@@ -46,8 +46,8 @@ class Grant:
         return "; ".join((f"{self.priority}{memory}", *self.advice))
 
 
-REFUSED = "the system grants no more"
-NOT_ASKED = Grant("normal", "no more was requested")
+REFUSED = "the system does not grant a higher priority"
+NOT_ASKED = Grant("normal", "a higher priority was not requested")
 NO_THREAD = Grant("none", "not in a separate thread")
 
 

@@ -102,7 +102,7 @@ class _Bus:
             return int(struct.unpack_from("<q", answer, 8)[0])
         if kind == b"i":
             return int(struct.unpack_from("<i", answer, 4)[0])
-        raise OSError(f"the real-time service sent {name} in an unknown form")
+        raise OSError(f"the real-time service sent {name} in an unknown format")
 
     def call(
         self, service: str, path: str, interface: str, member: str, signature: str = "", body: bytes = b""
@@ -132,7 +132,7 @@ class _Bus:
             raise OSError("the bus uses big-endian byte order, unlike this machine")
         _, kind, _, _, length, _, fields = struct.unpack("<cBBBIII", head)
         if length + fields > _LONGEST:
-            raise OSError("the reply is not from a bus")
+            raise OSError("the reply does not come from a message bus")
         return kind, self._receive(fields + -fields % 8 + length)[fields + -fields % 8 :]
 
     def _receive(self, count: int) -> bytes:
@@ -175,10 +175,13 @@ _NICE = -15
 _LOCK_ALL = 1 | 2 | 4  # present and future pages, each when it is used: unused pages are not loaded
 
 _RIGHTS = (
-    'for real-time priority write "USER - rtprio 70" and "USER - memlock unlimited", with your user\'s name, into '
+    'for real-time priority, write "USER - rtprio 70" and "USER - memlock unlimited" (USER is your user name) into '
     "/etc/security/limits.d/liquid-study.conf and log in again, or install rtkit"
 )
-MEMORY = 'to lock it write "USER - memlock unlimited" into /etc/security/limits.d/liquid-study.conf and log in again'
+MEMORY = (
+    'to lock the memory, write "USER - memlock unlimited" into /etc/security/limits.d/liquid-study.conf and log in '
+    "again"
+)
 
 
 def open_clock(spin_ns: int) -> Any:
@@ -232,7 +235,7 @@ def raise_priority(*, real_time: bool = True) -> Grant:
             return Grant("real-time", f"SCHED_FIFO {priority}")
     thread = threading.get_native_id()
     with suppress(OSError, ValueError):
-        return Grant("real-time", f"SCHED_RR {make_real_time(thread)}, through the desktop's service")
+        return Grant("real-time", f"SCHED_RR {make_real_time(thread)}, granted by the desktop's real-time service")
     with suppress(OSError):
         os.setpriority(os.PRIO_PROCESS, thread, _NICE)
         return Grant("raised", f"nice {_NICE}", advice=(_RIGHTS,))

@@ -26,7 +26,7 @@ _CONSTRAINT_NS = 500_000
 _PERIOD_NS = 1_000_000
 
 _RIGHTS = "this system grants real-time priority to any program: close other audio and video programs"
-MEMORY = "to lock it raise the limit: ulimit -l unlimited"
+MEMORY = "to lock the memory, raise the limit: ulimit -l unlimited"
 
 
 class _TimebaseInfo(ctypes.Structure):

@@ -40,8 +40,8 @@ _TIME_CRITICAL = 15
 _MMCSS_CRITICAL = 2
 _TIMER_PERIOD_MS = 1
 
-_RIGHTS = "for real-time priority start the service Multimedia Class Scheduler (services.msc: MMCSS)"
-MEMORY = "to lock it close other programs: the working set is too small"
+_RIGHTS = "for real-time priority, start the service Multimedia Class Scheduler (services.msc: MMCSS)"
+MEMORY = "to lock the memory, close other programs: the working set is too small"
 
 
 def open_clock(spin_ns: int) -> Any:

@@ -89,6 +89,6 @@ def test_the_slope_limit_of_a_linear_damper_is_on_its_damping():
 def test_only_the_linear_law_has_a_damping():
     with pytest.raises(ValidationError, match='is missing: it is required by the drag law "linear"'):
         Drag(law="linear")
-    with pytest.raises(ValidationError, match='belongs to the drag law "linear"'):
+    with pytest.raises(ValidationError, match='is used only by the drag law "linear"'):
         Drag(law="constant", damping_nspm=8)
     assert Drag().model_dump() == {"law": "constant"}

@@ -97,10 +97,10 @@ def linux(monkeypatch):
 
 def test_linux_asks_for_less_where_more_is_refused(linux):
     assert str(linux("fifo", "service", "nice")) == "real-time (SCHED_FIFO 60)"
-    assert str(linux("service", "nice")) == "real-time (SCHED_RR 20, through the desktop's service)"
+    assert str(linux("service", "nice")) == "real-time (SCHED_RR 20, granted by the desktop's real-time service)"
     raised, normal = linux("nice"), linux()
     assert raised.priority == "raised (nice -15)"
-    assert normal.priority == "normal (the system grants no more)"
+    assert normal.priority == "normal (the system does not grant a higher priority)"
     for grant in (raised, normal):
         (advice,) = grant.advice
         assert "/etc/security/limits.d/" in advice
