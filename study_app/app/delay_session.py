@@ -137,7 +137,7 @@ def measure_delays(
         No window can be opened here.
     """
     if not LEAST_S <= seconds <= MOST_S:
-        raise StudyError(f"each delay is shown for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
+        raise StudyError(f"each delay must be shown for {LEAST_S:g} to {MOST_S:g} s, not {seconds:g}")
     application_here()
     rates: list[float | None] = [*VIRTUAL_HZ]
     if QGuiApplication.platformName() not in WITHOUT_OPENGL:

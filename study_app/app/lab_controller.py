@@ -57,9 +57,9 @@ def _error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
     wake, force = "no wake" if errors.wake is None else share, "no drag"
     if errors.force_n is not None:
         force = f"< {_SMALLEST_N:g} N" if errors.force_n < _SMALLEST_N else f"{errors.force_n:.3f} N"
-    note = f"of drag and wake; no reference for {without}" if without else "along programmed paths"
+    note = f"for drag and wake; there is no reference for {without}" if without else "along programmed paths"
     return (
-        ErrorRow(measure="Wake, of Σ|e|/S", value=wake, note=note),
+        ErrorRow(measure="Wake, relative to Σ|e|/S", value=wake, note=note),
         ErrorRow(measure="Force, largest", value=force, note=note),
         ErrorRow(
             measure="Lag of the velocity filter", value=f"{1e3 * errors.lag_s:z.1f} ms", note="at constant acceleration"
@@ -277,7 +277,7 @@ _INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
 _INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
 _FRAME_MS: Final = 33
 _APPRAISE_AFTER_MS: Final = 300
-COMPILING: Final = "Compiling the force model (once after each installation or update; about a minute)"
+COMPILING: Final = "Compiling the force model (once after each installation or update; takes about a minute)"
 
 
 class LabController(QObject):
@@ -558,7 +558,7 @@ class LabController(QObject):
 
     def _save_preset(self, path: Path, setting: Setting) -> None:
         if self.bench.blind:
-            self.trouble = "presets cannot be saved during a blind comparison: end it first"
+            self.trouble = "presets cannot be saved during a blind comparison: end the comparison first"
             return
         self._clear_trouble()
         self._saving.save_preset(path, setting)

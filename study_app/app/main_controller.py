@@ -233,7 +233,7 @@ class MainController(QObject):
         place_window(self.window, self.window.screen(), corner=False)
         self.window.show()
         if self.machine.trouble:
-            self.window.show_message("The default settings are used", f"{self.machine.trouble}.")
+            self.window.show_message("The default settings are being used", f"{self.machine.trouble}.")
         elif self._follows_machine and chosen_workspace() is None:
             asked = self.question = WorkspaceDialog(self.window, self.window.theme, offered_workspace().folder)
             asked.accepted.connect(lambda: self._choose_workspace(asked.folder))

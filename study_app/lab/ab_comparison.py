@@ -169,7 +169,7 @@ class Workbench:
 
     def _refuse_blind(self, what: str) -> None:
         if self.blind:
-            raise StudyError(f"settings cannot be {what} during a blind comparison: end it first")
+            raise StudyError(f"settings cannot be {what} during a blind comparison: end the comparison first")
 
 
 def other_side(side: Side) -> Side:

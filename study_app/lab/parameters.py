@@ -48,7 +48,7 @@ _CHOICES: Final = {
         _P(
             "knee.law",
             "Knee law",
-            choices=(("sqrt", "Square root"), ("square", "Square (thesis' words)"), ("none", "None")),
+            choices=(("sqrt", "Square root"), ("square", "Square (thesis wording)"), ("none", "None")),
         ),
     )
 }
@@ -136,7 +136,7 @@ def the_liquid(scene: Scene) -> Liquid:
     if len(scene.liquids) != 1:
         raise StudyError(f"the lab opens one liquid at a time, not {len(scene.liquids)}: choose one")
     if isinstance(scene.velocity, Given):
-        raise StudyError('velocity "given" is for motions from a file: choose an estimator such as "ewma"')
+        raise StudyError('velocity "given" is only for motions from a file: choose an estimator such as "ewma"')
     return scene.liquids[0]
 
 
@@ -263,7 +263,7 @@ def _check_value(it: Parameter, value: Value) -> Value:
         raise StudyError(f"{it.label} must be a number, not {value!r}")
     slack = 1e-9 * (abs(it.least) + abs(it.most))  # rounding of a number in other units
     if not it.least - slack <= value <= it.most + slack:
-        raise StudyError(f"{it.label} must be {it.shown(it.least)} to {it.shown(it.most)}, not {it.shown(value)}")
+        raise StudyError(f"{it.label} must be from {it.shown(it.least)} to {it.shown(it.most)}, not {it.shown(value)}")
     value = min(max(float(value), it.least), it.most)
     return round(value) if it.whole else value
 

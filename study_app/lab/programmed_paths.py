@@ -38,7 +38,7 @@ def programmed_path(name: str, scene: Scene, half_m: _Vector) -> Motion:
         There is no path with this name.
     """
     if name not in TITLES:
-        raise StudyError(f"unknown path {name!r}: there are {', '.join(TITLES)}")
+        raise StudyError(f"unknown path {name!r}: the known paths are {', '.join(TITLES)}")
     x_m, _, z_m = (REACHED * scene.scale * half for half in half_m)
     radius_m = min(RADIUS_M, x_m, z_m)
     sized: dict[str, dict[str, float]] = {

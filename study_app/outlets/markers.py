@@ -173,9 +173,11 @@ class SinkThread:
             since_s = self._since_s  # read once, since the thread may clear it at any time
             taken_s = 0.0 if since_s is None else perf_counter() - since_s
             if taken_s > HANGS_S:
-                self._give_up(f"a marker was not sent in {taken_s:.1f} s (limit {HANGS_S:g} s): {_ADVICE}")
+                self._give_up(
+                    f"a marker had still not been sent after {taken_s:.1f} s (limit {HANGS_S:g} s): {_ADVICE}"
+                )
             elif len(self._waiting) >= ROOM:
-                self._give_up(f"{ROOM:,} markers wait to be sent (limit): {_ADVICE}")
+                self._give_up(f"{ROOM:,} markers, the maximum, are waiting to be sent: {_ADVICE}")
             else:
                 self._waiting.append(marker)
                 self._changed.notify_all()
@@ -200,7 +202,7 @@ class SinkThread:
         try:
             self.sink.close()
         except Exception as error:  # noqa: BLE001
-            self.lost = self.lost or f"it was not closed: {error}"
+            self.lost = self.lost or f"it could not be closed: {error}"
 
     def _give_up(self, reason: str) -> None:
         self.lost = self.lost or reason

@@ -72,7 +72,7 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
     kind = SINKS.get(name)
     if kind is None or not address.isprintable():
         examples = ", ".join(sink.example for sink in SINKS.values())
-        raise OutletError(f"{address!r} is not an address of markers: use one like {examples}")
+        raise OutletError(f"{address!r} is not a marker address: use one such as {examples}")
     return kind.open(place, now_ns)
 
 

@@ -108,7 +108,7 @@ def _system_ioctl() -> _Ioctl:
     try:
         import fcntl  # noqa: PLC0415 - not on Windows
     except ImportError as error:
-        raise OutletError("parallel ports are supported on Linux only: use a serial port") from error
+        raise OutletError("parallel ports are supported only on Linux: use a serial port") from error
     return fcntl.ioctl
 
 

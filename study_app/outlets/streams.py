@@ -190,7 +190,9 @@ class SampleStream:
         """Send the samples since the previous call; called in the stream's thread."""
         samples = self._reader.read()
         if self._reader.dropped:
-            self.lost = f"{counted(self._reader.dropped, 'sample')} not sent in time: this computer is too busy"
+            self.lost = (
+                f"{counted(self._reader.dropped, 'sample')} could not be sent in time: this computer is too busy"
+            )
         if len(samples) == 0:
             return
         self.mapping.measure_if_due()

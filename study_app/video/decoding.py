@@ -61,7 +61,7 @@ def open_video(source: str, *, kind: str | None = None, timeout: Any = None, **o
 def failure_reason(error: Exception) -> str:
     """Return the reason why a video cannot be read, as reported by the system or FFmpeg."""
     if type(error).__name__ == "ExitError":  # FFmpeg: "Immediate exit requested", after its time limit
-        return "no data came in time"
+        return "no data arrived in time"
     if isinstance(error, UnicodeError):  # PyAV reads a name in it
         return "the file is damaged"
     return str(getattr(error, "strerror", None) or error or type(error).__name__)

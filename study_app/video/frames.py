@@ -8,7 +8,7 @@ from study_app.errors import VideoError
 
 def stopped_error(why: str) -> VideoError:
     """Return the error about a source that failed in a trial, without its name, which would reveal the condition."""
-    return VideoError(f"a video of the study stopped ({why}): check camera and files")
+    return VideoError(f"one of the study's videos stopped ({why}): check the camera and the files")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -75,7 +75,7 @@ class Camera:
     def __init__(self, source: str, now_ns: Callable[[], int], holds_s: float) -> None:
         self.source = source  # may contain a name and a password: use `without_login` to show or store it
         if not source:
-            raise VideoError("the camera is not set: set it under This machine, such as dshow:video=NAME")
+            raise VideoError("the camera is not set: specify it under This machine, for example as dshow:video=NAME")
         self._now_ns = now_ns
         self._holds_ns = round(holds_s * SECOND_NS) + _SPARE_NS
         self._changed = threading.Condition()
@@ -88,7 +88,7 @@ class Camera:
         self.thread.start()
         with self._changed:
             self._changed.wait_for(lambda: self._frames or self._failure, OPENS_S)
-            failure = self._failure or ("" if self._frames else f"no picture in {OPENS_S:g} s")
+            failure = self._failure or ("" if self._frames else f"no picture arrived within {OPENS_S:g} s")
         if failure:
             self.close()
             raise VideoError(f"the camera {without_login(source)} cannot be used: {failure}")
@@ -125,7 +125,7 @@ class Camera:
         with self._changed:
             failure, held = self._failure, tuple(self._frames)
         if not failure and self._stalls:
-            failure = f"no picture for {STALLS_S:g} s"
+            failure = f"no picture arrived for {STALLS_S:g} s"
         if failure:
             raise stopped_error(failure)
         return next((frame for frame in reversed(held) if frame.due_ns <= moment_ns), None)
@@ -234,13 +234,13 @@ class Footage:
                 stream = container.streams.video[0]
                 self._period_ns = period_ns(stream)
                 if (first := next(container.decode(stream), None)) is None:
-                    raise VideoError("it does not contain frames")  # noqa: TRY301 - reported with the file's name below
+                    raise VideoError("it does not contain any frames")  # noqa: TRY301 - reported with the file's name below
                 self._start_s = first.time or 0.0
                 self.size = (stream.width, stream.height)
         except Exception as error:
             raise VideoError(
-                f"{path} cannot be shown: {failure_reason(error)}; specify a video file that plays: MP4, MOV, "
-                "Matroska, WebM, AVI, MPEG or Ogg"
+                f"{path} cannot be shown: {failure_reason(error)}; specify a playable video file (MP4, MOV, "
+                "Matroska, WebM, AVI, MPEG or Ogg)"
             ) from error
         self._scaler = Scaler()
         self._changed = threading.Condition()
@@ -340,7 +340,7 @@ class Footage:
                     )
                 number += 1
             if end_ns == 0:
-                raise VideoError("it does not contain frames")
+                raise VideoError("it does not contain any frames")
             offset_ns += end_ns
 
     def _put(self, frame: VideoFrame, play: int) -> bool:
@@ -401,7 +401,7 @@ class Videos:
                         before.close()
                     self._keep(view, self._opened(view))
                 except VideoError as error:
-                    return VideosFound("every video of the study must open", str(error))
+                    return VideosFound("every video in the study must open", str(error))
         return VideosFound("; ".join(self._words()))
 
     def reopen(self) -> None:
@@ -413,7 +413,7 @@ class Videos:
             A video cannot be opened; the message omits the name of the source, which would reveal the condition.
         """
         if self.open().fault:
-            raise VideoError("a video of the study cannot be opened: check camera and files")
+            raise VideoError("one of the study's videos cannot be opened: check the camera and the files")
 
     def source(self, view: str) -> Camera | Footage:
         return self._open[view]
@@ -457,7 +457,7 @@ class Videos:
             return Camera(self._camera, self._now_ns, self._holds_s)
         path = self._folder / view
         if file_hash(path) not in (None, self._hashes.get(view)):
-            raise VideoError(f"{path} is not the file that the study began with: restore it")
+            raise VideoError(f"{path} is no longer the file that the study began with: restore it")
         return Footage(path)
 
     def _words(self) -> Iterable[str]:

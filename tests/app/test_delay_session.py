@@ -129,5 +129,5 @@ def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypat
 
 @pytest.mark.parametrize("seconds", [0.0, 0.4, 601.0, float("nan")])
 def test_times_that_make_no_sense_are_refused(seconds):
-    with pytest.raises(StudyError, match=r"each delay is shown for 0\.5 to 600 s"):
+    with pytest.raises(StudyError, match=r"each delay must be shown for 0\.5 to 600 s"):
         held.measure_delays(seconds, "none")

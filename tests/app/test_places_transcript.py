@@ -118,7 +118,7 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
         "remedy_asked": place._apply_remedy,
         "leave_out_asked": lambda asked: place._order_decision("leaving out", of.LeaveOut, **exclusion(asked)),
         "take_back_asked": lambda asked: place._order_decision(
-            "taking the exclusion back", of.TakeBack, **exclusion(asked)
+            "reversing the exclusion", of.TakeBack, **exclusion(asked)
         ),
         "unblind_asked": lambda by, reason: place._order_decision("opening the key", of.OpenKey, by=by, reason=reason),
         "tables_asked": lambda *asked: place._start_writing(of.WriteTables, *asked),

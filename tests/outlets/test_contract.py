@@ -148,7 +148,7 @@ def test_the_other_end_gets_each_event_in_order(kind: str, parport: str) -> None
         ),
         ("parallel:/dev/\0x", r"^'parallel:/dev/\\x00x' is not an address of markers: "),
         pytest.param("parallel:/nowhere/parport0", "parallel:/nowhere/parport0 cannot be opened: ", marks=needs_posix),
-        ("usb:1", "'usb:1' is not an address of markers: use one like lsl, parallel:/dev/par"),
+        ("usb:1", "'usb:1' is not a marker address: use one such as lsl, parallel:/dev/par"),
     ],
 )
 def test_an_address_where_nothing_is_is_refused_in_a_line(address: str, words: str) -> None:

@@ -122,7 +122,8 @@ def test_a_sink_that_hangs_is_lost_at_the_first_marker_after_the_limit(clock: Cl
     assert thread.lost == ""
     thread.mark(marker(3))
     assert thread.lost == (
-        "a marker was not sent in 5.2 s (limit 5 s): sending has stopped; check the connection, then end and "
+        "a marker had still not been sent after 5.2 s (limit 5 s): sending has stopped; check the connection, then "
+        "end and "
         "resume the session"
     )
     sink.go_on.set()
@@ -166,7 +167,7 @@ def test_a_sink_that_hangs_delays_neither_markers_nor_the_end(monkeypatch) -> No
     assert sink.hanging.wait(5)
     for trial in range(2, 7):
         thread.mark(marker(trial))
-    assert thread.lost.startswith("3 markers wait to be sent (limit): sending has stopped; check")
+    assert thread.lost.startswith("3 markers, the maximum, are waiting to be sent: sending has stopped; check")
     thread.close(0.01)
     assert not sink.closed.is_set()
     sink.go_on.set()

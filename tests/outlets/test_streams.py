@@ -90,7 +90,7 @@ def test_a_recorder_gets_every_sample_with_the_time_of_its_reading() -> None:
     assert np.diff(stamps_s) == pytest.approx(1e-3, abs=1e-6)
     assert found["rate"] == 1000.0
     assert stream.sent == 250
-    assert stream.lost == "12 samples not sent in time: this computer is too busy"
+    assert stream.lost == "12 samples could not be sent in time: this computer is too busy"
     for label, unit in (("position_x", "m"), ("velocity_z", "m/s"), ("force_y", "N")):
         assert f"<label>{label}</label>\n\t\t\t\t<unit>{unit}</unit>" in found["xml"]
     assert "<label>limiters</label>" in found["xml"]

@@ -86,7 +86,7 @@ def test_frames_that_were_lost_on_the_way_have_numbers() -> None:
 def test_a_camera_that_stops_is_said_in_one_line_that_does_not_name_it() -> None:
     with camera("--seconds", "2") as one:
         one.thread.join(10)
-        with pytest.raises(VideoError, match=r"stopped \(it ended\): check camera and files") as refused:
+        with pytest.raises(VideoError, match=r"stopped \(it ended\): check the camera and the files") as refused:
             one.frame_at(time.perf_counter_ns())
         assert one.source not in str(refused.value)  # the operator and the journal's readers are blind
 
@@ -98,7 +98,7 @@ def test_a_camera_that_sends_nothing_without_closing_is_said_in_words() -> None:
         os.kill(process.pid, signal.SIGSTOP)
         one.thread.join(10)
         assert not one.thread.is_alive()
-        with pytest.raises(VideoError, match=r"stopped \(no data came in time\)"):
+        with pytest.raises(VideoError, match=r"stopped \(no data arrived in time\)"):
             one.frame_at(time.perf_counter_ns())
 
 

@@ -105,7 +105,7 @@ def test_a_file_that_fails_later_stops_without_its_name(clip: Path, monkeypatch:
     monkeypatch.setattr(sources, "open_video", once)
     footage = Footage(clip)
     footage.thread.join(10)
-    with pytest.raises(VideoError, match=r"a video of the study stopped \(it is gone\)") as refused:
+    with pytest.raises(VideoError, match=r"one of the study's videos stopped \(it is gone\)") as refused:
         footage.frame_at(0)
     assert clip.name not in str(refused.value)
 

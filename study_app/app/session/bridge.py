@@ -84,8 +84,8 @@ _END_SHOWN_MS = 5000
 SCREEN_SETTLES_MS = 500  # a window manager may briefly put a window on another screen
 _SCREEN_REMOVED = (
     "Both windows are on one screen",
-    "The session is paused, and cannot be resumed: the participant's window would cover the force stop. Connect the "
-    "second screen again; the participant's window returns to it.",
+    "The session is paused and cannot be resumed, because the participant's window would cover the force stop. "
+    "Reconnect the second screen; the participant's window will then return to it.",
 )
 log = logging.getLogger(__name__)
 
@@ -342,8 +342,8 @@ class SessionBridge(QObject):
     @guarded_session_slot
     def _report_thread_failure(self, what: str) -> None:
         """Log that a thread has ended with an exception, and tell the operator."""
-        self.operator.show_message("A part of the program ended", f"{what}. All answers are kept.")
-        self.record_note(f"a thread of the program ended: {what}")
+        self.operator.show_message("Part of the program has stopped", f"{what}. All answers have been kept.")
+        self.record_note(f"a thread in the program ended: {what}")
 
     def _now(self) -> float:
         return self.parts.clock()
@@ -491,8 +491,8 @@ class SessionBridge(QObject):
                 self._reconnect()
             case "failed":
                 what, error = details
-                log.error("a part of the operator's window failed: %s", what, exc_info=error)
-                self.record_note(f"a part of the operator's window failed: {what}")
+                log.error("part of the operator's window failed: %s", what, exc_info=error)
+                self.record_note(f"part of the operator's window failed: {what}")
             case "page":
                 self.participant.bring_forward()
             case "close":
@@ -714,7 +714,7 @@ def show_windows(
         yield
     shown_on, operated_on = screens()
     if shown_on is operated_on and bridge.strip is None:
-        raise DisplayError("a screen was disconnected while the session opened; start the session again")
+        raise DisplayError("a screen was disconnected while the session was opening; start the session again")
     bridge.participant.open_on(shown_on)
     if not played:
         bridge.watch_screens()

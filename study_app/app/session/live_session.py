@@ -80,7 +80,7 @@ def load_windows() -> None:
 CANCELLED = 130
 BUG = 1
 OPENING_PATIENCE_S = 20.0
-NOT_EXAMINED = ("There is nothing to diagnose", "Diagnosis is not available for this device.")
+NOT_EXAMINED = ("There is nothing to diagnose", "Diagnostics are not available for this device.")
 
 
 class LiveSession(QObject):
@@ -346,7 +346,7 @@ class LiveSession(QObject):
         self.theme = self.bridge.operator.theme
         if (proof := self.bridge.parts.journal.fingerprint) and self._store is not None:
             tell = self._progress or logging.getLogger(__name__).info
-            tell(f"fingerprint of the session (also in the study's fingerprints.txt): {proof}")
+            tell(f"session fingerprint (also in the study's fingerprints.txt): {proof}")
             write_proof(self._store.place.study_folder, tell)
         if self._progress is not None and self._store is not None:
             status, folder = self.bridge.parts.journal.progress.ended, self._store.folder.path

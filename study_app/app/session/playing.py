@@ -119,7 +119,7 @@ _LOOK_S: Final = 0.01
 FOLDER: Final = "liquid-study-play-"
 _OUTCOMES: Final = {
     "completed": "to the end",
-    "incomplete": "to the end; some trials were not delivered",
+    "incomplete": "to the end, but some trials were not delivered",
     "aborted": "stopped",
     "withdrawn": "no consent",
     "broken": "it failed",

@@ -139,8 +139,8 @@ def _pair_warnings(
     for j, k in pairs:
         alike = f"(correlation {correlation[j, k]:.3f})".replace("-", "−")
         yield (
-            f"{names[j]} and {names[k]} cannot be distinguished by {problem.varied} {alike}: each can compensate the "
-            f"other; fit one of them, or {problem.more}"
+            f"{names[j]} and {names[k]} cannot be distinguished by {problem.varied} {alike}, because each can "
+            f"compensate for the other: fit only one of them, or {problem.more}"
         )
 
 
@@ -152,7 +152,7 @@ def _parameter_warnings(
     for k, it in enumerate(problem.parameters):
         near = 1e-6 * max(1.0, abs(z[k]))
         if not acts[k]:
-            yield f"{it.name} does not change the {problem.compared}: {it.value:g} is its initial value"
+            yield f"{it.name} does not change the {problem.compared}, so its initial value {it.value:g} was kept"
         elif z[k] - problem.least[k] < near or problem.most[k] - z[k] < near:
             yield (
                 f"{it.name} reached the end of its range, {values[k]:.6g}{_edge_reason(problem, k, z)}: the best value "
@@ -168,7 +168,7 @@ def _edge_reason(problem: Problem, k: int, z: Floats) -> str:
     """Return the reason why a range ends, if not by the model itself, or ""."""
     it = problem.parameters[k]
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
-        return f" (no less than {NO_LESS_THAN[it.field]})"
+        return f" (it cannot be less than {NO_LESS_THAN[it.field]})"
     if it.whole and z[k] > problem.least[k]:
         return " (it cannot exceed the scaling or the duration of the measurement)"
     return ""

@@ -53,7 +53,7 @@ def draw_force(fit: Fit) -> Figure:
     limit_n = 1.05 * float(np.abs(fit.residual_n).max()) or 1.0
     for axes in figure.axes[1:]:
         axes.set_ylim(-limit_n, limit_n)
-    write(right_pt, _TOP_PT - 13, "Fitted, with 95 % intervals", color=style.TEXT_SOFT)
+    write(right_pt, _TOP_PT - 13, "Fitted values with 95 % intervals", color=style.TEXT_SOFT)
     write(right_pt, _TOP_PT + 3, "\n".join(_values(fit)), linespacing=1.45)
     write(_SIDE_PT, below_pt + _RESIDUAL_PT + _FOOT_PT - 8, "\n".join(caption), color=style.TEXT_SOFT, linespacing=1.25)
     return figure
@@ -70,13 +70,13 @@ def _values(fit: Fit) -> list[str]:
 
 def _caption(fit: Fit) -> str:
     text = (
-        "Grey shows measurements, lines show the least-squares fit through the servo's own tick. The residual, "
+        "Measurements are grey; lines show the least-squares fit, computed with the servo's own tick. The residual, "
         f"measured − fitted, is {fit.rms_n:.3g} N RMS, {100 * fit.share:.1f} % of the force; its correlation "
         f"from row to row is {fit.following:.2f}."
     ).replace("-", "−")
     along = (
         " The right panel shows its component along the motion against speed; dots are medians. A slope or "
-        "bend there means a wrong law."
+        "bend there indicates a wrong law."
     )
     return text + along + "".join(f" Warning: {warning}." for warning in fit.warnings)
 

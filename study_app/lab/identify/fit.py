@@ -89,9 +89,10 @@ def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Itera
     if rho > max(_FOLLOWING, _CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
-            f"residuals, {100 * share:.1f} % of the force, are autocorrelated (correlation {rho:.3f} from row "
-            "to row): the model is incomplete, the sensor filters, or velocities from positions blur sharp "
-            "turns; the intervals are widened for this, but are valid only if the model is valid"
+            f"the residuals ({100 * share:.1f} % of the force) are autocorrelated (correlation {rho:.3f} from row "
+            "to row): the model is incomplete, the sensor filters the force, or velocities computed from positions "
+            "blur sharp turns; the intervals have been widened to allow for this, but they are valid only if the "
+            "model is valid"
         )
 
 
@@ -121,7 +122,7 @@ class CurveFit(Estimates):
     def summary(self) -> str:
         rates = self.curve.rate_per_s
         said = f"{len(rates)} shear rates from {rates.min():.3g} to {rates.max():.3g} per s"
-        return f"{said}; residual {100 * self.share:.1f} % of the stress, RMS"
+        return f"{said}; residual {100 * self.share:.1f} % of the stress (RMS)"
 
 
 def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCurve) -> CurveFit:
@@ -136,7 +137,7 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
     parameters = find_parameters(scene, liquid_id, names)
     for it in parameters:
         if it.table != CURVE_TABLE:
-            raise StudyError(f"{it.name} does not change a flow curve: fit parameters of the table {CURVE_TABLE}")
+            raise StudyError(f"{it.name} does not change a flow curve: fit parameters from the table {CURVE_TABLE}")
     if len(curve.rate_per_s) <= len(parameters):
         raise StudyError(f"{len(curve.rate_per_s)} shear rates are too few for {len(parameters)} parameters")
     ordered = curve.ordered()
@@ -163,9 +164,9 @@ def _branch_warnings(curve: FlowCurve) -> Iterator[str]:
     size = math.sqrt(float(np.mean(gap**2)))
     if size > _APART * noise and size > _LEAST_GAP:
         yield (
-            f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, more than noise "
+            f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which is more than noise "
             "explains (thixotropy or hysteresis); the fit lies between them, and the intervals do not cover "
-            "both: fit one branch"
+            "both: fit only one branch"
         )
 
 

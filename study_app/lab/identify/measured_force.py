@@ -34,7 +34,7 @@ class Measured:
 
     def __post_init__(self) -> None:
         if self.force_n.shape != (len(self.motion.t_s), 3) or not np.isfinite(self.force_n).all():
-            raise StudyError(f"a measured force is finite and (n, 3), not {self.force_n.shape}")
+            raise StudyError(f"a measured force must be finite and have the shape (n, 3), not {self.force_n.shape}")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,13 +66,13 @@ class FlowCurve:
         if len(repeated) > len(rates) / 2:
             stresses = [self.stress_pa[self.rate_per_s == rate] for rate in repeated]
             least, greatest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
-            description = "the greatest and the smallest stress at repeated shear rates"
+            description = "the largest and the smallest stresses at repeated shear rates"
             return Branches(description=description, first=(repeated, greatest), second=(repeated, least))
         turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
         if len(turns) != 1:
             return None
         ways = [self._sorted(slice(turns[0] + 2)), self._sorted(slice(turns[0] + 1, None))]
-        return Branches(description="stresses at rising and at falling shear rates", first=ways[0], second=ways[1])
+        return Branches(description="the stresses at rising and at falling shear rates", first=ways[0], second=ways[1])
 
     def _sorted(self, rows: slice) -> tuple[Floats, Floats]:
         order = np.argsort(self.rate_per_s[rows])
@@ -112,7 +112,7 @@ def read_measurement(path: Path) -> Measured | FlowCurve:
     if lacking := [name for name in names if name not in table.names]:
         raise StudyError(f"{path} does not have the column {', '.join(lacking)}: the first line must contain {_HEADER}")
     if twice := [name for name in names if table.names.count(name) > 1]:
-        raise StudyError(f"{path} has two columns {twice[0]}: remove one of them")
+        raise StudyError(f"{path} has two columns named {twice[0]}: remove one of them")
     if not table.lines:
         raise StudyError(f"{path} has a header but no rows: add one row for each sample")
     try:
@@ -163,7 +163,9 @@ def with_centred_velocity(motion: Motion) -> Motion:
     even = at_rate(motion, 1 / step_s)
     rows = 2 * max(math.floor(_SMOOTHED_S / 2 / step_s), 1) + 1
     if len(even.t_s) < rows:
-        raise StudyError(f"{len(motion.t_s)} rows are too few to estimate velocities: measure for {_SMOOTHED_S:g} s")
+        raise StudyError(
+            f"{len(motion.t_s)} rows are too few to estimate velocities: measure for at least {_SMOOTHED_S:g} s"
+        )
     slopes = savgol_filter(even.position_m, rows, 2, deriv=1, delta=step_s, axis=0)
     velocity_mps = np.column_stack([np.interp(motion.t_s, even.t_s, column) for column in slopes.T])
     return Motion(motion.t_s, motion.position_m, velocity_mps=velocity_mps)

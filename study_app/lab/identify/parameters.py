@@ -92,7 +92,7 @@ def _liquid(scene: Scene, liquid_id: str) -> Liquid:
         if liquid.id == liquid_id:
             return liquid
     liquids = ", ".join(liquid.id for liquid in scene.liquids) or "none"
-    raise StudyError(f"the scene does not contain liquid {liquid_id!r}; its liquids: {liquids}")
+    raise StudyError(f"the scene does not contain the liquid {liquid_id!r}; its liquids are {liquids}")
 
 
 def _tables(scene: Scene, liquid: Liquid) -> Iterator[tuple[str, BaseModel]]:
@@ -124,7 +124,7 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
             value = getattr(tables[table], field)
             if value is None:
                 raise StudyError(
-                    f"the scene does not contain an initial value of {name}: specify one with --set {name}=VALUE"
+                    f"the scene does not contain an initial value for {name}: specify one with --set {name}=VALUE"
                 )
             return Parameter(
                 name=name,
@@ -139,7 +139,9 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
     known = sorted({field for fields in numbers.values() for field in fields} - set(_THRESHOLDS))
     near = difflib.get_close_matches(field, known, n=1)
     meant = f"did you mean {near[0]!r}? " if near else ""
-    raise StudyError(f"unknown parameter {name!r}: {meant}this liquid and its effects have {', '.join(known)}")
+    raise StudyError(
+        f"unknown parameter {name!r}: {meant}the parameters of this liquid and its effects are {', '.join(known)}"
+    )
 
 
 def _numbers(table: BaseModel) -> Iterator[tuple[str, tuple[float, float, bool, bool]]]:

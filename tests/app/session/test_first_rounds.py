@@ -113,7 +113,7 @@ def test_a_page_without_a_force_stop_does_not_cover_that_of_the_operator(
     session = ScreenRemoved(replace(CHOSEN, results=tmp_path / "results"), LIGHT)
     with qtbot.waitSignal(session.over, timeout=60_000):
         session.open()
-    assert str(session.error) == "a screen was disconnected while the session opened; start the session again"
+    assert str(session.error) == "a screen was disconnected while the session was opening; start the session again"
     assert session.bridge is not None
     assert not session.bridge.parts.servo.force_is_on
     assert not session.bridge.participant.isVisible()

@@ -109,7 +109,7 @@ def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():
         (
             ["density_kg_m3"],
             25,
-            "density_kg_m3 does not change a flow curve: fit parameters of the table non_newtonian",
+            "density_kg_m3 does not change a flow curve: fit parameters from the table non_newtonian",
         ),
         (["yield_stress"], 25, "unknown parameter 'yield_stress': did you mean 'yield_stress_pa'"),
         (["yield_stress_pa", "flow_index"], 2, "2 shear rates are too few for 2 parameters"),
@@ -136,7 +136,7 @@ def test_from_a_rheometer_file_to_a_preset(tmp_path):
     fields = ",".join(STARTS["ketchup"])
     shown = identify("slime", "--measured", path, "--liquid", "ketchup", "--fit", fields, "--to", tmp_path / "out")
     assert shown.exit_code == 0
-    assert "ketchup: 25 shear rates from 0.05 to 200 per s; residual 0.9 % of the stress, RMS" in shown.output
+    assert "ketchup: 25 shear rates from 0.05 to 200 per s; residual 0.9 % of the stress (RMS)" in shown.output
     written = load_scene(tmp_path / "out" / "ketchup.toml", "ketchup").liquids[0].non_newtonian
     for field in STARTS["ketchup"]:
         assert getattr(written, field) == pytest.approx(getattr(PRESETS["ketchup"][1], field), rel=0.05)
@@ -190,7 +190,7 @@ def test_a_fit_does_not_depend_on_the_order_of_rows(gap):
 
 def test_branches_that_differ_are_named_with_their_gap():
     found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.2))
-    said = "the greatest and the smallest stress at repeated shear rates differ by 25 % of the stress"
+    said = "the largest and the smallest stresses at repeated shear rates differ by 25 % of the stress"
     assert any(warning.startswith(said) for warning in found.warnings)
     low, high = found.intervals["yield_stress_pa"]
     assert 1 < low < high < 30

@@ -165,7 +165,7 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
     [
         ([], "specify at least one parameter to fit"),
         (["drag_coeficient"], "did you mean 'drag_coefficient'"),
-        (["viscosity_pa_s"], "does not contain an initial value of viscosity_pa_s"),
+        (["viscosity_pa_s"], "does not contain an initial value for viscosity_pa_s"),
         (["breaking_angle_deg"], "is a threshold"),
         (["alpha"], "unknown parameter 'alpha'"),
         (["axes"], "unknown parameter 'axes'"),
@@ -176,7 +176,7 @@ def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
 def test_what_cannot_be_fitted_is_said(names, said):
     with pytest.raises(StudyError, match=said):
         fit(TANK, "tank", names, REVERSE, force_of(TANK, REVERSE))
-    with pytest.raises(StudyError, match="does not contain liquid 'lake'; its liquids: tank"):
+    with pytest.raises(StudyError, match="does not contain the liquid 'lake'; its liquids are tank"):
         fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
     with pytest.raises(StudyError, match="it is a device, which may never end"):
         measured_force.read_measurement(Path("/dev/null"))  # /dev/zero would fill the memory

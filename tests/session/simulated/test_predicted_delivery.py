@@ -102,7 +102,9 @@ def test_every_surface_says_that_no_trial_was_delivered(
     (facts,) = sessions(rehearsed.parent, {})
     assert (status_chip(facts)[2], str(facts.missing), facts.is_counted) == ("Incomplete", SENTENCE, False)
     record = read_record(facts.folder)
-    assert record.limits.startswith(f"{SENTENCE}. Nobody answered them. The study permits 5 % of the trials to be")
+    assert record.limits.startswith(
+        f"{SENTENCE}. These trials were not answered. The study allows up to 5 % of the trials to be"
+    )
     assert "answers are kept" not in record.limits
     (row,) = exclusions(rehearsed)
     assert (row.rule_or_person, row.reason) == (MISSING_RULE, SENTENCE)

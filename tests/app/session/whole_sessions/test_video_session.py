@@ -161,7 +161,7 @@ def test_footage_that_stops_is_opened_again_by_the_operator(
     (broke,) = [line for line in lines if line["event"] == "broke"]
     (again,) = [line for line in lines if line["event"] == "device_reconnected"]
     assert broke["what"] == CAUSE_WITHHELD
-    assert operator.troubles == {"a video of the study stopped (the file is gone): check camera and files"}
+    assert operator.troubles == {"one of the study's videos stopped (the file is gone): check the camera and the files"}
     assert again["device"] == "scripted"
     assert reconnected == []
     assert lines[-1]["status"] == "completed"

@@ -48,7 +48,7 @@ def test_a_session_runs_from_the_first_page_to_the_last_in_its_windows(short_dem
     assert told[-1]["status"] == "completed"
     proof, _, place = (results / "fingerprints.txt").read_text("utf-8").rstrip().partition("  ")
     assert place == "data/sub-P001/ses-01"
-    assert lines[-2] == f"fingerprint of the session (also in the study's fingerprints.txt): {proof}"
+    assert lines[-2] == f"session fingerprint (also in the study's fingerprints.txt): {proof}"
     answers = rows(results, "responses")
     assert len(answers) == 8
     assert {row["response"] for row in answers} == {"1", "2"}
