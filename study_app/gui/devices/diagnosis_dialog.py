@@ -23,7 +23,7 @@ from study_app.store.workstation import MachineSettings
 from study_app.workers.server import Crashed, Refused
 
 _LOOK_MS = 100
-_PREPARING = "Preparing … The driver is compiled at the first use, which takes about a minute."
+_PREPARING = "Preparing … On first use the driver is compiled, which takes about a minute."
 _SIZE = QSize(820, 700)
 
 
@@ -187,7 +187,9 @@ class DiagnosisDialog(QDialog):
         except StoreError as error:
             self.saved.setText(_sentence(str(error)))
         else:
-            self.saved.setText(f"Saved as {path}. It does not contain participant IDs, answers or liquid parameters.")
+            self.saved.setText(
+                f"Saved as {path}. The file contains neither participant IDs nor answers nor liquid parameters."
+            )
         self.saved.show()
 
     def _end_process(self) -> None:
@@ -209,8 +211,8 @@ def _sentence(text: str) -> str:
 
 
 _HELD = (
-    "This session uses the device, so some checks cannot run. For a full diagnosis, end the session first; you can "
-    "resume it later."
+    "This session is using the device, so some checks cannot run. For a full diagnosis, end the session first; you "
+    "can resume it later."
 )
 
 

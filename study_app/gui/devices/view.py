@@ -90,9 +90,10 @@ class _HelpCard(Card):
         super().__init__("Before the first session", gap=8)
         for paragraph in (
             "Connect the USB cable and the power adapter, then press “Refresh”.",
-            "“Diagnose …” finds, opens, loads, homes and tests the device without force, and reports faults.",
+            "“Diagnose …” opens the device, loads its firmware, homes and tests it without force, and reports any "
+            "faults.",
             "“liquid-study devices calibrate” measures its force with a known weight.",
-            "“liquid-study devices bench” measures any device with force in ten minutes.",
+            "“liquid-study devices bench” measures any force-feedback device in ten minutes.",
         ):
             line = label(paragraph, "label", "text2", wraps=True, weight=400)
             line.setMinimumWidth(LEAST_WORDS)

@@ -39,7 +39,7 @@ def check_display(environment: Mapping[str, str] = os.environ, platform: str = s
     display = environment.get("DISPLAY", "")
     if not display:
         raise DisplayError(
-            "there is no display for a window: DISPLAY and WAYLAND_DISPLAY are not set; start from a desktop "
+            "no display is available: DISPLAY and WAYLAND_DISPLAY are not set; start the program from a desktop "
             f"session, or over SSH with ssh -X ({_NEEDS_NO_DISPLAY})"
         )
     _load_plugin()
@@ -61,7 +61,7 @@ def missing_library(error: OSError | ImportError) -> DisplayError:
     library = str(error).partition(":")[0]
     if _platform_is_linux():
         return DisplayError(
-            f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu: "
+            f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu run "
             f"sudo apt install {PACKAGES} ({_NEEDS_NO_DISPLAY})"
         )
     return DisplayError(f"Qt cannot be loaded ({error}): reinstall liquid-study with pip")

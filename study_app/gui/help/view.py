@@ -311,7 +311,7 @@ class HelpPlace(Place):
         self.list.currentItemChanged.connect(self._open_chosen)
         self.reader.page_asked.connect(self.open_page)
         self.back.clicked.connect(self.go_back)
-        self.back.setToolTip("Back (Alt+←); Esc leads to where Help was opened")
+        self.back.setToolTip("Back (Alt+←); Esc returns to the page from which Help was opened")
         QShortcut(QKeySequence("Alt+Left"), self, self.go_back)
         QShortcut(QKeySequence("Esc"), self, self._go_to_origin)
         QShortcut(QKeySequence(QKeySequence.StandardKey.Find), self, self.words.setFocus)

@@ -157,11 +157,11 @@ COLUMNS = (
 _EVERY = "every"
 LEAST_HEIGHT = 200
 _NONE = {
-    "": "No sessions of participants yet. The first session appears here when it starts.",
+    "": "No participant sessions yet. The first session will appear here when it starts.",
     "pilot": "No pilot sessions.",
     "simulated": "No simulated sessions.",
     "sample": "No sample sessions.",
-    _EVERY: "No sessions yet. The first session appears here when it starts.",
+    _EVERY: "No sessions yet. The first session will appear here when it starts.",
 }
 
 
@@ -342,7 +342,7 @@ class BrokenCard(_FileCard):
     def __init__(self, facts: BrokenFacts | DraftFacts, *, first: bool = False) -> None:
         if isinstance(facts, DraftFacts):
             super().__init__(facts, facts.title, first=first)
-            why = f"{Path(facts.source).name} is written when it is saved."
+            why = f"{Path(facts.source).name} will be created when the draft is saved."
         else:
             super().__init__(facts, Path(facts.source).stem, first=first, sign="warning")
             self.column.addWidget(label("This file cannot be used.", "strong", "warn"))

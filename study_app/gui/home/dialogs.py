@@ -62,7 +62,7 @@ class RehearsalDialog(Work):
     ) -> None:
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
         groups = ", ".join(facts.protocol.groups)
-        dealt = f" They are spread evenly over the groups {groups}." if facts.protocol.asks_group else ""
+        dealt = f" They are distributed evenly across the groups {groups}." if facts.protocol.asks_group else ""
         super().__init__(
             parent,
             theme,
@@ -122,7 +122,9 @@ class RehearsalDialog(Work):
                 self._listening.stop()
                 self.worker.close()
                 if isinstance(answer, Path):
-                    self.show_done(f"Done: {count} simulated sessions, stored in {self.folder}.", "Open results")
+                    self.show_done(
+                        f"Done: {count} simulated sessions have been stored in {self.folder}.", "Open results"
+                    )
                 else:
                     self.show_refused(answer.sentence)
 
@@ -138,9 +140,9 @@ class RehearsalDialog(Work):
 _FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 _HOLDS = "It will contain the folders protocols and results."
-_ROW_HINT = "the session uses that participant's order; leave empty for its own order"
-_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty for its own"
-_GROUP_HINT = "a property of the participant; it is recorded"
+_ROW_HINT = "the session uses that participant's order; leave empty to use its own"
+_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty to use its own"
+_GROUP_HINT = "recorded as a property of the participant"
 
 
 @dataclass(frozen=True, slots=True)
@@ -232,14 +234,14 @@ class NewSessionDialog(QDialog):
         fields = (
             Field("participant", "Participant", aside="letters and digits, not a name"),
             Field("session", "Session", "count", limits=(1, MAX_SESSION)),
-            seed_field("determines every order; recorded"),
+            seed_field("determines all orders; it is recorded"),
             Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
             choice_field("language", "Language of the participant's pages", languages),
             choice_field("device", "Device", {name: device_label(name) for name in devices}),
             choice_field("screen", "Participant's screen", screen_titles),
             Field("windowed", "In a window instead of full screen", "check"),
-            Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
-            Field("results", "Results folder of this study", "folder"),
+            Field("pilot", "Pilot: marked by a frame and stored separately", "check"),
+            Field("results", "Results folder for this study", "folder"),
             choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=_GROUP_HINT),
             Field(
                 "row_of", "Replaces participant", aside=_PLACE_HINT if self.facts.protocol.groups else _ROW_HINT,
@@ -398,7 +400,7 @@ class NewSessionDialog(QDialog):
             self._raise_if_refused()
         except (StudyError, ValueError) as error:
             fault = str(error)
-        sentence = fault or f"{participant} is free, session {session}"
+        sentence = fault or f"{participant} is available for session {session}"
         by_id = sentence.startswith(f"{participant} ")  # an id is kept as typed
         self.verdict.setText(sentence if by_id else sentence[:1].upper() + sentence[1:])
         set_ink(self.verdict, "bad" if fault else "ok")
@@ -459,7 +461,7 @@ class WorkspaceDialog(Question):
             parent,
             theme,
             "Choose your workspace",
-            "Protocols and results of this computer are stored in one folder. Windows and commands use it "
+            "This computer's protocols and results are stored in one folder, which windows and commands use "
             "wherever they are started. You can change it later under This machine.",
             ActionButton("check", "Use this folder", role="primary"),
             back="Not now",

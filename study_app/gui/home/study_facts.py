@@ -367,7 +367,7 @@ def session_counts_text(sessions: Iterable[SessionFacts], study: str) -> str:
     complete = sum(session.status == COMPLETED for session in own)
     incomplete = sum(session.status == INCOMPLETE for session in own)
     excluded = sum(session.excluded is not None for session in own)
-    parts = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participant yet"]
+    parts = [f"{counted(len(own), 'session')}, {complete} complete" if own else "no participants yet"]
     parts += [f"{incomplete} incomplete"] * bool(incomplete)
     parts += [f"{excluded} excluded"] * bool(excluded) + [counted(pilots, "pilot")] * bool(pilots)
     return ", ".join(parts)

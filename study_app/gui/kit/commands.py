@@ -56,19 +56,21 @@ COMMANDS: Final = (
     Command("views", "Views, then their tabs", ("Ctrl+3",), run=lambda place: place.parts.focus_pane()),
     Command("problems", "Problems", ("Ctrl+4",), run=lambda place: place.parts.focus_problems()),
     Command("header", "Header", ("Ctrl+5",), run=lambda place: place.parts.focus_header()),
-    Command("next part", "Next of these parts", ("F6",), run=lambda place: place.parts.cycle(1)),
+    Command("next part", "Next part", ("F6",), run=lambda place: place.parts.cycle(1)),
     Command("part before", "Previous part", ("Shift+F6",), run=lambda place: place.parts.cycle(-1)),
     Command("find", "Find in the study", ("Ctrl+F",), run=lambda place: place.parts.focus_find()),
     Command("next problem", "Next problem", ("F8",), run=lambda place: place.open_next_problem()),
-    Command("file", "File, and back", ("Ctrl+E",), run=lambda place: place.parts.switch_to_file()),
+    Command("file", "Switch to the file and back", ("Ctrl+E",), run=lambda place: place.parts.switch_to_file()),
     Command("back", "Previous element", ("Alt+Left",), run=lambda place: place.ask("back")),
     Command("page", "Participant's page", ("Ctrl+Return",)),
-    Command("leave page", "Leave that page", ("Escape",), within="page"),
-    Command("language", "The page in the next language", ("Ctrl+L",)),
+    Command("leave page", "Leave the page", ("Escape",), within="page"),
+    Command("language", "Show the page in the next language", ("Ctrl+L",)),
     Command("add", "Add", ("Insert",), run=lambda place: place.ask_to_add()),
     Command("open entry", "Open the element that an entry refers to", ("Return",), within="lists"),
     Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda place: place.duplicate()),
-    Command("series", "Copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()),
+    Command(
+        "series", "Make copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()
+    ),
     Command("rename", "Rename", ("F2",), run=lambda place: place.rename()),
     Command("delete", "Delete", ("Delete",), within=_LISTS, run=lambda place: place.delete()),
     Command("up", "Move up", ("Alt+Up",), run=lambda place: place.move_by(-1)),
@@ -85,7 +87,7 @@ COMMANDS: Final = (
     Command("accept", "Accept", ("Return",), within="field"),
     Command("restore", "Restore", ("Escape",), within="field"),
     Command("remove", "Remove the key from the file", ("Ctrl+Delete",), within="field"),
-    Command("count", "Count up, down", ("Up", "Down"), within="field"),
+    Command("count", "Increase, decrease", ("Up", "Down"), within="field"),
 )
 _OF: Final = {command.id: command for command in COMMANDS}
 _NAMES: Final = {"Return": "Enter", "Escape": "Esc", "Insert": "Ins", "Delete": "Del"}

@@ -87,7 +87,7 @@ def seed_field(aside: str = "") -> Field:
 def typed_file(name: str, text: str) -> Path | None:
     """Return the file whose path was typed, None for an empty text."""
     if text and not Path(text).is_file():
-        raise ValueError(f"{name} is not in {text}: choose the file, or leave the field empty")
+        raise ValueError(f"{name} was not found at {text}: choose the file, or leave the field empty")
     return Path(text) if text else None
 
 

@@ -155,7 +155,7 @@ class _CurvePlot(Plot):
         self.box.setYRange(-0.02 * self._top, self._top / (1 - share), padding=0)
 
 
-_FORCE_SENTENCE = f"Magnitude of the force of settings A and B on the same motion over the last {SPAN_S:g} s, in N."
+_FORCE_SENTENCE = f"Magnitude of the force in settings A and B for the same motion over the last {SPAN_S:g} s, in N."
 _SPEED_SENTENCE = f"Speed of the body, and of the wake in settings A and B, over the last {SPAN_S:g} s, in m/s."
 
 
@@ -360,7 +360,7 @@ class ErrorCard(_ReadingCard):
 
     def __init__(self) -> None:
         why = "Errors would reveal the settings."
-        super().__init__("Error against the reference", label("", "small", "text2"), why)
+        super().__init__("Error relative to the reference", label("", "small", "text2"), why)
         self.lines: list[ErrorLine] = []
         self._lines = vbox(spacing=2)
         add_parts(self.content, self._lines, STRETCH)

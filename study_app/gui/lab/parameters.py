@@ -391,8 +391,8 @@ class _NumberRow(ParameterRow):
         if len(readings_of(text)) == 2:
             self.show_refused(f"{unclear_number(text)}, or press Esc.")
             return
-        said = f"“{text}” is not a number" if text.strip() else "This needs a number"
-        self.show_refused(f"{said}: write a value such as {example}, or press Esc.")
+        said = f"“{text}” is not a number" if text.strip() else "This field needs a number"
+        self.show_refused(f"{said}: enter a value such as {example}, or press Esc.")
 
     def _restore_number(self) -> None:
         self.show_refused("")

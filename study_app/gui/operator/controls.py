@@ -76,15 +76,15 @@ def _hint_text(view: OperatorView) -> str:
     if view.over and view.trouble:
         return ""
     if view.over:
-        return "The journal is closed and the tables are written."
+        return "The journal is closed and the tables have been written."
     if view.waits:
-        return "The force is off. The answers are kept in memory until the disk accepts them."
+        return "The force is off. The answers are kept in memory until they can be written to disk."
     if view.state == "trouble":
         return "The force is off. All answers so far are on disk."
     if view.state == "force off":
         return "The force returns only after you turn it on again."
     if view.state == "paused":
-        return "An interrupted trial restarts."
+        return "An interrupted trial starts again."
     return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
 
 
@@ -130,7 +130,7 @@ class NotesCard(Card):
         self._list = QWidget()
         vbox(self.none, *self.lines, STRETCH, spacing=6, margins=0, parent=self._list)
         self.field = _NoteField()
-        self.hint = label("Press Enter to store it with the time", "small", "text3")
+        self.hint = label("Press Enter to save the note with the time", "small", "text3")
         self.add = ActionButton("pen", "Add note", key="N")
         self.mark = ActionButton("flag", "Mark", key="M")
         buttons = hbox((self.add, 1), (self.mark, 1), spacing=12)
@@ -276,7 +276,7 @@ class DeviceCard(Card):
         self.name = label("", "card")
         self.chip = Chip("neutral", "ring", "Waiting", small=True)
         self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
-        self.diagnose.setToolTip("First turns the force off and pauses")
+        self.diagnose.setToolTip("First turns off the force and pauses the session")
         self._most = ALL_ROWS
         self._view: OperatorView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)

@@ -374,8 +374,8 @@ def _delay_sentences(vitals: Vitals) -> tuple[str, ...]:
     if vitals.delay_ticks <= vitals.first_delay_ticks:
         return ()
     return (
-        f"The device answers after {vitals.delay_ticks} ticks (at the start {vitals.first_delay_ticks}): the "
-        "force is limited to a stable level for this delay",
+        f"The device now answers after {vitals.delay_ticks} ticks ({vitals.first_delay_ticks} at the start), so the "
+        "force is limited to a level that is stable with this delay",
     )
 
 
@@ -383,7 +383,7 @@ def _lost_recording_sentences(session: Session, progress: Progress, lost: Mappin
     """Return a sentence for every trial whose recording was lost, newest first."""
     trials = {trial.number: trial for trial in session.schedule.trials}
     return tuple(
-        f"Recording of {trials[number].label(session.protocol, session.language)} lost: {reason}"
+        f"The recording of {trials[number].label(session.protocol, session.language)} was lost: {reason}"
         for number, reason in sorted(lost.items(), reverse=True)
     )
 
@@ -392,7 +392,7 @@ def _incomplete_recording_sentences(session: Session, progress: Progress, now: M
     """Return a sentence for every trial whose recording lacks samples, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"Recording of {labels[number]} lacks {grouped(count)} samples: the disk is too slow"
+        f"The recording of {labels[number]} lacks {grouped(count)} samples because the disk is too slow"
         for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
     )
 
@@ -401,7 +401,7 @@ def _limit_sentences(session: Session, progress: Progress) -> tuple[str, ...]:
     """Return a sentence for every finished trial that violated a limit, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"{labels[number]} out of limits: " + "; ".join(broken_limit_text(*limit) for limit in beyond)
+        f"{labels[number]} exceeded limits: " + "; ".join(broken_limit_text(*limit) for limit in beyond)
         for number, beyond in reversed(session.broken_limits(progress).items())
         if beyond
     )

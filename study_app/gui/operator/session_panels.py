@@ -91,7 +91,7 @@ class Header(QWidget):
         elif view.over or view.saved_ago_s > _SAVED_RECENTLY_S:
             self.saved.show_state("ok", "check", "All saved to disk")
         else:
-            self.saved.show_state("ok", "check", "Saved to disk now")
+            self.saved.show_state("ok", "check", "Just saved to disk")
         self.clock.setText(minutes(view.elapsed_s))
         self.expected.setText(f"of about {max(1, round(view.expected_s / 60))} min")
         done, of = view.main_trials
@@ -111,12 +111,13 @@ _RECONNECT = (
     "paused until you resume it; an interrupted trial starts again."
 )
 _WAITS = (
-    "The force is off and nothing is lost. Free disk space or reconnect the drive; the session then continues, paused."
+    "The force is off and nothing has been lost. Free up some disk space or reconnect the drive; the session will then "
+    "continue, paused."
 )
 _AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
 _WAITS_AT_END = (
-    "The force is off and the journal is complete. Free disk space, and leave this window open until the session's "
-    "other files are written."
+    "The force is off and the journal is complete. Free up some disk space, and leave this window open until the "
+    "session's other files have been written."
 )
 
 

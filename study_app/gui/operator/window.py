@@ -227,7 +227,7 @@ class OperatorWindow(Themed, QMainWindow):
         clear_frames(error.__traceback__)  # frames may hold a painter, and Qt would then paint no window
         if (what := f"{type(error).__name__}: {_PASSED_ON.sub('', str(error))}") not in self._failures:
             self._failures.add(what)
-            self.show_message("A part of this window failed", f"{what}. The session continues.")
+            self.show_message("Part of this window failed", f"{what}. The session continues.")
             self.ask("failed", what, error)
 
     def show_view(self, view: OperatorView) -> None:
@@ -262,9 +262,9 @@ class OperatorWindow(Themed, QMainWindow):
             self._open_question(
                 "repeat",
                 "Repeat this trial?",
-                f"{setting} restarts from the beginning. The first recording is kept with your reason.",
+                f"{setting} restarts from the beginning. The first recording is kept, together with your reason.",
                 ActionButton("repeat", "Repeat trial", role="primary"),
-                fields=(Field("reason", "Reason", placeholder="For example: phone rang"),),
+                fields=(Field("reason", "Reason", placeholder="For example: the phone rang"),),
                 needs={"reason": REASON},
             )
             self._asks_about = setting
@@ -274,8 +274,8 @@ class OperatorWindow(Themed, QMainWindow):
             self._open_question(
                 "end",
                 "End this session now?",
-                f"{dict(self._view.counts)['Answers on disk']} answers are on disk and are kept. The force is turned "
-                "off when the session ends.",
+                f"{dict(self._view.counts)['Answers on disk']} answers are on disk and will be kept. The force will "
+                "be turned off when the session ends.",
                 ActionButton("cross", "End session", role="danger"),
                 back="Continue the session",
                 fields=(

@@ -128,7 +128,7 @@ OF_THE_COMPUTER: Final = ("Servo rate", "Servo lateness", "Priority", "Screen", 
 """The checks before a session that say nothing of the study or its device."""
 
 _RECOMPILES: Final = (
-    "Every start compiles the model again, for up to a minute: set NUMBA_CACHE_DIR to a writable folder."
+    "The model is compiled again at every start, which takes up to a minute: set NUMBA_CACHE_DIR to a writable folder."
 )
 
 
@@ -267,7 +267,7 @@ class PreflightWindow(QWidget):
         self.rows: list[CheckRow] = []
         self.masking = _MaskingQuestion() if asks_masking else None
         self.plot = LatenessPlot(limit_us)
-        describe_plot(self.plot, "Tick lateness", "Histogram of how late the ticks of two seconds began, in µs.")
+        describe_plot(self.plot, "Tick lateness", "Histogram of how late ticks began during two seconds, in µs.")
         self.cancel = ActionButton("", "Cancel", height=46)
         self.again = ActionButton("repeat", "Check again", height=46)
         self.start = ActionButton("play", "Start", role="primary", height=46)
@@ -389,7 +389,7 @@ class _MaskingQuestion(QWidget):
         for means, text in MEANS.items():
             self.means.addItem(text, means)
         self.noise_db = Number(QUIETEST_DB, LOUDEST_DB, USUAL_DB)
-        self.noise_db.setAccessibleName("Level of the noise in dB")
+        self.noise_db.setAccessibleName("Noise level in dB")
         self.noise_db.setSuffix(" dB")
         self.noise_db.setVisible(False)
         self.means.currentIndexChanged.connect(lambda: self.noise_db.setVisible(self._is_noise))
@@ -406,10 +406,10 @@ class _MaskingQuestion(QWidget):
 
 _SIZE = (860, 620)
 _ABOUT = (
-    "Measured for two seconds with the simulated hand. A session measures again, with its own device and limits. "
-    "This page is also available under This machine."
+    "These values are measured for two seconds with the simulated hand. Each session measures them again with its own "
+    "device and limits. This page is also available under This machine."
 )
-_MEASURING = "Measuring … The force model is compiled at the first use, which may take a minute."
+_MEASURING = "Measuring … On first use the force model is compiled, which may take a minute."
 
 
 class ComputerWindow(Question):

@@ -283,7 +283,7 @@ class _FigureView(Coloured, QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         person = self._person_at(event.position())
         self.setCursor(Qt.CursorShape.PointingHandCursor if person else Qt.CursorShape.ArrowCursor)
-        self.setToolTip(plain_tip(f"{person}: click for the session" if person else ""))
+        self.setToolTip(plain_tip(f"{person}: click to open the session" if person else ""))
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         person = self._person_at(event.position())
@@ -498,7 +498,7 @@ class _WorkLine(Card):
             self.bar.show_share(going.share)
         elif untested:
             self.words.show_text(
-                "The computation was stopped before the tests: recognition and the lowest delays are missing."
+                "The computation was stopped before the tests, so recognition and the lowest delays are missing."
             )
 
 

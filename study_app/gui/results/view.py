@@ -159,8 +159,8 @@ class LeaveOutDialog(Question):
             parent,
             theme,
             "Exclude from the analysis",
-            "It is excluded from measures, figures and tests. No data are deleted: exclusions.csv and every "
-            "report state what was excluded, by whom and why.",
+            "The chosen session or trial is excluded from measures, figures and tests. No data are deleted: "
+            "exclusions.csv and every report state what was excluded, by whom and why.",
             ActionButton("minus", "Exclude", role="primary"),
             fields=(
                 choice_field(
@@ -277,7 +277,7 @@ class _ExclusionsCard(Card):
     def __init__(self) -> None:
         self.leave_out = ActionButton("minus", "Exclude …", height=36)
         super().__init__("Excluded", self.leave_out, padding=14, gap=6)
-        self.none = label("There are no exclusions from the analysis.", "label", "text2", wraps=True, weight=400)
+        self.none = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True, weight=400)
         self.open = ActionButton("file", "Open the list", role="plain", height=30)
         inside = QWidget()
         self._rows = vbox(STRETCH, spacing=8, margins=0, parent=inside)
@@ -324,7 +324,7 @@ class _ExclusionsCard(Card):
         why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
         now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
         by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at.astimezone(now.tzinfo), now)}")
-        by = f"Proposed by the rule “{by.replace('_', ' ')}”, not yet decided" if proposed else by
+        by = f"Proposed by the rule “{by.replace('_', ' ')}”; not yet decided" if proposed else by
         who = label(by, "small", "text2")
         vbox(hbox((what, 1), *buttons), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)
         made.setAccessibleName(f"{exclusion_text(exclusion)}: {exclusion.reason} ({by})")
@@ -343,9 +343,9 @@ STACKED_HEIGHT, EXCLUSIONS = 330, 360
 _REASON_SIGNS = 40
 _EXTRAS: Final = (
     _Extra("wide", "Wide table: one row per participant"),
-    _Extra("parquet", "Every table also as Parquet"),
+    _Extra("parquet", "Every table as Parquet too"),
     _Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
-    _Extra("psych-ds", "A Psych-DS folder of all tables, to share"),
+    _Extra("psych-ds", "A Psych-DS folder with all tables, for sharing"),
 )
 
 
@@ -362,8 +362,8 @@ _MISTAKE: Final = Trouble(
 
 _Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
 _REFUSALS: Final = {
-    LeaveOut: "It was not excluded",
-    TakeBack: "It is still excluded",
+    LeaveOut: "Nothing was excluded",
+    TakeBack: "The exclusion still applies",
     OpenKey: "The study is still blinded",
 }
 
@@ -504,7 +504,7 @@ class ResultsPlace(Place):
         if self.view.kind == "pilot":
             chips.append(("warn", "info", "Pilot", "Pilot sessions, stored separately"))
         if self.view.sealed:
-            chips.append(("neutral", "lock", "Blinded: shown by code", "The names of the conditions are sealed"))
+            chips.append(("neutral", "lock", "Blinded: shown by code", "The condition names are sealed"))
         if self.view.opened:
             opened, most = self.view.opened, 2 * _REASON_SIGNS
             text = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
@@ -572,7 +572,7 @@ class ResultsPlace(Place):
         proposed = not exclusion.excluded_at
         done = "Keep" if proposed else "Include again"
         why = (
-            f"A rule proposes to exclude it: {exclusion.reason}. It stays in measures, figures and tests."
+            f"A rule proposes excluding it: {exclusion.reason}. It will remain in measures, figures and tests."
             if proposed
             else f"It was excluded for this reason: “{exclusion.reason}”. It will be included again in measures, "
             "figures and tests."
@@ -589,7 +589,7 @@ class ResultsPlace(Place):
         )
         which = {"participant": exclusion.participant, "session": exclusion.session, "trial": exclusion.trial}
         which |= {"rule": exclusion.rule_or_person} if proposed else {}
-        decide = partial(self._order_decision, "taking the exclusion back", TakeBack, **which)
+        decide = partial(self._order_decision, "reversing the exclusion", TakeBack, **which)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open_dialog(dialog)
 
@@ -600,7 +600,7 @@ class ResultsPlace(Place):
             self,
             self.theme,
             f"Export {self._study_name()}",
-            "The answers, trials and counts of all participants as CSV files, with a codebook that explains every "
+            "All participants' answers, trials and counts as CSV files, with a codebook that explains every "
             f"column.{self._code_note()}",
             go_on="Export",
             to=self.results.resolve().parent / f"{self._study_name()}-tables",
@@ -614,8 +614,8 @@ class ResultsPlace(Place):
             self,
             self.theme,
             f"Report of {self._study_name()}",
-            "One page with figures, tests and conclusions, and every number, table and figure as a file. A large study "
-            f"takes some minutes.{self._code_note()}",
+            "One page with figures, tests and conclusions, and every number, table and figure as a file. This takes a "
+            f"few minutes for a large study.{self._code_note()}",
             go_on="Write the report",
             to=self.results.resolve().parent / f"{self._study_name()}-report",
             opens_file=True,
@@ -740,7 +740,7 @@ class ResultsPlace(Place):
         if chosen is None and folders:
             chosen = max(answer.studies, key=lambda study: study.newest_s).folder
         if chosen is None:
-            sentence = f"The first session of a study creates its folder in {self.results}."
+            sentence = f"A study's folder is created in {self.results} when its first session starts."
             self.show_view(
                 ResultsView(
                     trouble=Trouble(title="No studies yet", sentence=sentence, button="Go to Home", remedy="home")
@@ -807,7 +807,7 @@ class ResultsPlace(Place):
             trouble = Trouble(title="Your data are complete", sentence=sentence, button="Refresh", remedy="again")
             self._update_view(trouble=trouble, figures=(), drawing=None, testing=None)
         elif self.view.listed and not self.view.sessions:
-            sentence = "Results appear after the first session has started."
+            sentence = "Results will appear once the first session has started."
             trouble = Trouble(title="No sessions yet", sentence=sentence, button="Go to Home", remedy="home")
             self._update_view(trouble=trouble, figures=(), drawing=None, testing=None)
         else:
@@ -857,7 +857,7 @@ class ResultsPlace(Place):
             elif isinstance(answer, (Done, Refused)):
                 last = answer
             elif isinstance(answer, Crashed):
-                last = Refused(f"a bug ended the process that writes the files: {answer.sentence}")
+                last = Refused(f"a bug stopped the process that writes the files: {answer.sentence}")
         if last is None:
             return
         self._writer.close()

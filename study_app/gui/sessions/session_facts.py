@@ -206,9 +206,9 @@ _MISSING: _Chipped = ("warn", "warning", "Trials missing")
 
 
 LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
-    "lateness_p99_ms": ("lateness of ticks (99th percentile)", "ms"),
+    "lateness_p99_ms": ("tick lateness (99th percentile)", "ms"),
     "worst_gap_ms": ("longest time between two ticks", "ms"),
-    "delay_error_p95_ms": ("error of the delay (95th percentile)", "ms"),
+    "delay_error_p95_ms": ("delay error (95th percentile)", "ms"),
     "first_frame_gap_ms": ("time before the first frame", "ms"),
     "worst_frame_gap_ms": ("longest time between two frames", "ms"),
     "withheld_share": ("proportion of the force held back", "%"),

@@ -98,7 +98,7 @@ def read_record(folder: Path) -> SessionRecord:
     key = opened_key(study)
     lines = open_events(journal.read(session.journal), key)
     if not lines:
-        raise StoreError(f"{session.journal} is empty: the session did not begin")
+        raise StoreError(f"{session.journal} is empty: the session has not begun")
     listed = exclusions(study.path)
     (facts,) = session_facts(study.path, row_of(session, key), listed, {})
     own = tuple(exclusion for exclusion in listed if exclusion.what[:2] == (facts.participant, facts.session))
@@ -143,7 +143,8 @@ def _limits_sentence(
     lost = f"{_missing_sentence(missing, excluded=excluded)} " if missing.count else ""
     repeated = sum(trial.outcome == UNDELIVERED for trial in trials)
     again = (
-        f"{counted(repeated, 'presentation')} exceeded a limit and were not followed by a question. "
+        f"{counted(repeated, 'presentation')} exceeded a limit and {'was' if repeated == 1 else 'were'} not followed "
+        "by a question. "
         if repeated
         else ""
     )
@@ -154,29 +155,29 @@ def _limits_sentence(
 def _missing_sentence(missing: MissingTrials, *, excluded: bool) -> str:
     """Return sentences on undelivered trials, with reasons, and whether the session is included."""
     permitted = missing.limits.get(MISSING_PERCENT)
-    states = f" The study permits {permitted:g} % of the trials to be missing." if permitted is not None else ""
+    states = f" The study allows up to {permitted:g} % of the trials to be missing." if permitted is not None else ""
     if missing.exceed:
-        included = "Include it again in Results to analyse it." if excluded else "It was included by a person."
+        included = "Include it again in Results to analyse it." if excluded else "It was included manually."
         states += f" The session is incomplete. {included}"
-    return f"{missing}. Nobody answered them.{states}"
+    return f"{missing}. These trials were not answered.{states}"
 
 
 def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bool | None) -> str:
     judged = [trial for trial in trials if trial.valid is not None]
     outside = [trial for trial in judged if not trial.valid]
     if verdict is False and not outside:
-        return "Out of limits: at least one trial exceeded a limit of the study. Unblinding shows which one."
-    later = " Delay error, force held back and targets reached are checked after unblinding."
+        return "Out of limits: at least one trial exceeded one of the study's limits. Unblinding will show which trial."
+    later = " Delay error, force held back and targets reached will be checked after unblinding."
     later = later if sealed and not verdict else ""
     if not judged:
         return f"Trials have not been measured yet.{later}"
     if not outside:
         every = "The measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
-        return f"{every} met the limits of the study.{later}"
+        return f"{every} met the study's limits.{later}"
     return (
-        f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded a limit of the "
-        "study. The answers are still included; in Results you can exclude trials that you do not trust. The "
-        f"column “Limits” and the line below the table state the limit.{later}"
+        f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded one of the study's "
+        "limits. The answers are still included; in Results you can exclude trials that you do not trust. The "
+        f"column “Limits” and the line below the table show which limit.{later}"
     )
 
 

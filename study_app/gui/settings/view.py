@@ -157,12 +157,12 @@ def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
     """Return a sentence about the measured offset of a screen."""
     if offset is None:
         return (
-            "Not measured. The screen shows each frame slightly later; the delay is recorded as “not measured” in "
-            "every receipt."
+            "Not measured. The screen always shows frames with a slight delay; this delay is recorded as “not "
+            "measured” in every receipt."
         )
     text = f"{write_number(offset.mean_ms, _DECIMALS)} ± {write_number(offset.spread_ms, _DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
-    where = "" if offset.screen == screen else f" for another screen ({offset.screen}): not used here"
+    where = "" if offset.screen == screen else f" for a different screen ({offset.screen}), so it is not used here"
     return f"{text} by {offset.how}{when}{where}."
 
 
@@ -287,13 +287,13 @@ _PORTS = "One byte per event: serial:/dev/ttyUSB0, serial:COM3 or parallel:/dev/
 
 def _check_port(text: str) -> str:
     if text and not is_port(text):
-        raise ValueError(f"This is not the address of a port. {_PORTS}")
+        raise ValueError(f"This is not a port address. {_PORTS}")
     return text
 
 
 def _check_server(text: str) -> str:
     if not re.fullmatch(r"(https?://\S+)?", text):
-        raise ValueError(f"This is not the address of a server. {_STAMPS}")
+        raise ValueError(f"This is not a server address. {_STAMPS}")
     return text
 
 
@@ -309,26 +309,26 @@ def _text_or_empty(value: str | None) -> str:
 
 _SAMPLES = {
     "off": "Off",
-    "single-blind": "On, but off in double-blind studies",
-    "always": "On, also in double-blind studies",
+    "single-blind": "On, except in double-blind studies",
+    "always": "On, even in double-blind studies",
 }
 FIELDS = (
-    number_field("viewing_distance_mm", "Viewing distance, eye to screen", "mm", DISTANCE_MM),
-    number_field("screen_width_mm", "Width of the picture on the screen", "mm", WIDTH_MM),
+    number_field("viewing_distance_mm", "Viewing distance from eye to screen", "mm", DISTANCE_MM),
+    number_field("screen_width_mm", "Width of the screen's visible area", "mm", WIDTH_MM),
     Field("lsl_markers", "Markers over the Lab Streaming Layer (LSL)", "switch"),
-    choice_field("lsl_samples", "Samples of position and force over LSL", _SAMPLES),
+    choice_field("lsl_samples", "Position and force samples over LSL", _SAMPLES),
     Field("triggers", "Trigger port", hint=_PORTS, parse=_check_port),
-    Field("photodiode", "Square for a photodiode in the tank's corner", "switch"),
+    Field("photodiode", "Square in the tank's corner for a photodiode", "switch"),
     choice_field("device", "Device", {name: title_of(name) for name in list_devices()}),
     Field("camera", "Camera for conditions that show a camera picture", longest=CAMERA_LENGTH, placeholder=USUAL),
     Field(
         "proofs", "Folder for the study's proof, written when a session ends", "folder",
-        hint="A folder that people who can change results cannot change. Leave empty to disable.",
+        hint="A folder that cannot be changed by people who can change the results. Leave empty to disable.",
         parse=_check_path, write=_text_or_empty,
     ),
     Field("stamps", "Time-stamp server for proofs (RFC 3161)", hint=_STAMPS, parse=_check_server),
     Field(
-        "stamp_root", "Root certificate of the server (PEM), to verify its stamps", "file",
+        "stamp_root", "The server's root certificate (PEM), for verifying its stamps", "file",
         file_filter="Certificates (*.pem *.crt *.cer)", parse=_check_path, write=_text_or_empty,
     ),
 )  # fmt: skip
@@ -382,7 +382,7 @@ class _ScreensCard(Card):
             remove_widget(old)
         for at, radio in enumerate(self.radios, start=1):
             radio.setChecked(at == chosen)
-        self.note.setText(f"{missing} is not connected; the last screen is used instead." if missing else "")
+        self.note.setText(f"{missing} is not connected, so the last screen is used instead." if missing else "")
         self.note.setVisible(bool(missing))
 
 
@@ -414,7 +414,7 @@ class MachinePlace(Place):
             editor.changed.connect(lambda name, value: self.changed.emit({name: value}))
         self.screens, self.offset = _ScreensCard(), _OffsetForm()
         self.sample = label(_SAMPLE, "statement", wraps=True)
-        self.sample.setAccessibleName(f"A statement at the size that participants see: {_SAMPLE}")
+        self.sample.setAccessibleName(f"A sample statement in the size that participants see: {_SAMPLE}")
         self.sample.setFixedHeight(112)
         self.sample.setIndent(0)
         self.sample.setStyleSheet(
@@ -444,7 +444,7 @@ class MachinePlace(Place):
             add_parts(made.column, *(self.editors[part] if isinstance(part, str) else part for part in parts))
             return made
 
-        workspace = label("Workspace, the folder of protocols and results", "label", "text2")
+        workspace = label("Workspace, the folder for protocols and results", "label", "text2")
         folder = vbox(workspace, hbox((self.folder, 1), self.change, spacing=8), spacing=6)
         seen = "viewing_distance_mm", "screen_width_mm", self.sample, self.said
         columns = (
@@ -464,7 +464,7 @@ class MachinePlace(Place):
         self._body.setSpacing(18)
         for column in columns:
             add_layout(self._body, vbox(*column, STRETCH, spacing=18), 1)
-        about = "Settings of this computer and its screens, independent of every study. Changes are saved immediately."
+        about = "Settings for this computer and its screens; they apply to every study. Changes are saved immediately."
         titles = vbox(label("This machine", "title"), label(about, "body", "text2", wraps=True), spacing=4)
         head = hbox((titles, 1), self.check, self.undo, spacing=16, margins=(SHADOW, 0, SHADOW, 0))
         foot = hbox(self.kept_in, margins=(SHADOW, 0, SHADOW, 0))
@@ -535,8 +535,9 @@ class MachinePlace(Place):
 
 def _width_sentence(settings: MachineSettings, screen: ScreenShown) -> str:
     """Return a sentence on the screen width that the system reports."""
-    known = f"The system reports {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not report it."
-    return known if settings.screen_width_mm is None else f"{known} The measured value is used."
+    known = f"The system reports {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not report "
+    "the width."
+    return known if settings.screen_width_mm is None else f"{known} The measured value is used instead."
 
 
 def _text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: float) -> str:
@@ -544,7 +545,7 @@ def _text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: f
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:
         enlarged = f"Measure the viewing distance; text is then enlarged until an x subtends {least}."
-        return f"{enlarged} Until then it has its default size."
+        return f"{enlarged} Until then, text has its default size."
     if scale == 1.0:
         return f"Default size: an x subtends {seen:.2f}°; at least {least} is recommended."
     return f"{scale:.2f} times the default size: an x subtends {least} instead of {seen:.2f}°."

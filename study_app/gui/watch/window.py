@@ -42,7 +42,7 @@ LEAST_N, LEAST_MPS = 0.05, 0.01  # lower peaks are not drawn larger
 _MOST_POINTS: Final = 800  # of a curve
 _AXIS_PX: Final = 60  # of the plot's numbers
 _FORCES_HIDDEN: Final = "Hidden while the study is blinded"
-_SHOWS_FORCES: Final = "liquid-study unblind RESULTS shows forces."
+_SHOWS_FORCES: Final = "Run liquid-study unblind RESULTS to show forces."
 
 
 class _WatchedTank(TankWidget):
@@ -157,7 +157,7 @@ class Stage(QWidget):
         plot = self.forces or MaskedPanel(_FORCES_HIDDEN, _SHOWS_FORCES)
         plot.setMinimumHeight(88)
         plot.setMaximumHeight(190)
-        key = label("" if shown.blinded else "N: line sent, area requested", "small", "text2")
+        key = label("" if shown.blinded else "N: sent as a line, requested as an area", "small", "text2")
         above = hbox(self.numbers, (self.happened, 1), key, spacing=16, margins=(0, 4, int(MARGIN), 0))
         along = hbox((plot, 1), margins=(0, 0, int(MARGIN), 0))
         timed = hbox((self.line, 1), margins=(_AXIS_PX - int(MARGIN), 0, 0, 0))
@@ -227,7 +227,7 @@ class WatchWindow(Themed, QDialog):
         self, parent: QWidget, theme: Theme, folder: Path, trial: int, *, attempt: int, presented: str
     ) -> None:
         super().__init__(parent)
-        self.setWindowTitle(f"Trial {trial}, watched again")
+        self.setWindowTitle(f"Trial {trial}, replayed")
         self._folder, self._trial, self._attempt = folder, trial, attempt
         self.stage: Stage | None = None
         self.export_dialog: Work | None = None
@@ -248,7 +248,7 @@ class WatchWindow(Themed, QDialog):
         self.interval.setAccessibleName("Interval")
         self.seen = Toggle("As on the screen")
         self.seen.setToolTip(
-            "The ball with the delay that the participant saw; arrows and curves show the current moment"
+            "Shows the ball with the delay that the participant saw; arrows and curves show the current moment"
         )
         self.export = ActionButton("download", "Export as video …", height=40)
         self.play = ActionButton("play", "Play", cap="Space", height=40)
@@ -438,7 +438,7 @@ class WatchWindow(Themed, QDialog):
             return
         if isinstance(progress, Path):
             self._writing.stop()
-            dialog.show_done(f"The video is {progress}.", "Open the folder")
+            dialog.show_done(f"The video was saved as {progress}.", "Open the folder")
         else:
             dialog.show_progress("Painting …", progress)
 

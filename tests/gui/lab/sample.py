@@ -95,7 +95,7 @@ def still_view(bench: Workbench | None = None, **fields: Any) -> LabView:
         ),
         "tick_ns": 161.0,
         "errors": (
-            ErrorRow(measure="Wake, of Σ|e|/S", value="4e−15"),
+            ErrorRow(measure="Wake, relative to Σ|e|/S", value="4e−15"),
             ErrorRow(measure="Force, largest", value="< 0.001 N"),
             ErrorRow(measure="Lag of the velocity filter", value="9 ms"),
         ),

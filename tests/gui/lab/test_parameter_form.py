@@ -51,7 +51,7 @@ def test_every_number_says_exactly_what_it_shows_when_entered_again(place: Any, 
 def test_what_the_model_refuses_stays_with_the_reason_until_it_is_mended(place: Any, told: Any, still: LabView) -> None:
     row = fields(place)["wake.length"]
     enter(row.field, "9000")
-    why = "length 9000 exceeds scaling 2600: lower length or raise scaling"
+    why = "length 9000 exceeds scaling 2600: reduce length or increase scaling"
     refused = dataclasses.replace(still, refused=("wake.length", why))
     for _ in range(3):
         place.show_view(refused)

@@ -116,7 +116,7 @@ BROKEN = replace(
 RECORD = SessionRecord(
     facts=facts("P007", simulated=False),
     about="Device mouse  ·  language en",
-    limits="Out of limits: 1 of 2 measured trials exceeded a limit of the study.",
+    limits="Out of limits: 1 of 2 measured trials exceeded one of the study's limits.",
     trials=(
         TRIAL,
         BROKEN,

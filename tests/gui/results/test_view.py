@@ -168,7 +168,7 @@ def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
     proposed = replace(LEFT_OUT, trial=None, rule_or_person="below_chance", reason="0 of 40", excluded_at="")
     place.show_view(replace(view(), proposed=(proposed,)))
     out, keep = place.exclusions.lines[0].findChildren(ActionButton)
-    assert "Proposed by the rule “below chance”, not yet decided" in place.exclusions.lines[0].accessibleName()
+    assert "Proposed by the rule “below chance”; not yet decided" in place.exclusions.lines[0].accessibleName()
     click(qtbot, out)
     assert [place.dialog.value(name) for name in ("session", "trial", "by", "reason")] == [
         ("P003", 1), None, "below_chance", "0 of 40"

@@ -111,7 +111,7 @@ def test_a_page_says_what_each_trial_has_and_why_a_session_cannot_be_read(qtbot,
 
 def test_no_page_names_a_condition_of_a_sealed_study(study):
     record = read_record(next(iter(StudyFolder(study).sessions())).path)
-    assert record.limits == "All 4 measured trials met the limits of the study."
+    assert record.limits == "All 4 measured trials met the study's limits."
     text = repr(record)
     protocol = load("demo")
     assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []
