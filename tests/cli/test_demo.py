@@ -72,7 +72,7 @@ def test_without_the_analysis_libraries_sessions_stay_and_one_line_says_what_to_
     ("variables", "reason"),
     [
         ({"QT_QPA_PLATFORM": "offscreen"}, "QT_QPA_PLATFORM=offscreen does not show windows"),
-        ({}, "there is no display for a window|sudo apt install"),
+        ({}, "no display is available|sudo apt install"),
         ({"DISPLAY": ":7654"}, "':7654'|sudo apt install"),
     ],
     ids=["offscreen", "none", "not served"],

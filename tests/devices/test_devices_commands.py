@@ -68,7 +68,7 @@ class TestDoctor:
         ("fault", "words"),
         [
             ("dropp=0.1", "choose one of: drop, truncate"),
-            ("drop=1.5", "must be 0 to 1, not 1.5"),
+            ("drop=1.5", "must be from 0 to 1, not 1.5"),
             ("drop", "not known; choose from: drop=CHANCE"),
             ("never", "never-homes, "),
             ("frozen=1", "cannot occur at random"),

@@ -105,7 +105,7 @@ def test_a_reach_is_of_minimum_jerk():
     speed = np.linalg.norm(np.diff(seen, axis=0), axis=1).max() * 1e3
     assert speed == pytest.approx(1.875 * np.linalg.norm(end - start) / 0.5, rel=1e-3)
     assert not hand.device.moving
-    with pytest.raises(DeviceError, match="longer than 0 s, got 0"):
+    with pytest.raises(DeviceError, match="longer than 0 s, not 0"):
         hand.device.reach_to(0, 0, 0, duration_s=0)
 
 

@@ -34,7 +34,7 @@ def test_every_value_of_a_preset_can_be_set_again(name: str) -> None:
 
 
 def test_a_number_out_of_range_is_refused_in_the_units_that_are_shown() -> None:
-    with pytest.raises(StudyError, match=r"Breaking span must be 0 mm to 500 mm, not 700 mm"):
+    with pytest.raises(StudyError, match=r"Breaking span must be from 0 mm to 500 mm, not 700 mm"):
         with_parameter(SCENES["rek2024/water"], "wake.breaking_span_m", 0.7)
     with pytest.raises(StudyError, match="Density must be a number, not nan"):
         with_parameter(SCENES["rek2024/water"], "liquid.density_kg_m3", float("nan"))

@@ -146,7 +146,7 @@ def test_the_other_end_gets_each_event_in_order(kind: str, parport: str) -> None
         pytest.param(
             "serial:/dev/ptmx@99999999999999999999", "^serial:/dev/ptmx@9+ cannot be opened: ", marks=needs_posix
         ),
-        ("parallel:/dev/\0x", r"^'parallel:/dev/\\x00x' is not an address of markers: "),
+        ("parallel:/dev/\0x", r"^'parallel:/dev/\\x00x' is not a marker address: "),
         pytest.param("parallel:/nowhere/parport0", "parallel:/nowhere/parport0 cannot be opened: ", marks=needs_posix),
         ("usb:1", "'usb:1' is not a marker address: use one such as lsl, parallel:/dev/par"),
     ],

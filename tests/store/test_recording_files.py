@@ -144,8 +144,12 @@ def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Pat
     schema = parquet.read_schema(written.path)
     for name, unit, description in (
         ("position_y_m", b"m", b"Exact position of the hand, up."),
-        ("velocity_x_mps", b"m/s", b"Velocity in the scene from which the force was computed; resolution 1/4096 m/s,"),
-        ("device_force_z_n", b"N", b"Force that the device applied to the hand; resolution 1/16384 N, toward the"),
+        (
+            "velocity_x_mps",
+            b"m/s",
+            b"Velocity in the scene from which the force was computed (resolution: 1/4096 m/s),",
+        ),
+        ("device_force_z_n", b"N", b"Force that the device applied to the hand (resolution: 1/16384 N), toward the"),
     ):
         told = schema.field(name).metadata
         assert (told[b"unit"], told[b"description"][: len(description)]) == (unit, description)

@@ -150,7 +150,7 @@ def test_a_file_that_is_no_video_is_refused_in_one_line(tmp_path: Path, damage: 
     write_clip(tmp_path / "clip.mp4", frames=6, size=(64, 48))
     broken = tmp_path / "broken.mp4"
     broken.write_bytes(damage((tmp_path / "clip.mp4").read_bytes()))
-    with pytest.raises(VideoError, match=r"broken\.mp4 cannot be shown: .+; specify a video file") as refused:
+    with pytest.raises(VideoError, match=r"broken\.mp4 cannot be shown: .+; specify a playable video file") as refused:
         Footage(broken)
     assert "\n" not in str(refused.value)
     assert not any(word in str(refused.value) for word in ("NoneType", "codec can't", "Invalid argument"))

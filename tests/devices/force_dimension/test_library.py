@@ -113,7 +113,7 @@ class TestOpening:
         opened(standin, "force-dimension:10233").close()
         with pytest.raises(DeviceNotFound, match="the library cannot open the device"):
             opened(standin, "force-dimension:10234")
-        with pytest.raises(DeviceError, match="'left' is not a serial number"):
+        with pytest.raises(DeviceError, match="'left' is not a Force Dimension serial number"):
             opened(standin, "force-dimension:left")
 
 

@@ -126,7 +126,7 @@ class TestOpening:
         assert "\n" not in str(refused.value)
 
     def test_a_workspace_beyond_its_reach_is_refused(self) -> None:
-        with pytest.raises(DeviceError, match="a workspace of 200 x 60 x 60 mm exceeds the reach of an Inverse3"):
+        with pytest.raises(DeviceError, match="a workspace of 200 x 60 x 60 mm exceeds an Inverse3's reach"):
             EmulatedInverse3(workspace_m=(0.1, 0.03, 0.03))
 
     def test_an_address_names_host_port_and_device(self) -> None:
@@ -134,7 +134,7 @@ class TestOpening:
             with pytest.raises(DeviceNotFound, match=rf"does not answer \({said}:"):
                 open_device(f"inverse3:{where}")
         for where in (":1", "a:b", "a:0", "a:65536", "a:1:b:c", "a:-1"):
-            with pytest.raises(DeviceError, match="is not an address of the Inverse Service"):
+            with pytest.raises(DeviceError, match="is not a valid address for the Inverse Service"):
                 open_device(f"inverse3:{where}")
 
 

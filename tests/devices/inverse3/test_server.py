@@ -132,7 +132,7 @@ def test_a_service_that_does_not_answer_about_its_force_scale_moves_nothing(
     late = threading.Event()
     monkeypatch.setattr(server, "_answer_http", lambda _head: answer or str(late.wait(PATIENCE_S)).encode())
     with pytest.raises(
-        DeviceFailure, match=r"multiplier of all forces is not known \(no number within 0\.5 s\).*restart"
+        DeviceFailure, match=r"service multiplies all forces is unknown \(no number within 0\.5 s\).*restart"
     ):
         open_device(f"inverse3:127.0.0.1:{server.port}")
     late.set()

@@ -143,6 +143,6 @@ def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblindi
 
     assert (before.facts.validity, after.facts.validity) == ("invalid", "invalid")
     assert [trial.valid for trial in before.trials] == [None, None]  # which trial it was would tell the thick liquid
-    assert before.limits.endswith("Unblinding shows which one.")
+    assert before.limits.endswith("Unblinding will show which trial.")
     assert [trial.valid for trial in after.trials] == [True, False]
     assert after.limits.startswith("Out of limits: 1 of 2 measured trials")

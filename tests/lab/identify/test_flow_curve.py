@@ -79,7 +79,9 @@ def test_a_relaxation_time_does_not_change_a_flow_curve():
     assert found.values["zero_shear_viscosity_pa_s"] == pytest.approx(20)
     assert not found.distinguishable
     (warning,) = found.warnings
-    assert warning.startswith("relaxation_time_s does not change the stress at these shear rates: 0.3 is its initial")
+    assert warning.startswith(
+        "relaxation_time_s does not change the stress at these shear rates, so its initial value 0.3 was kept"
+    )
 
 
 THICKENING = ["zero_shear_viscosity_pa_s", "thickened_viscosity_pa_s", "onset_shear_rate_per_s"]
