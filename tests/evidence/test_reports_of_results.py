@@ -72,7 +72,7 @@ GIVEN: dict[str, Any] = {
     "delay": lambda rng: int(rng.integers(1, 4)),
     "strokes": lambda rng: tuple(rng.choice([0.0, 0.03, 0.2], len(withheld_force.STROKES)).tolist()),
     "after": lambda rng: tuple(tuple(rng.choice([0.0, 0.0004, 0.1], 4).tolist()) for _ in withheld_force.QUICK),
-    "reasons": lambda rng: tuple(rng.choice(["not finite", "swing"], int(rng.integers(0, 3)), replace=False)),
+    "reasons": lambda rng: tuple(rng.choice(["not finite", "noise"], int(rng.integers(0, 3)), replace=False)),
 }  # fmt: skip
 QUICK = {
     "timing_report-text": report.evidence, "delay_report-text": delays.evidence,
@@ -81,7 +81,6 @@ QUICK = {
     "verdicts-write": known_values.evidence,
     "noticed_delays-markdown": noticed_delays.evidence,
     "rates-write": simulation.evidence,
-    "stability_report-group_table": stability_report.group_table,
     "stability_report-in_words": stability_report.in_words, "stability_report-summary": stability_report.summary,
     "force_delay-report": force_delay.evidence, "criteria-report": velocity.evidence,
     "withheld_force-report": withheld_force.evidence,

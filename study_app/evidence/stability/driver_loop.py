@@ -7,7 +7,7 @@ of the case. Samples, encoders and delay are those of the Falcon. What is judged
   stop, 2 mJ more than a scripted device does that acts as late. Where a light handle swings until the passivity
   controller calms it, that hangs on micrometres and milliseconds (1 to 11 mJ in honey): the worst of three encoder
   counts counts and, before it is called unstable, of releases up to 2 ms earlier and later;
-- *force*: compared with that of the scripted device in place of the motion without feedback.
+- *sustained force*, *noise*: compared with the scripted device in place of the motion without feedback.
 """
 
 import dataclasses
@@ -19,21 +19,20 @@ import numpy as np
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.devices.simulated import ScriptedDevice
-from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, fast_part, given_out_j, lasts_s, lowest_balance
+from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, given_out_j, lasts_s, lowest_balance
 from study_app.evidence.stability.closed_loop import TRACE, place, write_row
 from study_app.evidence.stability.stability_cases import GRIPS, LETS_GO, Case, scene_of
 from study_app.evidence.stability.verdict import (
     ALLOWANCE_J,
-    FAST_HZ,
-    ONCE_S,
-    RESTLESS_N,
     SWING_MPS,
     Verdict,
     acted,
+    compare_fast,
     not_finite,
     reasons_of,
     swing,
     windows,
+    worst_of,
 )
 from study_app.haptics.kernels.c_functions import Driver
 from study_app.haptics.kernels.compiled import kernel
@@ -109,12 +108,17 @@ def judge_driven(case: Case) -> Verdict:
                 given_j = max(_given_out(near, other) for other in _scripted_traces(near, dynamics))
                 permitted_j = min(permitted_j, -_BEYOND_SCRIPTED_J - given_j)
     swing_mps = swing(trace, case)
-    fast_n, scripted_n = _restlessness(case, trace, others)
+    restlessness = worst_of(
+        [
+            compare_fast(trace.sent_n[:ends], [other.sent_n[:ends] for other in others], case.rate_hz, begins)
+            for begins, ends in (np.searchsorted(trace.t_s, window_s) for window_s in windows(case))
+        ]
+    )
     reasons = reasons_of(
-        np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N + _MOTOR_STEP_N,
-        lacks or balance_j < permitted_j,
-        swing_mps > SWING_MPS,
-        fast_n - scripted_n > RESTLESS_N,
+        limit=np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N + _MOTOR_STEP_N,
+        energy=lacks or balance_j < permitted_j,
+        oscillation=swing_mps > SWING_MPS,
+        restlessness=restlessness,
     )
     return Verdict(
         case=case,
@@ -123,8 +127,8 @@ def judge_driven(case: Case) -> Verdict:
         balance_j=balance_j,
         permitted_j=permitted_j,
         swing_mps=swing_mps,
-        fast_n=fast_n,
-        played_n=scripted_n,
+        fast_n=restlessness.fast_n,
+        played_n=restlessness.control_n,
         acted=acted(trace),
     )
 
@@ -223,16 +227,3 @@ def _given_out(case: Case, trace: Any) -> float:
     met = (np.abs(trace.position_m[first:]) >= _AT_STOP * np.array(_STOP_M)).any(axis=1)
     last = first + int(np.argmax(met)) if met.any() else len(trace)
     return float(given_out_j(trace[first:last]))
-
-
-def _restlessness(case: Case, trace: Any, others: list[Any]) -> tuple[float, float]:
-    """Return the RMS of the force's fast part and the greatest of the scripted devices', where they differ most."""
-    swings = []
-    for window_s in windows(case):
-        begins, ends = np.searchsorted(trace.t_s, window_s)
-        fast_n, *others_n = (
-            fast_part(one.sent_n, case.rate_hz, FAST_HZ, begins, min(ends, len(one)), ONCE_S)
-            for one in (trace, *others)
-        )
-        swings.append((fast_n, max(others_n)))
-    return max(swings, key=lambda pair: pair[0] - pair[1])

@@ -1,8 +1,8 @@
 """The stability of hard cases: the sweep with the safety layer off and on, the other groups with it.
 
 What a case is made of is said in `stability_cases`, which cases there are in `case_groups`, when one counts as unstable
-in `verdict`, the maximum stable damping in `damping_limits`. The map shows the limit of a free handle, what its
-friction proves, what limits allow, and what a sweep finds.
+or noisy in `verdict`, the maximum stable damping in `damping_limits`. The map shows the limit of a free handle, what
+its friction proves, what limits allow, and what a sweep finds.
 """
 
 import collections
@@ -35,7 +35,7 @@ from study_app.evidence.stability.damping_limits import (
 )
 from study_app.evidence.stability.driver_loop import judge_driven
 from study_app.evidence.stability.stability_cases import CIRCLES, FALCON, REACHES, STROKE, Case, liquids
-from study_app.evidence.stability.verdict import REASONS, Verdict, judge
+from study_app.evidence.stability.verdict import NOISY, REASONS, UNSTABLE, Verdict, judge
 from study_app.evidence.table import Evidence, Table, plot_files, run
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.scene import Ewma
@@ -110,7 +110,7 @@ def _found(axes: Axes, off: Sequence[Verdict]) -> None:
     bad: collections.Counter[tuple[float, int]] = collections.Counter()
     for verdict in off:
         total[verdict.case.rate_hz, verdict.case.delay] += 1
-        bad[verdict.case.rate_hz, verdict.case.delay] += not verdict.stable
+        bad[verdict.case.rate_hz, verdict.case.delay] += verdict.grade == UNSTABLE
     rates_hz = sorted({rate_hz for rate_hz, _ in total}, reverse=True)
     shares = np.array([[bad[r, d] / max(total[r, d], 1) for r in rates_hz] for d in DELAYS])
     axes.grid(visible=False)
@@ -243,6 +243,7 @@ def _compare(case: Case, trace: Any) -> Fidelity:
     )
 
 
+_NOISY_SHARE: Final = 1e-4
 _MEASURES: Final = ("balance_j", "permitted_j", "swing_mps", "fast_n", "played_n")
 
 
@@ -253,9 +254,8 @@ class _Judged:
     name: str
     verdicts: tuple[Verdict, ...]
 
-    @property
-    def unstable(self) -> tuple[Verdict, ...]:
-        return tuple(verdict for verdict in self.verdicts if not verdict.stable)
+    def of_grade(self, grade: str) -> tuple[Verdict, ...]:
+        return tuple(verdict for verdict in self.verdicts if verdict.grade == grade)
 
 
 @dataclass(frozen=True, slots=True)
@@ -267,10 +267,15 @@ class Swept:
     took_s: float
     others: tuple[_Judged, ...] = ()
 
+    def of_grade(self, grade: str) -> tuple[Verdict, ...]:
+        """Return the verdicts of a grade among those with safety on."""
+        return tuple(verdict for group in self.groups for verdict in group.of_grade(grade))
+
     @property
-    def unstable(self) -> tuple[Verdict, ...]:
-        """The verdicts that are unstable although safety is on."""
-        return tuple(verdict for group in self.groups for verdict in group.unstable)
+    def missed(self) -> bool:
+        """Whether a case with safety on is unstable, or more than one in 10,000 are noisy."""
+        judged = sum(len(group.verdicts) for group in self.groups)
+        return bool(self.of_grade(UNSTABLE)) or len(self.of_grade(NOISY)) > _NOISY_SHARE * judged
 
     @property
     def groups(self) -> tuple[_Judged, ...]:
@@ -309,7 +314,7 @@ def _judge(case: Case, safe: bool) -> Verdict:
 def in_words(verdict: Verdict) -> str:
     """Return a verdict as a sentence."""
     said = f"safety {'on' if verdict.safe else 'off'}: "
-    said += "stable" if verdict.stable else f"unstable ({', '.join(verdict.reasons)})"
+    said += f"{verdict.grade} ({', '.join(verdict.reasons)})" if verdict.reasons else verdict.grade
     if verdict.reasons == ("not finite",):
         return said
     reference = "with the scripted device" if verdict.case.plant == FALCON else "without feedback"
@@ -332,26 +337,40 @@ def _counts(swept: Swept) -> Iterator[str]:
     yield f"{cases} cases with safety off and on, {others} others with safety on, {swept.took_s:.0f} s"
     yield f"{'':24} safety off   safety on"
     reasons = [collections.Counter(r for v in verdicts for r in v.reasons) for verdicts in (swept.off, swept.on)]
-    unstable = [sum(not verdict.stable for verdict in verdicts) for verdicts in (swept.off, swept.on)]
-    yield f"{'unstable':24} {unstable[0]:10d}  {unstable[1]:10d}"
-    for reason in REASONS:
+    grades = [collections.Counter(verdict.grade for verdict in verdicts) for verdicts in (swept.off, swept.on)]
+    yield f"{UNSTABLE:24} {grades[0][UNSTABLE]:10d}  {grades[1][UNSTABLE]:10d}"
+    for reason in REASONS[:-1]:
         yield f"  {reason:22} {reasons[0][reason]:10d}  {reasons[1][reason]:10d}"
+    yield f"{NOISY:24} {grades[0][NOISY]:10d}  {grades[1][NOISY]:10d}"
 
 
 def group_table(swept: Swept) -> str:
-    """Return, for each group, the unstable cases and the most energy that the handle gained from a liquid."""
-    return "\n".join(_group_lines(swept))
+    """Return, for each group, the unstable and noisy cases and the most energy that the handle gained from a liquid."""
+    return "\n".join((*_group_lines(swept), "", _grade_line(swept)))
+
+
+def _grade_line(swept: Swept) -> str:
+    """Return the numbers of unstable and noisy cases with safety on, and the greatest force of the noisy ones."""
+    unstable, noisy = swept.of_grade(UNSTABLE), swept.of_grade(NOISY)
+    judged = sum(len(group.verdicts) for group in swept.groups)
+    line = f"with safety on, of {judged} cases: {len(unstable)} unstable, {len(noisy)} noisy"
+    if not noisy:
+        return line
+    worst = max(noisy, key=lambda verdict: verdict.fast_n - verdict.played_n)
+    excess_n = worst.fast_n - worst.played_n
+    return f"{line} (above 40 Hz at most {worst.fast_n:.2f} N, {excess_n:.2f} N more than the control)"
 
 
 def _group_lines(swept: Swept) -> Iterator[str]:
     width = max(len(group.name) for group in swept.groups)
-    yield f"{'with safety on':{width + 2}}   cases  unstable   given out   beyond the bound, at most [mJ]"
+    yield f"{'with safety on':{width + 2}}   cases  unstable   noisy   given out   beyond the bound, at most [mJ]"
     for group in swept.groups:
         finite = [verdict for verdict in group.verdicts if math.isfinite(verdict.balance_j)]
         given_j = max((-verdict.balance_j for verdict in finite), default=math.nan)
         beyond_j = max((max(verdict.permitted_j - verdict.balance_j, 0.0) for verdict in finite), default=math.nan)
-        counts = f"{len(group.verdicts):7} {len(group.unstable):9} {1e3 * given_j:11.2f} {1e3 * beyond_j:11.2f}"
-        reasons = collections.Counter(reason for verdict in group.unstable for reason in verdict.reasons)
+        unstable, noisy = [len(group.of_grade(grade)) for grade in (UNSTABLE, NOISY)]
+        counts = f"{len(group.verdicts):7} {unstable:9} {noisy:7} {1e3 * given_j:11.2f} {1e3 * beyond_j:11.2f}"
+        reasons = collections.Counter(reason for verdict in group.verdicts for reason in verdict.reasons)
         why = ", ".join(f"{reason} {count}" for reason, count in reasons.items())
         yield f"  {group.name:{width}} {counts}   {why}".rstrip()
 
@@ -384,13 +403,14 @@ def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidenc
     """Return a summary (or a table of groups), the cases as CSV, the unstable ones as text, and the map."""
     text = f"seed {seed}\n\n{summary(swept, fidelities) if swept.on else group_table(swept)}"
     lines = ("# When the simulation is stable", "", "```", text, "```", "", "![Map](map.png)", "")
-    unstable = (*(f"- unstable with safety on: `{verdict.case}`" for verdict in swept.unstable), "")
-    files = {"cases.csv": _cases_csv(swept), "stability.md": "\n".join((*lines, *unstable))}
-    for safety, verdicts in (("off", swept.off), ("on", swept.unstable)):
-        lines_of_cases = (f"{verdict.case}\n" for verdict in verdicts if not verdict.stable)
-        files[f"unstable-safety-{safety}.txt"] = "".join(lines_of_cases)
+    on = {grade: swept.of_grade(grade) for grade in (UNSTABLE, NOISY)}
+    flagged = (f"- {grade} with safety on: `{verdict.case}`" for grade in on for verdict in on[grade])
+    files = {"cases.csv": _cases_csv(swept), "stability.md": "\n".join((*lines, *flagged, ""))}
+    off = [verdict for verdict in swept.off if verdict.grade == UNSTABLE]
+    for name, verdicts in (("unstable-safety-off", off), *((f"{grade}-safety-on", on[grade]) for grade in on)):
+        files[f"{name}.txt"] = "".join(f"{verdict.case}\n" for verdict in verdicts)
     figures = plot_files("map", "Where a liquid stays stable", draw_map, swept.off)
-    return Evidence(f"{text}\n", files, figures, missed=bool(swept.unstable))
+    return Evidence(f"{text}\n", files, figures, missed=swept.missed)
 
 
 def limits(executor: Executor, progress: Callable[[int, int], object], file: str) -> Evidence:
@@ -410,11 +430,11 @@ def limits(executor: Executor, progress: Callable[[int, int], object], file: str
 
 
 def _cases_csv(swept: Swept) -> str:
-    names = [f"{name}_{safety}" for safety in ("off", "on") for name in ("unstable", *_MEASURES)]
+    names = [f"{name}_{safety}" for safety in ("off", "on") for name in ("grade", "reasons", *_MEASURES)]
     rows: list[Sequence[Any]] = [(*(field.name for field in fields(Case)), *names, *(f"{n}_on" for n in LIMITER_NAMES))]
     for off, on in zip(swept.off, swept.on, strict=True):
         row = list(astuple(off.case))
         for verdict in (off, on):
-            row += ["; ".join(verdict.reasons), *(f"{getattr(verdict, name):.4g}" for name in _MEASURES)]
+            row += [verdict.grade, "; ".join(verdict.reasons), *(f"{getattr(verdict, name):.4g}" for name in _MEASURES)]
         rows.append((*row, *(f"{share:.4g}" for share in on.acted)))
     return csv_text_of(rows)

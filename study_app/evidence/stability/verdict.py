@@ -1,4 +1,4 @@
-"""Whether a closed loop was stable: five things that must not happen, and the numbers that say so.
+"""Whether a closed loop was stable, noisy or unstable: six things that must not happen, and their numbers.
 
 - *not finite*: a force or the handle's position is not finite;
 - *limit*: the servo sent more than it may;
@@ -7,8 +7,12 @@
   lower, where the loop is mistaken about the device's delay;
 - *oscillation*: the handle, at rest or let go, goes on swinging above 12 Hz at more than 40 mm/s and does not tire over
   0.4 s, or does so above 40 Hz while it is being moved;
-- *force*: above 40 Hz the force exceeds that of the same motion played without feedback by more than 0.05 N in the mean
-  square root over a stretch of 0.4 s or more, the strongest 0.1 s of each aside.
+- *sustained force*: above 40 Hz the force exceeds that of the same motion played without feedback by more than 0.05 N
+  RMS in each of four successive intervals of 0.1 s, and by at least 0.8 times as much in the last as in the first;
+- *noise*: it does so over an interval of 0.4 s or more, excluding the strongest 0.1 s of each, and is not sustained.
+
+A case with any reason but noise is **unstable**; one with noise alone is **noisy**: its force buzzes for a moment, but
+neither supplies energy nor persists.
 
 Where a study delays the force, the handle works at the bounds of the controller: an encoder count and the noise count
 for the energy, the swing may reach 100 mm/s, and the force a fifth more than that of the motion without feedback.
@@ -25,9 +29,9 @@ the motors off, too: hence the first of the three, also for a hand that lets go 
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -45,7 +49,12 @@ from study_app.evidence.stability.stability_cases import LETS_GO, THROWN, Case
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.slope_limits import DampingLimits
 
-REASONS: Final = ("not finite", "limit", "energy", "oscillation", "force")
+STABLE: Final = "stable"
+NOISY: Final = "noisy"
+UNSTABLE: Final = "unstable"
+_NOISE: Final = "noise"
+REASONS: Final = ("not finite", "limit", "energy", "oscillation", "sustained force", _NOISE)
+"""All but the last make a case unstable."""
 
 _SETTLES_S: Final = 0.2
 _LEAD_S: Final = 0.06
@@ -61,15 +70,17 @@ _LATE_SWING_MPS: Final = 0.1
 """The same of a force that a study delays: 1 mJ, which the controller tolerates, moves 0.2 kg at this speed."""
 _LATE_SHARE: Final = 0.2
 """Such a force is restless beyond this share of the one without feedback: jitter and loss make steps of its size."""
-ONCE_S: Final = 0.1
+_ONCE_S: Final = 0.1
+_SUSTAINED: Final = 4
+"""Number of successive intervals of `_ONCE_S` in which a sustained force exceeds its limit."""
 _TIRED: Final = 0.8
-RESTLESS_N: Final = 0.05
+_RESTLESS_N: Final = 0.05
 _SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict:
-    """The verdict on a case: ``reasons`` why it is unstable, empty if it is stable, and the measured quantities.
+    """The verdict on a case: ``reasons`` why it is unstable or noisy, empty if it is stable, and what was measured.
 
     ``acted`` is the fraction of ticks in which each limiter acted, in the order of ``LIMITER_NAMES``.
     """
@@ -85,8 +96,19 @@ class Verdict:
     acted: tuple[float, ...]
 
     @property
-    def stable(self) -> bool:
-        return not self.reasons
+    def grade(self) -> str:
+        if not self.reasons:
+            return STABLE
+        return NOISY if self.reasons == (_NOISE,) else UNSTABLE
+
+
+class Restlessness(NamedTuple):
+    """The force above 40 Hz [N RMS], that of the control, and whether the excess is beyond its limit and sustained."""
+
+    fast_n: float
+    control_n: float
+    excessive: bool
+    sustained: bool
 
 
 def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
@@ -104,9 +126,11 @@ def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
     )
 
 
-def reasons_of(*found: bool) -> tuple[str, ...]:
-    """Return the names of the reasons that apply, after the first, in order."""
-    return tuple(reason for reason, holds in zip(REASONS[1:], found, strict=True) if holds)
+def reasons_of(*, limit: bool, energy: bool, oscillation: bool, restlessness: Restlessness) -> tuple[str, ...]:
+    """Return the names of the reasons that apply to a finite trace."""
+    noise = restlessness.excessive and not restlessness.sustained
+    applies = (False, limit, energy, oscillation, restlessness.sustained, noise)
+    return tuple(itertools.compress(REASONS, applies))
 
 
 def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Verdict:
@@ -133,12 +157,12 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
     if case.misjudged:
         permitted_j = min(permitted_j, -MISJUDGED_ALLOWANCE_J)
     swing_mps = swing(trace, case)
-    fast_n, played_n = _restlessness(case, trace, before, limits)
+    restlessness = _restlessness(case, trace, before, limits, late_share=_LATE_SHARE if linked else 0.0)
     reasons = reasons_of(
-        safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
-        balance_j < permitted_j,
-        swing_mps > (_LATE_SWING_MPS if linked else SWING_MPS),
-        fast_n - played_n > (max(RESTLESS_N, _LATE_SHARE * played_n) if linked else RESTLESS_N),
+        limit=safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
+        energy=balance_j < permitted_j,
+        oscillation=swing_mps > (_LATE_SWING_MPS if linked else SWING_MPS),
+        restlessness=restlessness,
     )
     return Verdict(
         case=case,
@@ -147,8 +171,8 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         balance_j=balance_j,
         permitted_j=permitted_j,
         swing_mps=swing_mps,
-        fast_n=fast_n,
-        played_n=played_n,
+        fast_n=restlessness.fast_n,
+        played_n=restlessness.control_n,
         acted=acted(trace),
     )
 
@@ -187,15 +211,15 @@ def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> fl
 
 
 def _restlessness(
-    case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None
-) -> tuple[float, float]:
-    """Return the RMS of the force's fast part and that without feedback, where they differ most."""
+    case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None, *, late_share: float
+) -> Restlessness:
+    """Compare the force's fast part with that of the same motion without feedback, where they differ most."""
     calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
     smooth(trace, _SPREAD_S, calm_m, calm_n)
     calm_mps = np.gradient(calm_m, trace.t_s, axis=0)
     undecided_m = case.quantum_um * 1e-6 * (np.random.default_rng(1).random(calm_m.shape) - 0.5)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
-    swings = []
+    compared = []
     for window_s, (first, bench) in zip(windows(case), before, strict=True):
         begins, ends = np.searchsorted(trace.t_s, window_s)
         played = [passive] if passive is not None and len(passive) >= ends else []
@@ -206,12 +230,51 @@ def _restlessness(
             answer.velocity_mps[:] = calm_mps
             again.play(answer[first:ends], places_m[first:ends])
             played.append(answer)
-        fast_n, *others_n = (
-            fast_part(one.sent_n, case.rate_hz, FAST_HZ, begins, min(ends, len(one)), ONCE_S)
-            for one in (trace, *played)
+        controls_n = [answer.sent_n[:ends] for answer in played]
+        compared.append(compare_fast(trace.sent_n[:ends], controls_n, case.rate_hz, begins, late_share=late_share))
+    return worst_of(compared)
+
+
+def compare_fast(
+    force_n: Any, controls_n: Sequence[Any], rate_hz: float, first: int, *, late_share: float = 0.0
+) -> Restlessness:
+    """Compare the fast part of a force (rows, 3) [N] with the greatest of its controls, from row ``first`` onwards.
+
+    The permitted excess is 0.05 N, or ``late_share`` of the control if that is more. Controls may have fewer rows.
+    """
+
+    def measure(begins: int, ends: int, aside_s: float = 0.0) -> tuple[float, float]:
+        fast_n, *calm_n = (
+            fast_part(each, rate_hz, FAST_HZ, begins, min(ends, len(each)), aside_s) for each in (force_n, *controls_n)
         )
-        swings.append((fast_n, max(others_n)))
-    return max(swings, key=lambda pair: pair[0] - pair[1])
+        return fast_n, max(calm_n)
+
+    fast_n, control_n = measure(first, len(force_n), _ONCE_S)
+    rows = range(first, len(force_n) + 1, round(_ONCE_S * rate_hz))
+    pairs_n = np.array([measure(*interval) for interval in itertools.pairwise(rows)]).reshape(-1, 2)
+    permitted_n = np.maximum(_RESTLESS_N, late_share * pairs_n[:, 1])
+    return Restlessness(
+        fast_n=fast_n,
+        control_n=control_n,
+        excessive=fast_n - control_n > max(_RESTLESS_N, late_share * control_n),
+        sustained=_is_sustained(pairs_n[:, 0] - pairs_n[:, 1], permitted_n),
+    )
+
+
+def _is_sustained(excesses_n: Any, permitted_n: Any) -> bool:
+    """Return whether the excess is beyond what is permitted in four successive intervals, and does not decay."""
+    beyond = excesses_n > permitted_n
+    last = len(beyond) - _SUSTAINED + 1
+    return any(
+        beyond[k : k + _SUSTAINED].all() and excesses_n[k + _SUSTAINED - 1] >= _TIRED * excesses_n[k]
+        for k in range(last)
+    )
+
+
+def worst_of(compared: Sequence[Restlessness]) -> Restlessness:
+    """Return the greatest excess; it is sustained if any is."""
+    worst = max(compared, key=lambda each: each.fast_n - each.control_n)
+    return worst._replace(sustained=any(each.sustained for each in compared))
 
 
 def _passive(case: Case, safe: bool, limits: DampingLimits | None) -> Any | None:

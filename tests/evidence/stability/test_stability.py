@@ -12,7 +12,8 @@ from study_app.errors import StudyError
 from study_app.evidence.stability import stability_report as stability
 from study_app.evidence.stability.case_groups import Group, evenly_chosen, groups, sweep
 from study_app.evidence.stability.stability_cases import Case, liquids, parse, scene_of
-from study_app.evidence.stability.verdict import judge
+from study_app.evidence.stability.verdict import Verdict, judge
+from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.slope_limits import slope_limit_table
 from study_app.workers.executors import open_executor
 from tests.haptics.scenes import COMPILED
@@ -38,17 +39,17 @@ def swept():
 
 @compiled
 def test_many_are_unstable_without_safety_and_none_with_it(swept):
-    unstable = [verdict for verdict in swept.off if not verdict.stable]
+    unstable = [verdict for verdict in swept.off if verdict.reasons]
     assert len(unstable) > 25
-    assert {reason for verdict in unstable for reason in verdict.reasons} == {"energy", "oscillation", "force"}
-    assert [str(verdict.case) for verdict in swept.unstable] == []
+    assert {reason for verdict in unstable for reason in verdict.reasons} >= {"energy", "oscillation"}
+    assert [str(verdict.case) for verdict in swept.on if verdict.reasons] == []
 
 
 @compiled
 def test_the_strongest_linear_damper_is_unstable_without_safety_and_stable_with_it():
     damped = [dataclasses.replace(case, liquid="damper") for case in evenly_chosen(sweep(), 60)]
-    assert sum(not judge(case, safe=False).stable for case in damped) > 25
-    assert [str(case) for case in damped if not judge(case, safe=True).stable] == []
+    assert sum(bool(judge(case, safe=False).reasons) for case in damped) > 25
+    assert [str(case) for case in damped if judge(case, safe=True).reasons] == []
     assert parse(str(damped[0])) == damped[0]
 
 
@@ -73,7 +74,7 @@ def test_a_handle_without_any_friction_comes_to_rest_in_tar(speed_mps, quantum_u
     for jitter, missed in ((0.0, 0.0), (0.0, 0.02), (0.2, 0.0), (0.2, 0.02)):
         changed = {"speed_mps": speed_mps, "quantum_um": quantum_um, "jitter": jitter, "missed": missed}
         verdict = judge(dataclasses.replace(thrown, **changed), safe=True)
-        assert verdict.stable, verdict.case
+        assert not verdict.reasons, verdict.case
         assert verdict.swing_mps < 0.03
 
 
@@ -139,6 +140,32 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
     assert len(lines) == 2 * (1 + len(groups(count=2)))
     assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}
+
+
+def test_it_tolerates_one_noisy_case_in_10000_and_no_unstable_one():
+    stable = Verdict(
+        case=Case(),
+        safe=True,
+        reasons=(),
+        balance_j=0.0,
+        permitted_j=-1e-3,
+        swing_mps=0.0,
+        fast_n=0.4,
+        played_n=0.3,
+        acted=(0.0,) * len(LIMITER_NAMES),
+    )
+    noisy, unstable = (dataclasses.replace(stable, reasons=reasons) for reasons in (("noise",), ("energy", "noise")))
+
+    def swept_with(*verdicts):
+        return stability.Swept((), (*verdicts, *[stable] * (20_000 - len(verdicts))), 0.0)
+
+    assert not swept_with(noisy, noisy).missed
+    assert swept_with(noisy, noisy, noisy).missed
+    assert swept_with(unstable).missed
+    line = stability.group_table(swept_with(noisy, unstable)).splitlines()[-1]
+    assert line == (
+        "with safety on, of 20000 cases: 1 unstable, 1 noisy (above 40 Hz at most 0.40 N, 0.10 N more than the control)"
+    )
 
 
 @compiled
