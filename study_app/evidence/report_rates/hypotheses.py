@@ -196,12 +196,12 @@ def _contrasts() -> Iterator[DrawnStudies]:
             claim=_SHOWN,
             trial=_compares_pairs(n, _one_in_six),
         )
-    yield DrawnStudies(
-        name="paired, exponential",
-        participants=30,
-        claim=_SHOWN,
-        trial=_compares_pairs(30, lambda rng, n: rng.exponential(size=n) - 1),
-    )
+        yield DrawnStudies(
+            name="paired, exponential",
+            participants=n,
+            claim=_SHOWN,
+            trial=_compares_pairs(n, lambda rng, count: rng.exponential(size=count) - 1),
+        )
 
 
 def _compares_groups(n: int, other: int, ratio: float) -> Trial:
