@@ -5,7 +5,6 @@ import pytest
 
 from study_app.evidence.stability import verdict
 from study_app.evidence.stability.bench import Bench
-from study_app.evidence.stability.closed_loop import _settle_passivity
 from study_app.evidence.stability.stability_cases import parse
 from study_app.evidence.stability.verdict import compare_fast, judge, reasons_of, worst_of
 from tests.haptics.scenes import COMPILED
@@ -67,9 +66,11 @@ class WithoutObserver(Bench):
     """A loop with the safety layer, but without the passivity observer's balances."""
 
     def run(self, trace, first, until_s):
+        passivity = self.safety[0].passivity
         row, end = first, -1
         while row != end and row < len(trace):
-            _settle_passivity(self.safety[0].passivity)
+            passivity.balance_j = passivity.late_balance_j = passivity.later_balance_j = np.inf
+            passivity.fast.balance_j, passivity.gain = np.inf, 1.0
             end, row = row, super().run(trace[: row + 1], row, until_s)
         return row
 
