@@ -346,7 +346,7 @@ def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
             f"{LEAST_N:g} to {MOST_N:g} N (110 to 600 g)"
         )
     notes: list[tuple[Any, float, Any]] = []
-    grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
+    grip.wait(ask("let-go", "Let go of the grip; it will hold itself in place and move slowly. Keep clear of it."))
     notes += _measure_round(grip, 0.0)
     grip.wait(
         ask(
@@ -373,7 +373,7 @@ def _measure_round(grip: Grip, load_n: float) -> list[tuple[Any, float, Any]]:
 def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
     """Measure at each position without load and then with an operator's pull on a scale; return the measurements."""
     notes: list[tuple[Any, float, Any]] = []
-    grip.wait(ask("let-go", "Let go of the grip; it will hold itself and move slowly. Keep clear of it."))
+    grip.wait(ask("let-go", "Let go of the grip; it will hold itself in place and move slowly. Keep clear of it."))
     for number, place in enumerate(PLACES_M, start=1):
         grip.move_to(place)
         counts, units = grip.weigh()

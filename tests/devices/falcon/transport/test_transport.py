@@ -198,7 +198,7 @@ def test_every_failure_is_one_line_that_says_what_to_do() -> None:
     for kind in (*KINDS.values(), *FURTHER_KINDS):
         said = str(UsbFailure(kind, "trying"))
         assert said.startswith("the Falcon cannot be used: ")
-        assert "(trying)" in said
+        assert "(while trying)" in said
         assert "\n" not in said
     assert "libusb error -3" in str(usb_failure(constants.ERROR_ACCESS, "trying"))
 
