@@ -136,11 +136,11 @@ def accuracy(
     """
     said = list(notes)
     if motion.velocity_mps is None:
-        said.append("the motion brings no velocities: central differences of its places count as the true ones")
+        said.append("the motion does not contain velocities: central differences of its positions are used instead")
         motion = with_velocity(motion)
     fewest = len(motion.t_s) // max(models.SLOWER)
     if fewest < Candidate.BATCH:
-        said.append(f"the motion is short: calls, of some µs, count in times of {fewest} ticks a batch, not 1,000")
+        said.append(f"the motion is short: batches have {fewest} ticks, not 1,000, so calls add some µs to their times")
     measured: list[Row] = []
     found: list[Truth] = []
     if numerical is not None:
@@ -149,7 +149,7 @@ def accuracy(
         truth = truths.definition_truth(with_given_velocity(scene), motion)
         if not truth.cases[0].force_n.any():
             raise StudyError(
-                f"along {named} {scene.liquids[0].id} exerts no force: there is no share of it to be wrong by"
+                f"{scene.liquids[0].id} does not exert a force along {named}, so its error cannot be given in percent"
             )
         measured += _rows("numerical", scene, candidates, choice, (truth,), progress)
         found.append(truth)
@@ -205,10 +205,10 @@ def _acting_errors(scene: Scene, batches: int) -> tuple[ActingError, ...]:
 def _physical_truths(scene: Scene, notes: list[str]) -> tuple[Truth, ...]:
     measured = truths.steady_truth(scene)
     if measured is None:
-        notes.append("steady drag: no experiment is known at Reynolds numbers so low")
+        notes.append("steady drag: there are no known experiments at such low Reynolds numbers")
     solved = solver_truths(scene)
     if not solved:
-        notes.append(f"fluid solver: no table is stored for {scene.liquids[0].id} and this ball")
+        notes.append(f"fluid solver: there is no stored table for {scene.liquids[0].id} and this ball")
     steady = () if measured is None else (measured,)
     return (*steady, truths.oscillation_truth(scene), truths.starting_truth(scene), *solved)
 

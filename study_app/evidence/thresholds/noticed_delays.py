@@ -177,12 +177,12 @@ def draw(comparison: Compared) -> Figure:
 
 
 _CAPTION: Final = (
-    "Simulated people answer two questions about the delay of the picture. Left: proportion correct in the "
-    f"forced choice of {FORCED_CHOICE} (dashed) and proportion of agreement with “different” in {LIKERT} (dots "
-    "with fitted curves), for mean criteria of 60, 95, 130 and 165 ms. Right: both thresholds against the "
-    "criterion, with 95 % intervals; the forced choice does not depend on it. Diamond: people who have adapted "
-    f"to a delay of 30 ms. The answer model has a criterion of {1000 * MEAN_CRITERION_S:.0f} ms, chosen to "
-    "agree with the thesis."
+    "Simulated participants answer two questions about the visual delay. Left: proportion correct in the forced "
+    f"choice of {FORCED_CHOICE} (dashed line) and proportion agreeing with “different” in {LIKERT} (dots with "
+    "fitted curves), for mean criteria of 60, 95, 130 and 165 ms. Right: both thresholds against the criterion, "
+    "with 95 % intervals; the forced-choice threshold does not depend on it. Diamond: participants who have adapted "
+    f"to a delay of 30 ms. The answer model's criterion is {1000 * MEAN_CRITERION_S:.0f} ms, chosen to agree "
+    "with the thesis."
 )
 
 
@@ -199,7 +199,7 @@ def evidence(comparison: Compared) -> Evidence:
         ends = f"{threshold.lower:.0f} to {threshold.upper:.0f} ms" if known else "–"
         rows.append((name, f"{1000 * rating.criterion_s:.0f} ms", value, ends))
     table = Table(("procedure", "criterion", "threshold", "95 % interval"), rows, left=1)
-    head = f"**SIMULATED.** The same {comparison.people} people in both procedures, seed {comparison.seed}."
+    head = f"**SIMULATED.** The same {comparison.people} participants in both procedures, seed {comparison.seed}."
     text = f"{head}\n\n{table.markdown()}\n"
 
     def figures() -> dict[str, bytes]:

@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 @compiled
 def test_a_motion_that_meets_no_force_is_refused():
     rest = Motion(np.arange(100) / 1000, np.zeros((100, 3)))
-    with pytest.raises(StudyError, match="along a rest water exerts no force"):
+    with pytest.raises(StudyError, match="water does not exert a force along a rest"):
         accuracy(TANK, None, rest, named="a rest")
 
 
