@@ -644,7 +644,7 @@ def line_problem(line: Mapping[str, Any]) -> str | None:
     for name in line:
         if not is_valid_value(known := _kind_name(line, name), line[name]):
             return f"({event}) has {name} {shorten_value(line[name])}; expected: {_KINDS[known][0].description}"
-    return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has t_s {line['t_s']:g}"
+    return None if 0 <= line["t_s"] <= _MOST_SECONDS else f"({event}) has an invalid t_s, {line['t_s']:g}"
 
 
 def journal_schema() -> dict[str, Any]:

@@ -108,8 +108,8 @@ def test_what_a_reader_would_call_damage_is_not_written(tmp_path: Path) -> None:
     path = tmp_path / "journal.jsonl"
     with Journal.create(path) as journal:
         for told, sentence in (
-            ({"t_s": -0.001}, "(note) has t_s -0.001"),
-            ({"t_s": 1e10}, "(note) has t_s 1e+10"),
+            ({"t_s": -0.001}, "(note) has an invalid t_s, -0.001"),
+            ({"t_s": 1e10}, "(note) has an invalid t_s, 1e+10"),
             ({"kind": 3}, "(note) has kind 3; expected: text"),
         ):
             note = journal_events.Note(kind=told.get("kind", "note"), text="x")
