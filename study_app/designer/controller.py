@@ -205,8 +205,8 @@ class DesignerController(QObject):
             return
         numbers = number_rows(opened.study.document, path)
         if not numbers or opened.read_only:
-            why = opened.read_only or "This element does not have numeric fields."
-            self.place.message.emit("A series of this element is not possible", why)
+            why = opened.read_only or "This element does not have any numeric fields."
+            self.place.message.emit("A series cannot be made from this element", why)
             return
         self.editing.select(path)
         card = SeriesCard(opened.study, path, numbers)

@@ -143,7 +143,7 @@ class _FileEditor(Coloured, QPlainTextEdit):
         fixed.setPixelSize(_LETTERS_PX)
         fixed.setStyleHint(QFont.StyleHint.Monospace)
         self.setFont(fixed)
-        self.setAccessibleName("Text of the file")
+        self.setAccessibleName("File text")
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setLineWrapMode(QPlainTextEdit.LineWrapMode.NoWrap)
         self.setUndoRedoEnabled(False)

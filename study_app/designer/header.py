@@ -63,7 +63,7 @@ class NoticeCard(Card):
         self.buttons: dict[str, ActionButton] = {}
         self._lines: list[QWidget] = []
         self.icon, self.words = Icon("info", "accent", 20), label("", "body" if of_playing else "label", wraps=True)
-        self.close_button = IconButton("cross", "Close this line", "Close (Esc)", size=36, role="plain")
+        self.close_button = IconButton("cross", "Close this message", "Close (Esc)", size=36, role="plain")
         self.close_button.clicked.connect(lambda: self.asked.emit("close"))
         self._buttons = hbox(spacing=10)
         self._listed = vbox(spacing=2, margins=(30 + SHADOW, 0, 0, 0))
@@ -136,8 +136,8 @@ class PlayDevices:
 
 def device_question(title: str, step: str, *, has_force: bool) -> Notice:
     """Return the question that is shown before a device other than the simulated hand is used."""
-    force = "The force fades in when a trial begins; hold" if has_force else "This device does not produce force. Hold"
-    question = f"Play from {step}, with the device {title}? {force} Esc to stop."
+    force = "The force fades in when a trial begins. Hold" if has_force else "This device does not produce force. Hold"
+    question = f"Play from {step} using the device {title}? {force} Esc to stop."
     return Notice(question, (("play", "Play"), ("close", "Cancel")), "warn", "device")
 
 
@@ -151,13 +151,15 @@ def refusal_notice(problems: tuple[str, ...]) -> Notice:
 
 def playing_notice(step: str, title: str) -> Notice:
     """Return the notice shown while a pilot is played."""
-    sentence = f"Playing from {step}, with the device {title}. Hold Esc to stop."
+    sentence = f"Playing from {step} using the device {title}. Hold Esc to stop."
     return Notice(sentence, (("stop", "Stop"),), "ok", "play")
 
 
 def ended_notice(step: str, how: str) -> Notice:
     """Return the question whether to keep the data of a played pilot."""
-    return Notice(f"Played from {step}: {how}. Its data are deleted unless you save them.", _KEEP, "neutral", "flag")
+    return Notice(
+        f"Played from {step}: {how}. Its data will be deleted unless you save them.", _KEEP, "neutral", "flag"
+    )
 
 
 def kept_notice(folder: str) -> Notice:
@@ -180,7 +182,7 @@ class _PlayControls(QWidget):
         self.play = ActionButton("play", PLAY, key=keys_of("play")[0])
         self.play.setAccessibleName(PLAY)
         self.play.setToolTip(command_tip("play"))
-        self.device = IconButton("device", "Device to play with")
+        self.device = IconButton("device", "Playback device")
         self.menu = QMenu(self)
         self.menu.setFont(font("label"))
         hbox(self.play, self.device, spacing=6, margins=0, parent=self)
@@ -198,7 +200,7 @@ class _PlayControls(QWidget):
             group.addAction(action)
             action.triggered.connect(lambda _checked=False, name=name: self.device_chosen.emit(name))
         self.device.setToolTip(f"Device: {devices.title}")
-        self.device.setAccessibleName(f"Device to play with: {devices.title}")
+        self.device.setAccessibleName(f"Playback device: {devices.title}")
 
     def show_playing(self, playing: bool) -> None:
         self.play.setEnabled(not playing)

@@ -30,7 +30,7 @@ log = logging.getLogger(__name__)
 _IDLE_MS: Final = 20
 _REST_MS: Final = 800
 _LOOK_MS: Final = 100
-_FAILED: Final = "the simulation process does not start"
+_FAILED: Final = "the simulation process could not be started"
 
 
 class MeasuresController(QObject):

@@ -100,8 +100,9 @@ class KnownAnswer:
     def sentence(self) -> str:
         return (
             f"Simulated: {self.planted:g} {self.unit} at 75 % correct (after {self.source}). Estimated: "
-            f"{self.found:.3g} {self.unit}; in 9 of 10 simulated studies of {self.people} people {self.low:.3g} to "
-            f"{self.high:.3g} {self.unit}. The numbers come from a model, not from measurements."
+            f"{self.found:.3g} {self.unit}; in 9 of 10 simulated studies with {self.people} participants the "
+            f"estimate was between {self.low:.3g} and {self.high:.3g} {self.unit}. These numbers come from a model, "
+            "not from measurements."
         )
 
 
@@ -116,26 +117,27 @@ _COPY: Final = "copy"
 TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "compare-liquids": (
         "Compare liquids",
-        "Can people tell liquids apart, and what do they call them? Statements after each liquid.",
+        "Can participants tell liquids apart, and what do they call them? They rate statements after each liquid.",
     ),
     "two-liquids-abx": (
         "Two liquids, ABX",
-        "Can people tell two liquids apart? A, B, and X, which is one of them; statements after the block.",
+        "Can participants tell two liquids apart? They feel A, B and X, which is either A or B, and rate statements "
+        "after the block.",
     ),
     "viscosity-jnd": (
         "Viscosity JND",
-        "How much thicker must a liquid be to feel thicker? Two intervals, adaptive levels.",
+        "How much thicker must a liquid be to feel thicker? Trials with two intervals at adaptive levels.",
     ),
     "delay-detection": (
         "Delay detection",
-        "What is the shortest picture delay that people notice? Two intervals, adaptive levels.",
+        "What is the shortest picture delay that participants notice? Trials with two intervals at adaptive levels.",
     ),
     "rate-realism": (
         "Rate realism",
-        "How real does a liquid feel? A slider after each of four liquids, three times each.",
+        "How real does a liquid feel? Participants set a slider after each of four liquids, three times per liquid.",
     ),
     "questionnaire-only": ("Questionnaire only", "Questions of every kind before, during and after a single trial."),
-    "empty": ("Empty study", "One liquid, one block, welcome and thanks; ready to run."),
+    "empty": ("Empty study", "One liquid, one block, a welcome page and a thank-you page; ready to run."),
 }
 """Title and question of each template, in the order in which they are shown."""
 
@@ -607,7 +609,7 @@ class Questions(Themed, QWidget):
         without = bool(languages and chosen) and set(languages).isdisjoint(chosen)
         if without:
             self.first_texts.setText(
-                f"The texts are still in {dict(_languages_offered())[languages[0]]}: translate them."
+                f"The texts are still in {dict(_languages_offered())[languages[0]]}: please translate them."
             )
         self.first_texts.setVisible(without)
 
@@ -658,7 +660,7 @@ class NoStudyCard(Card):
         parts = (
             Icon("designer", "accent", 44),
             label("No study is open", "card"),
-            label("Choose a study above, or start a new one.", "body", "text2"),
+            label("Choose a study above or create a new one.", "body", "text2"),
             self.new,
         )
         centred = ((part, 0, Qt.AlignmentFlag.AlignHCenter) for part in parts)
@@ -681,7 +683,7 @@ class _ChosenCard(Card):
         parts = (self.about, self.details, self.begin, STRETCH)
         self.inside = vbox(*parts, spacing=10, margins=(0, 0, 8, 0), parent=inside)
         self.area = scrolled(inside)
-        foot = label("Nothing is written until you save it.", "small", "text2")
+        foot = label("Nothing is saved until you choose to save it.", "small", "text2")
         foot.setAlignment(Qt.AlignmentFlag.AlignCenter)
         add_parts(self.column, self.title, (self.area, 1), self.refusal, self.make, foot)
 
@@ -746,7 +748,7 @@ class NewStudyPage(Themed, QWidget):
         self._group = QButtonGroup(self)
         self.back = IconButton("chevron_left", "Back", role="plain")
         self.back.clicked.connect(self.given_up)
-        aside = cut_text("Choose what you want to find out. Everything can be changed afterwards.", "label", "text2")
+        aside = cut_text("Choose what you want to find out. You can change everything later.", "label", "text2")
         self.file = ActionButton("file", "From a file …")
         self.file.clicked.connect(self._open_file)
         parts = (self.back, label("New study", "title"), (aside, 1), self.file)
@@ -766,7 +768,7 @@ class NewStudyPage(Themed, QWidget):
         self.buttons = []
         for heading, aside, copies, across in (
             ("Templates", "", False, ACROSS),
-            ("Or a copy of a study", "including comments; the original does not change", True, COPIES_ACROSS),
+            ("Or copy an existing study", "including its comments; the original is not changed", True, COPIES_ACROSS),
         ):
             labels = label(heading, "card"), label(aside, "small", "text2")
             add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(_RING, 0, 0, 0)))

@@ -266,7 +266,7 @@ def _addable_instruments() -> tuple[Addable, ...]:
     entries = []
     for name in instruments():
         source = instrument(name)
-        texts = "" if source["languages"] else ". Its texts are not included: write them in the study"
+        texts = "" if source["languages"] else ". Its texts are not included, so you must write them in the study"
         help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
         title = f"Instrument: {name.upper()}, {len(source['items'])} questions"
         entries.append(Addable(words=title, icon="list", asks=AddInstrument(name), help=help_))
@@ -297,10 +297,10 @@ class AddList(Themed, QFrame):
         self.setAccessibleName("Add")
         self.setProperty("role", "card")
         self._every: tuple[Addable, ...] = ()
-        self.words = make_dense(QLineEdit(), "Filter what can be added", 36)
+        self.words = make_dense(QLineEdit(), "Filter the elements that can be added", 36)
         self.words.setPlaceholderText("Type to filter")
         self.list = QListWidget()
-        self.list.setAccessibleName("What can be added")
+        self.list.setAccessibleName("Elements that can be added")
         self.list.setProperty("role", "links")
         self.list.setFont(font("label"))
         self.list.setFrameShape(QFrame.Shape.NoFrame)
@@ -480,7 +480,7 @@ class Tree(Themed, QTreeView):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setAccessibleName("Outline of the study")
+        self.setAccessibleName("Study outline")
         self.setHeaderHidden(True)
         self.setIndentation(0)
         self.setRootIsDecorated(False)

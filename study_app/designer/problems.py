@@ -71,7 +71,7 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     for row in rows:
         code = row.fault.missing_language
         if row.fault.kind == "no text" and missing[code] > 1:
-            message = f"{missing[code]} texts are missing in {language_name(code)}; this is the first"
+            message = f"{missing[code]} texts are missing in {language_name(code)}; this is the first of them"
             fault = row.fault._replace(message=message, hint="")
             shown.setdefault(code, replace(row, message=message, hint="", fault=fault))
         else:
@@ -310,7 +310,7 @@ class ProblemsCard(Card):
         self.next = small_button("", "Next", cap=key_cap("next problem"), height=36)
         self.next.setToolTip(command_tip("next problem"))
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
-        titles = self.heading, label("liquid-study check prints them, too", "small", "text2")
+        titles = self.heading, label("liquid-study check also lists them", "small", "text2")
         top = hbox(*titles, STRETCH, self.limit, self.next, self.close_button, spacing=10)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)
@@ -368,7 +368,9 @@ class ProblemsCard(Card):
         inside = QWidget()
         self._column = column = vbox(spacing=0, margins=0, parent=inside)
         if rows and not listed:
-            column.addWidget(label(f"No problems in this element, {len(rows)} in others", "label", "text2"))
+            column.addWidget(
+                label(f"This element has no problems, but other elements have {len(rows)}", "label", "text2")
+            )
         column.addStretch()
         self.lines = []
         for row in listed:

@@ -58,7 +58,7 @@ def naming_places(study: Study, path: Path) -> tuple[str, ...]:
 def _field_label(study: Study, place: Path) -> str:
     inside = ", ".join(label_of(step) for step in place[len(element_of(study, place)) :])
     if value_at(study.document, place) is None:
-        return f"{inside} (the only one)"
+        return f"{inside} (its only entry)"
     return inside or f"entry {index_of(place) + 1}"
 
 
@@ -84,9 +84,9 @@ class DeleteCard(Prompt):
             self.column.addWidget(label(f"Also deletes: {too}.", "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
-        self.gaps = ActionButton("", "Keep the gaps", height=40)
+        self.gaps = ActionButton("", "Leave gaps", height=40)
         self.gaps.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "gaps")))
-        self.other = make_dense(Choice(), "Use another instead", 40)
+        self.other = make_dense(Choice(), "Use a different one instead", 40)
         self.other.setPlaceholderText("Use another …")
         self.other.setMinimumWidth(180)
         for name in names(document, str(path[0])) if len(path) == 2 else ():
@@ -121,14 +121,15 @@ class SeriesCard(Prompt):
     def __init__(self, study: Study, path: Path, numbers: Sequence[Row]) -> None:
         title = title_of(study.document, path)
         super().__init__(
-            f"Series of {title}", f"Type a value for each copy of {title}; the copies join the blocks of the original."
+            f"Series of {title}",
+            f"Enter one value per copy of {title}. The copies are added to the blocks that use the original.",
         )
         self.study, self.path, self.numbers = study, path, numbers
-        self.number = make_dense(Choice(), "Number that differs")
+        self.number = make_dense(Choice(), "Value that differs")
         for row in numbers:
             number_title = ", ".join(label_of(step) for step in row.path[2:])
             self.number.addItem(f"{number_title} [{row.unit}]" if row.unit else number_title)
-        self.values = make_dense(QLineEdit(), "Values of the copies")
+        self.values = make_dense(QLineEdit(), "Values for the copies")
         self.values.setPlaceholderText("60 120 240")
         self.copies = label("", "label", wraps=True)
         self.make = ActionButton("bars", "Make the copies", role="primary", height=40)

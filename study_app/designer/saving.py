@@ -80,7 +80,7 @@ class Saving(QObject):
         opened = self.editing.opened
         draft = None if opened is None else opened.draft if opened.base else draft_of(opened.file)
         if opened is not None and draft is not None and opened.edited:
-            sentence = f"Draft of {time_text(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
+            sentence = f"Draft from {time_text(draft.kept_at)}, {'not' if opened.base else 'never'} saved"
             self._show_notice(sentence, ("discard", "Discard the draft"), lasts=True)
 
     def _show_notice(self, sentence: str | None, *actions: tuple[str, str], lasts: bool | None = None) -> None:
@@ -140,7 +140,7 @@ class Saving(QObject):
             self._close_notice(opened)
             return
         if action == "discard" and not opened.base:
-            lost = "was never saved: without its draft the whole study is lost. This cannot be undone."
+            lost = "has never been saved, so without its draft the whole study will be lost. This cannot be undone."
             title = f"Discard “{opened.title or opened.file.stem}”?"
             card = ConfirmCard(title, f"{opened.file.name} {lost}", "Discard the draft", "trash")
             card.answered.connect(self.discard_study)
@@ -236,7 +236,7 @@ class Saving(QObject):
             self.editing.announce_edit()
             return
         count = len(problem_rows(opened.study))
-        said = f"Saved. It cannot be run yet: {counted(count, 'problem')}" if count else None
+        said = f"Saved, but the study cannot be run yet because of {counted(count, 'problem')}" if count else None
         self._show_notice(said, ("problems", "Show the list"), lasts=False)
         self._show_banner(opened)
         self.saved.emit(opened.file)
@@ -265,7 +265,10 @@ class Saving(QObject):
             self._drafting.setInterval(_DRAFT_MS)
         if opened.keeper.others > self._others:
             self._others = opened.keeper.others
-            said = "Another window of the program also edits this study; its unsaved edits are kept as a version"
+            said = (
+                "This study is also being edited in another window of the program; the unsaved edits made there are "
+                "kept as a version"
+            )
             self._show_notice(said, ("compare", "Compare"))
             self._show_banner(opened)
         if written:
@@ -275,7 +278,7 @@ class Saving(QObject):
         try:
             act()
         except StudyError as error:
-            self.place.message.emit("This was not done", f"{error}.")
+            self.place.message.emit("This could not be done", f"{error}.")
         self._show_banner(opened)
 
     def _show_banner(self, opened: Document) -> None:
@@ -294,11 +297,11 @@ def _banner_notice(opened: Document) -> Notice | None:
     if not changed:
         return None
     if not opened.file.exists():
-        return Notice("Another program deleted or moved this file", (("keep", "Keep mine"),))
-    too = ", and it was also edited here" if opened.edited else ""
+        return Notice("Another program has deleted or moved this file", (("keep", "Keep mine"),))
+    too = ", which has also been edited here" if opened.edited else ""
     return Notice(
-        f"Another program changed this file{too}",
-        (("keep", "Keep mine"), ("take", "Take the file's"), ("compare", "Compare")),
+        f"Another program has changed this file{too}",
+        (("keep", "Keep mine"), ("take", "Use the file's"), ("compare", "Compare")),
     )
 
 

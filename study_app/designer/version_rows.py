@@ -50,9 +50,9 @@ def version_chip(standing: Standing, known: Iterable[Run]) -> VersionChip:
     tip = "\n".join(f"Version {run.version}: {run_counts(run)}" for run in known)
     save = f"Save {standing.version} …" if standing.asks else "Save"
     if not standing.was:
-        text = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not run yet"
+        text = "Piloted" if any(run.pilots for run in known) else "Rehearsed" if known else "Not yet run"
         return VersionChip(
-            tone="neutral", icon="ring", words=text, tip=tip or "No session was run with this study", save=save
+            tone="neutral", icon="ring", words=text, tip=tip or "No session has been run with this study", save=save
         )
     if standing.sessions:
         text = f"{standing.version}, run by {standing.sessions}"
@@ -86,7 +86,7 @@ def version_choices(
 def _kept_label(version: Kept, now: datetime) -> str:
     when = _time_text(version.at, now)
     if version.origin == "draft":
-        return f"Unsaved edits of another window, {when}"
+        return f"Unsaved edits from another window, {when}"
     stated = _STATED.search((kept_content(version.hash) or b"").decode("utf-8", "replace"))
     how = "saved" if version.origin == "saved" else "in the file before it was saved"
     by = f" by {version.by}" if version.by else ""
@@ -123,4 +123,4 @@ def edited_elements_text(saved: str, draft: str, folder: Path) -> str:
         for path in places
     )
     named, more = list(titles)[:_NAMED_AT_MOST], len(titles) - _NAMED_AT_MOST
-    return f": {', '.join(named) or 'comments, order or notation'}{f' and {more} more' if more > 0 else ''}"
+    return f": {', '.join(named) or 'comments, order or notation only'}{f' and {more} more' if more > 0 else ''}"

@@ -104,7 +104,7 @@ def _read_runs(results: Path, study: str, file: Path) -> tuple[str, tuple[Run, .
     return study, known, recorded_items(known)
 
 
-_NOTHING = "There is no version to compare with, because the study has not been run or saved before."
+_NOTHING = "There is no version to compare with, because the study has not yet been run or saved."
 _LETTERS_PX = 12
 
 
@@ -146,9 +146,9 @@ class SaveCard(Prompt):
     def __init__(self, standing: Standing, known: Iterable[Run], difference: Comparison, problems: int) -> None:
         sessions = "; ".join(f"{run_counts(run)} with version {run.version}" for run in known if run.sessions)
         super().__init__(
-            "Save another version",
-            f"This study was run: {sessions}. A version that was run is never overwritten, so the study is "
-            "saved under another number.",
+            "Save as a new version",
+            f"This study has been run: {sessions}. A version that has been run is never overwritten, so the study "
+            "will be saved under a different number.",
         )
         self.difference = _DifferenceText()
         self.difference.show_lines(difference.lines)
@@ -161,7 +161,7 @@ class SaveCard(Prompt):
                 sign = Icon(icon, ink, 18)  # type: ignore[arg-type]  # an ink
                 add_layout(self.column, hbox(sign, (label(text, "label", wraps=True), 1), spacing=8))
         self.version = _field("Version to save as", standing.version, 110)
-        self.name = _field("Short name of the other study", "", 220)
+        self.name = _field("Short name for the new study", "", 220)
         self.name.setPlaceholderText("lowercase letters and digits")
         self.refusal = label("", "label", "bad", wraps=True)
         self.changes = ActionButton("", "Show in Changes", role="plain", height=40)
@@ -219,13 +219,13 @@ def _field(name: str, text: str, width: int) -> QLineEdit:
 _TAB: Final = "changes"
 _REST_MS: Final = 200
 _NO_COPY: Final = (
-    "No copy of this version is kept on this computer. The differences come from a receipt, which does not "
+    "This computer does not have a copy of this version. The differences are based on a receipt, which does not "
     "contain the conditions."
 )
 _FAULTY: Final = (
-    "No copy of this version is kept on this computer: correct the problems of the study to list differences."
+    "This computer does not have a copy of this version. To list the differences, correct the study's problems first."
 )
-_EQUAL: Final = "The study does not differ from this version."
+_EQUAL: Final = "The study is identical to this version."
 
 
 class Version(NamedTuple):
@@ -298,7 +298,7 @@ class Changes(Card):
         self.version = make_dense(Choice(), "Version to compare with")
         self.version.setMinimumWidth(120)
         self.restore = small_button("undo", "Restore", height=34)
-        self.restore.setToolTip("Restore the text of this version, in one step")
+        self.restore.setToolTip("Restore the text of this version in a single step")
         self.note = label("", "label", "text2", wraps=True)
         self.difference = _DifferenceText()
         self.top = QWidget()
@@ -368,9 +368,9 @@ class Changes(Card):
         with suppress(StoreError):  # an unreadable file is not offered for comparison
             if opened.base and opened.file.exists():
                 if opened.changed_outside():
-                    file = "The file written by the other program"
+                    file = "The file as changed by the other program"
                 elif opened.edited:
-                    file = "The file, without the edits"
+                    file = "The file without the edits"
         now = datetime.now().astimezone()
         return version_choices(self._known_runs(), kept_versions(opened.file), file, now)
 
@@ -396,9 +396,9 @@ class Changes(Card):
 
 
 BREAKS: Final = (
-    "answers before and after the change are in different columns of the tables",
-    "figures and tests treat them as two questions",
-    "a planned analysis that uses the old ID does not find the new ID",
+    "answers from before and after the change will be in different columns of the tables",
+    "figures and tests will treat them as two questions",
+    "a planned analysis that uses the old ID will not find the new one",
 )
 
 
@@ -425,7 +425,7 @@ class Renaming(QObject):
         if len(path) != 4 or path[2] != "items" or path == self._unlocked:
             return ""
         sessions = self.runs.items.get((str(path[1]), self._item_id(path)), 0)
-        return f"Answers of {counted(sessions, 'session')} are recorded under this ID." if sessions else ""
+        return f"Answers from {counted(sessions, 'session')} have been recorded under this ID." if sessions else ""
 
     def _recorded_ids(self, element: Place) -> frozenset[str]:
         """Return the ids of a question's questionnaire that have recorded answers."""
@@ -440,7 +440,7 @@ class Renaming(QObject):
 
     def _ask_to_unlock(self) -> None:
         path = self.editing.selected
-        title, why = f"Change the ID “{self._item_id(path)}”?", f"{self._lock_reason(path)} With another ID:"
+        title, why = f"Change the ID “{self._item_id(path)}”?", f"{self._lock_reason(path)} If you change it:"
         card = ConfirmCard(title, why, "Change the ID", breaks=BREAKS)
         card.answered.connect(lambda _action: self._unlock(path))
         self.place.show_prompt(card, card.first)

@@ -71,10 +71,10 @@ class _RightPane(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setAccessibleName("Views of the study")
+        self.setAccessibleName("Study views")
         self.pages: list[PanePage] = []
         self.tab = ""
-        self.tabs = Segments("View of the study")
+        self.tabs = Segments("Study view")
         self.facts = FactsRow()
         self._asides, self._below = hbox(), hbox(STRETCH, margins=(SHADOW, 0, SHADOW, 0))
         bar = hbox(self.tabs, STRETCH, self._asides, margins=(SHADOW, 0, SHADOW, 0))
@@ -173,7 +173,7 @@ class _PathBar(QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.setAccessibleName("Path of the element")
+        self.setAccessibleName("Element path")
         self.outline = small_button("layers", "Outline", cap=key_cap("outline"), height=40)
         self.outline.setAccessibleName(command_tip("outline"))
         self.outline.setToolTip(command_tip("outline"))

@@ -19,7 +19,7 @@ Kind: TypeAlias = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9_]*
 _NOT_WITH_DESIGN: Final = ("max_repeats", "min_distance", "questionnaire")
 """Keys of a block without a design: a design draws its own order and asks its own question."""
 
-_WAYS: Final = ("a stimulus", "a design", "conditions and no design")
+_WAYS: Final = ("a stimulus", "a design", "conditions but no design")
 """What a block presents, in words, for each entry of `Block.NOT_WITH`."""
 _ROUNDING: Final = 1e-9
 
@@ -27,10 +27,11 @@ _ROUNDING: Final = 1e-9
 class Criterion(Table):
     """A block ends as soon as ``right`` of its last ``of`` answers were correct."""
 
-    right: int = Field(ge=1, le=100, description="Number of these answers that must be correct.")
-    of: int = Field(ge=1, le=100, description="Number of last answers considered.")
+    right: int = Field(ge=1, le=100, description="How many of the most recent answers must be correct.")
+    of: int = Field(ge=1, le=100, description="How many of the most recent answers are considered.")
     missed: Literal["go_on", "end"] = Field(
-        default="go_on", description="go_on: if this is not reached, the session continues; end: it ends."
+        default="go_on",
+        description="What happens if the criterion is not met. go_on: the session continues; end: the session ends.",
     )
 
     @model_validator(mode="after")
@@ -43,12 +44,13 @@ class Criterion(Table):
 class Catch(Table):
     """Easy trials among the others: a participant who answers many of them incorrectly does not attend to the task."""
 
-    share: Annotated[float, within(0.01, 0.5, "from one catch trial in 100 other trials to one in 2")] = Field(
+    share: Annotated[float, within(0.01, 0.5, "between one catch trial per 100 other trials and one per 2")] = Field(
         default=0.1,
-        description="Number of catch trials per other trial of a track; one occurs at random in every 1/share trials.",
+        description="Number of catch trials per other trial in a track; one occurs at a random position in every "
+        "1/share trials.",
     )
     wrong_most: Annotated[float, within(0, 1, "a proportion of the catch trials")] = Field(
-        default=0.25, description="Proportion of incorrect answers to catch trials above which the session is excluded."
+        default=0.25, description="Proportion of catch trials answered incorrectly above which the session is excluded."
     )
 
     def count(self, trials: int) -> int:
@@ -89,67 +91,78 @@ class Block(Table):
     id: Id = Field(description="The name of the block's table.")
     phase: Phase = Field(
         default="main",
-        description="main: analysed; practice: kept, not analysed; baseline: kept for comparison, not analysed.",
+        description="main: analysed; practice: kept but not analysed; baseline: kept for comparison but not analysed.",
     )
     part: int | None = Field(default=None, ge=1, le=20, description="Part of the study to which the block belongs.")
     title: Localised = Field(description="Name of the block.")
-    setting_label: Localised = Field(description="Neutral name of its trials; a number follows: Liquid setting 1.")
-    code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="Letter of the block's codes.")
-    conditions: tuple[Id, ...] = Field(default=(), description="The conditions to present; omit them with a stimulus.")
-    standard: Id | None = later(
-        default=None, description="The reference with which a design compares the block's other conditions."
+    setting_label: Localised = Field(
+        description="Neutral name for the block's trials, to which a number is added, as in “Liquid setting 1”."
     )
-    stimulus: Id | None = later(default=None, description="The quantity to vary, instead of conditions.")
+    code_prefix: str | None = Field(
+        default=None, pattern=r"^[A-Z]$", description="Letter with which the block's codes begin."
+    )
+    conditions: tuple[Id, ...] = Field(
+        default=(), description="The conditions to present; omit this key if the block has a stimulus."
+    )
+    standard: Id | None = later(
+        default=None,
+        description="The reference condition, with which the design compares the block's other conditions.",
+    )
+    stimulus: Id | None = later(
+        default=None, description="The stimulus to present at varying levels, instead of conditions."
+    )
     standards: tuple[float, ...] = later(
-        default=(), max_length=8, description="The stimulus' standards that the block presents; default: all."
+        default=(), max_length=8, description="Which of the stimulus's standards the block presents; default: all."
     )
     design: Kind | None = later(
         default=None,
-        description="How a trial is built: the name of a table in [designs], or a kind with its defaults. The design "
-        "draws the order of the trials and asks its own question.",
+        description="How a trial is constructed: the name of a table in [designs], or a kind with its defaults. The "
+        "design draws the order of trials and asks its own question.",
     )
     method: Kind | None = later(
         default=None,
         description="How levels are chosen: the name of a table in [methods], or a kind with its defaults.",
     )
     until: Criterion | None = later(default=None, description="When the block ends early; default: never.")
-    catch: Catch | None = later(default=None, description="Easy trials, and the rule that excludes; default: none.")
+    catch: Catch | None = later(
+        default=None,
+        description="Easy trials that check attention, and the rule for excluding a session; default: none.",
+    )
     compares: Compared | None = Field(
         default=None,
-        description="liquids: the conditions of a main block differ in their liquids; delays: in their delays "
-        "(the default if all have one liquid and different delays); views: in their views (the "
-        "default if all have one liquid and different views). With 'views' their delays may also "
-        "differ.",
+        description="How the conditions of a main block differ. liquids: in their liquids; delays: in their delays "
+        "(the default if all have the same liquid but different delays); views: in their views (the default if "
+        "all have the same liquid but different views). With views, the delays may differ too.",
     )
     replicates: bool = Field(
         default=False,
-        description="In a block that compares delays: whether conditions with equal delay are intended; they "
+        description="Whether a block that compares delays may have several conditions with the same delay; these "
         "are analysed as replicates of one condition.",
     )
     order: Order = Field(
         default="fixed",
-        description="fixed: as written; shuffled: a new order in each repetition; constrained: all trials "
-        "together, subject to max_repeats and min_distance; williams, latin: balanced, rows of a "
-        "Williams design or Latin square, by the number in the participant's ID.",
+        description="fixed: as written; shuffled: a new order in each repetition; constrained: all trials are "
+        "shuffled together, subject to max_repeats and min_distance; williams, latin: balanced using the rows "
+        "of a Williams design or Latin square, which are selected by the number in the participant's ID.",
     )
     max_repeats: int | None = Field(
         default=None,
         ge=1,
         le=100,
-        description="How many times in a row a condition may be presented; only with order constrained.",
+        description="Maximum number of times in a row that a condition may be presented; only with order constrained.",
     )
     min_distance: int | None = Field(
         default=None,
         ge=1,
         le=1000,
-        description="Number of trials from one presentation of a condition to the next: 2 means never twice in "
-        "a row, 3 means at least two others in between; only with order constrained.",
+        description="Minimum number of trials from one presentation of a condition to the next: 2 means never twice "
+        "in a row, and 3 means at least two other trials in between; only with order constrained.",
     )
-    repetitions: int = Field(default=1, ge=1, le=100, description="How often each condition is presented.")
+    repetitions: int = Field(default=1, ge=1, le=100, description="How many times each condition is presented.")
     break_every: int | None = Field(
         default=None, ge=1, le=10_000, description="Number of trials between two breaks; default: no breaks."
     )
-    break_page: Id | None = Field(default=None, description="The page of kind break shown in a break.")
+    break_page: Id | None = Field(default=None, description="The page shown during a break (a page of kind break).")
     task: Id = Field(description="What the participant does.")
     questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; default: none.")
 
@@ -165,24 +178,27 @@ class Block(Table):
                 }.get(name, "omit it")
                 raise invalid(f"cannot be used in a block with {what}: {instead}", name, kind="surplus")
         if what == "a design" and (self.standard not in self.conditions or len(self.conditions) < 2):
-            raise invalid("must be one of at least two conditions: choose the reference", "standard")
+            raise invalid("must be one of at least two conditions: choose the reference condition", "standard")
         return self
 
     @model_validator(mode="after")
     def _codes_where_blinded(self) -> Self:
         if self.phase == "main":
             if self.code_prefix is None:
-                raise invalid("a main block needs a code_prefix, a capital letter", "code_prefix")
+                raise invalid("a main block needs a code_prefix (one capital letter)", "code_prefix")
             if self.part is None:
-                raise invalid("a main block needs a part: 1, 2, …", "part")
+                raise invalid("a main block needs a part (1, 2, …)", "part")
         elif self.compares is not None:
-            raise invalid(f"a {self.phase} block does not make a comparison: omit this key", "compares", kind="surplus")
+            raise invalid(
+                f"a {self.phase} block does not compare conditions: omit this key", "compares", kind="surplus"
+            )
         elif self.code_prefix is not None:
             raise invalid(f"a {self.phase} block is not blinded: omit code_prefix", "code_prefix", kind="surplus")
         elif len(self.conditions) > 1 and self.design is None:
             count = len(self.conditions)
             raise invalid(
-                f"a {self.phase} block must have one condition, but has {count}: use a block for each", "conditions"
+                f"a {self.phase} block must have one condition, but has {count}: use a separate block for each",
+                "conditions",
             )
         return self
 
@@ -214,9 +230,11 @@ class Block(Table):
         keys = {"break_every": self.break_every, "break_page": self.break_page}
         missing = [name for name, value in keys.items() if value is None]
         if len(missing) == 1:
-            raise invalid("is missing: break_every and break_page need each other", missing[0])
+            raise invalid("is missing: break_every and break_page must be used together", missing[0])
         trials = len(self.conditions) * self.repetitions
         if self.break_every is not None and self.design is None and trials <= self.break_every:
             counted = "1 trial" if trials == 1 else f"{trials} trials"
-            raise invalid(f"is {self.break_every}, but the block has {counted}: there would be no break", "break_every")
+            raise invalid(
+                f"is {self.break_every}, but the block has only {counted}, so there would be no break", "break_every"
+            )
         return self

@@ -42,11 +42,11 @@ from study_app.protocol.warnings.study_warnings import warnings
 _LEVELS = {"weber": "Weber fraction", "difference": "difference", "value": "value"}
 _BLINDINGS = {
     "double": "double-blind: the operator does not see the force",
-    "single": "single-blind: the operator sees force and wake",
+    "single": "single-blind: the operator sees the force and the wake",
 }
 _GROUP_WORDS = {
     "randomised": "randomised in permuted blocks",
-    "pre-existing": "pre-existing: entered for each participant, not randomised",
+    "pre-existing": "pre-existing: entered by the operator for each participant, not randomised",
 }
 
 
@@ -62,7 +62,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         for name, condition in protocol.conditions.items()
     ]
     warned = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
-    decided = [("nothing", "there is no table [analysis]: the report will call all findings exploratory")]
+    decided = [("nothing", "there is no [analysis] table, so the report will call all findings exploratory")]
     if protocol.analysis is not None:
         named = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
         decided = list(protocol.analysis.described(named))
@@ -78,7 +78,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         ("Effects in each liquid", *(f"  {line}".rstrip() for line in effects[:-1])),
         _titled("Conditions", conditions),
         *(_question_lines(protocol, name, language) for name in protocol.questionnaires),
-        _titled("Decided about the analysis", decided),
+        _titled("Decisions about the analysis", decided),
         *([] if people is None else [_titled("Simulated participants", [("Answers", people.described())])]),
         _titled("Limits of a valid trial", limit_rows(protocol)),
         *([("Warnings", *warned)] if warned else []),
@@ -93,11 +93,11 @@ def describe_scenes(scenes: Mapping[str, Scene]) -> str:
     rows = [
         ("Force limit", f"{scene.force_limit_n:g} N"),
         ("Servo", f"{scene.rate_hz:g} Hz"),
-        ("Scale", f"{scene.scale:g} times the motion of the hand"),
-        ("Ball", f"{ball_mm:g} mm in the scene, {ball_mm / scene.scale:.3g} mm in the hand frame"),
+        ("Scale", f"{scene.scale:g} times the hand's motion"),
+        ("Ball", f"{ball_mm:g} mm in the scene ({ball_mm / scene.scale:.3g} mm in the hand frame)"),
     ]
     effects = ("\n".join(f"  {line}".rstrip() for line in describe_gate(it)) for it in scenes.values())
-    head = ("Liquids without a study", *_aligned(rows))
+    head = ("Liquids that are not part of a study", *_aligned(rows))
     return "\n\n".join(("\n".join(head), "Effects in each liquid", *effects))
 
 
@@ -130,7 +130,7 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
         ("Force limit", f"{device.force_limit_n:g} N"),
         ("Servo", f"{device.rate_hz:g} Hz"),
         ("Tank", f"{sizes} mm in the hand frame, {scene.scale:g} times as large in the scene"),
-        ("Ball", f"{ball_mm:g} mm in the scene, {ball_mm / scene.scale:.3g} mm in the hand frame"),
+        ("Ball", f"{ball_mm:g} mm in the scene ({ball_mm / scene.scale:.3g} mm in the hand frame)"),
     ]
     return (f"{protocol.text(study.title, language)} ({study.name}, version {study.version})", *_aligned(rows))
 
@@ -171,7 +171,7 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
     questionnaire, compared = protocol.questionnaire_of(block.id), protocol.compared_in(block.id)
     trials = order_of(protocol, block).trials
     shown = "condition" if block.design is None else "comparison"
-    times = f"every {shown} {block.repetitions} times" if block.repetitions > 1 else ""
+    times = f"each {shown} {block.repetitions} times" if block.repetitions > 1 else ""
     rows = [
         ("Trials", ", ".join(filter(None, (counted(trials, "trial"), times, _order_text(block))))),
         *_assignment_and_break_rows(protocol, block, language),
@@ -185,9 +185,9 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
         rows.append(("Duration", f"about {block_duration_s(protocol, block, language) / 60:.0f} min"))
     rows.append(("Task", protocol.tasks[block.task].summary))
     if block.design is None and questionnaire is None:
-        rows.append(("Asked", "nothing"))
+        rows.append(("Asked", "no questions"))
     elif block.design is None and questionnaire is not None:
-        order = "in the order written" if questionnaire.item_order == "fixed" else "in another order each time"
+        order = "in the order of the file" if questionnaire.item_order == "fixed" else "in a new order each time"
         noun = "statement" if len(questionnaire.statements) == len(questionnaire.items) else "question"
         asked = counted(len(questionnaire.items), noun)
         rows.append(("Asked", f"{asked} (questionnaire {block.questionnaire}), {order}"))
@@ -223,7 +223,8 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
     if isinstance(method, Adjustment):
         low, high = stimulus.domain
         steps = round((high - low) / method.step(stimulus))
-        yield "Settings", f"{steps} steps from end to end, starting near either end, at most {method.most_s:g} s each"
+        longest = f"at most {method.most_s:g} s per setting"
+        yield "Settings", f"{steps} steps from end to end, starting near either end, {longest}"
     pairs = product(standards_of(protocol, block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
     unit = quantity(stimulus.vary).unit
@@ -239,9 +240,9 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         felt_n = [steady_force(level_scene, pace_mps).drag_n for level_scene in scenes]
         fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(compared) :])
         yield (
-            "Force at the pace",
-            f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, at most {fast_n:.1f} N at {FASTER:g} "
-            "times the pace",
+            "Force at the paced speed",
+            f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
+            f"{FASTER:g} times that speed",
         )
     if (highest_nspm := highest_damping(protocol, block)) > 0:
         scene = protocol.scene_for(condition_of(protocol, stimulus))
@@ -254,23 +255,23 @@ def _order_text(block: Block) -> str:
     if len(block.conditions) < 2:
         return ""
     if block.design is not None:
-        return "another order for each participant"
+        return "a different order for each participant"
     match block.order:
         case "fixed":
-            return "in the order written: readers of the protocol can identify the codes"
+            return "in the order of the file, so anyone who reads the protocol can identify the codes"
         case "shuffled":
-            return "another order for each participant"
+            return "a different order for each participant"
         case "constrained":
             most, least = block.max_repeats, block.min_distance
-            kept = [] if most is None else [f"a condition at most {most} times in a row"]
+            kept = [] if most is None else [f"each condition at most {most} times in a row"]
             kept += (
                 [] if least is None else [(f"at least {least} trials from one presentation of a condition to the next")]
             )
-            return f"another order for each participant, {' and '.join(kept)}"
+            return f"a different order for each participant, with {' and '.join(kept)}"
         case "williams" | "latin" as square:
             rows = row_count(square, len(block.conditions))
             name = "a Williams design" if square == "williams" else "a Latin square"
-            return f"in {name} of {rows} rows"
+            return f"in {name} with {rows} rows"
 
 
 def _assignment_and_break_rows(protocol: Protocol, block: Block, language: str) -> Iterator[tuple[str, str]]:
@@ -296,7 +297,7 @@ def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
         effects = resolve(protocol.scene_of(name)).liquids[0].effects
         wake = liquid.wake if "wake" in effects else None
         numbers = ("–", "–", "–") if wake is None else (f"{wake.length}", f"{wake.scaling:g}", f"{wake.exponent:g}")
-        unused = "" if name in used else "in no condition"
+        unused = "" if name in used else "not used in any condition"
         viscosity = "" if liquid.viscosity_pa_s is None else f", {liquid.viscosity_pa_s:g} Pa·s"
         damper = liquid.drag.damping_nspm
         density = f"{liquid.density_kg_m3:g} kg/m³{viscosity}" if damper is None else f"{damper:g} N·s/m at the hand"
@@ -307,9 +308,9 @@ def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
 def _drawing_notes(condition: Condition) -> Iterator[str]:
     """Yield notes on unusual displays and force links of a condition."""
     if condition.delay_ms:
-        yield f"seen {condition.delay_ms:g} ms late"
+        yield f"shown {condition.delay_ms:g} ms late"
     if condition.shows_video:
-        alone = ", without ball and targets" if condition.overlay == "hidden" else ""
+        alone = ", without the ball and the targets" if condition.overlay == "hidden" else ""
         yield f"video: {condition.view}{alone}"
     if condition.ball == "hidden":
         yield "ball hidden"
@@ -319,12 +320,12 @@ def _drawing_notes(condition: Condition) -> Iterator[str]:
 def _question_lines(protocol: Protocol, name: str, language: str) -> Iterable[str]:
     questionnaire = protocol.questionnaires[name]
     context = questionnaire.context(protocol.scales, language)
-    title = f"Questions of {name}"
+    title = f"Questions in {name}"
     if len(questionnaire.statements) == len(questionnaire.items):
         scale = protocol.scales[questionnaire.scale or ""]
         labels = scale.labels[language]
         off_scale = "" if scale.cannot_judge is None else f', or "{protocol.text(scale.cannot_judge, language)}"'
-        title = f"Statements of {name}, from 1 ({labels[0]}) to {len(labels)} ({labels[-1]}){off_scale}"
+        title = f"Statements in {name}, from 1 ({labels[0]}) to {len(labels)} ({labels[-1]}){off_scale}"
     rows = [
         (
             item.id,
@@ -348,7 +349,7 @@ def _question_kind(item: Question, context: Context) -> str:
         answers = f" ({', '.join(levels)})" if item.value_type == "text" else f" of {len(levels)} points"
     else:
         answers = "" if bounds is None else f" from {bounds[0]:g} to {bounds[1]:g}"
-    condition = "" if item.show_if is None else f", if {item.show_if.item} asks for it"
+    condition = "" if item.show_if is None else f", depending on the answer to {item.show_if.item}"
     return f"{item.kind_id}{answers}{condition}"
 
 

@@ -93,17 +93,19 @@ def _differences(place: _Place, old: Any, new: Any) -> Iterator[Difference]:
             yield from _differences((*place, key), old.get(key), new.get(key))
     elif isinstance(old, list) and isinstance(new, list):
         if len(old) != len(new):
-            yield Difference(place, f"{len(old)} entries before, {len(new)} now")
+            yield Difference(place, f"previously {len(old)} entries, now {len(new)}")
         else:
             for index, (before, after) in enumerate(zip(old, new, strict=True)):
                 yield from _differences((*place, index), before, after)
     elif old is None and new is not None:
-        yield Difference(place, f"new, {shown_value(new)}")
+        yield Difference(place, f"new: {shown_value(new)}")
     elif new is None and old is not None:
-        yield Difference(place, f"gone, it was {shown_value(old)}")
+        yield Difference(place, f"removed; it was {shown_value(old)}")
     elif old != new:
         before, after = shown_value(old), shown_value(new)
-        yield Difference(place, f"{before} before, {after} now" if before != after else "another text or number")
+        yield Difference(
+            place, f"previously {before}, now {after}" if before != after else "a different text or number"
+        )
 
 
 def _has_ids(value: Any) -> bool:
@@ -122,4 +124,4 @@ def _entry_differences(
     yield from _differences(place, before, after)
     stayed = before.keys() & after.keys()
     if [name for name in before if name in stayed] != [name for name in after if name in stayed]:
-        yield Difference(place, "in another order")
+        yield Difference(place, "in a different order")

@@ -28,19 +28,19 @@ class Group(Table):
     share: Annotated[int, within(1, _MOST_SHARE, "shares are small whole numbers")] = Field(
         default=1,
         description=(
-            "Number of participants of this group in each randomisation block; for a pre-existing group, its part of "
-            "the planned ratio."
+            "Number of participants of this group in each randomisation block; for a pre-existing group, its share "
+            "in the planned ratio."
         ),
     )
     sequence: Steps = later(
-        default=(), min_length=1, description=("The group's pages, blocks and forms, in every session.")
+        default=(), min_length=1, description=("The group's pages, blocks and forms in every session, in order.")
     )
-    sequences: Sequences = later(default=(), min_length=1, description="Its steps of session 1, 2 …")
+    sequences: Sequences = later(default=(), min_length=1, description="The group's steps in sessions 1, 2 and so on.")
 
     @model_validator(mode="after")
     def _one_of(self) -> Self:
         if self.sequence and self.sequences:
-            message = "specify either sequence or sequences"
+            message = "specify either sequence or sequences, not both"
             raise invalid(message, "sequences")
         return self
 
@@ -97,8 +97,11 @@ def _sequences(protocol: HasSteps, group: str | None) -> Sequences:
 
 def _session_number_error(session: int, last: int) -> StudyError:
     """Return the error about a session number beyond the last session."""
-    permitted = "1, the only session" if last == 1 else f"1 to {last}"
-    return StudyError(f"session {session}: a participant of this study has {last} (sequences); permitted: {permitted}")
+    permitted = "only session 1" if last == 1 else f"1 to {last}"
+    return StudyError(
+        f"session {session} does not exist: according to sequences, each participant in this study "
+        f"has {'1 session' if last == 1 else f'{last} sessions'}; permitted: {permitted}"
+    )
 
 
 def check_session_number(protocol: HasSteps, session: int) -> None:

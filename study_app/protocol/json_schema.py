@@ -17,7 +17,9 @@ from study_app.documentation import anchor_of
 from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
-_LIQUID_FILE = "Path of a liquid file with one liquid, relative to this file; it replaces the keys of this table."
+_LIQUID_FILE = (
+    "Path of a liquid file that contains one liquid, relative to this file; it replaces the keys of this table."
+)
 
 
 _LINEAR_DRAG: Final = {"properties": {"law": {"const": "linear"}}, "required": ["law"]}
@@ -97,7 +99,7 @@ def format_markdown() -> str:
     root = schema()
     places = _model_places(root)
     headings = _headings(root, places)
-    lines = ["## Top of the file", "", *_table_lines(root, root, headings)]
+    lines = ["## Top level of the file", "", *_table_lines(root, root, headings)]
     for name, heading in headings.items():
         node = root["$defs"][name]
         lines += ["", f"## {heading}", "", _cell_text(node.get("description", "")), ""]

@@ -4,7 +4,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path as File
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 
 from pydantic import BaseModel, Field, ValidationError
 
@@ -52,6 +52,7 @@ __all__ = [
 
 M = TypeVar("M", bound=BaseModel)
 
+_RENAME: Final = "rename the file, because studies are shared between systems"
 _SHOWN = 200  # characters of a bad value that a message repeats
 _LONG = re.compile(rf'(?<=")[^"]{{{_SHOWN + 1},}}(?=")|\S{{{_SHOWN + 1},}}')
 
@@ -59,8 +60,8 @@ _LONG = re.compile(rf'(?<=")[^"]{{{_SHOWN + 1},}}(?=")|\S{{{_SHOWN + 1},}}')
 class _SceneTable(SceneDefaults):
     """The scene of a file that holds no study: rate and force limit stand here, there is no device table."""
 
-    rate_hz: RateHz = Field(default=1000, description="Nominal rate of ticks [Hz].")
-    force_limit_n: HandForceN = Field(default=8, description="Largest force on the hand [N].")
+    rate_hz: RateHz = Field(default=1000, description="Nominal tick rate [Hz].")
+    force_limit_n: HandForceN = Field(default=8, description="Maximum force on the hand [N].")
 
 
 class SceneFile(Table):
@@ -209,7 +210,7 @@ def _with_footage(document: dict[str, Any]) -> tuple[dict[str, Any], list[Fault]
     faults: list[Fault] = []
     for path, view in shown:
         if fault := file_path_fault(view):
-            faults.append(Fault(path, fault, "rename the file: a study is shared"))
+            faults.append(Fault(path, fault, _RENAME))
         elif view in hashes:
             conditions[path[1]] = {**conditions[path[1]], "footage_sha256": hashes[view]}
         else:
@@ -227,7 +228,7 @@ def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
     if not isinstance(file, str):
         raise _LiquidFileFault("must be a string", "the path of a liquid file, relative to this file")
     if fault := file_path_fault(file):
-        raise _LiquidFileFault(fault, "rename the file: a study is shared")
+        raise _LiquidFileFault(fault, _RENAME)
     if file not in texts:
         raise _LiquidFileFault(
             f'there is no UTF-8 text file "{file}" in this folder', "specify the path of the liquid file"
@@ -239,7 +240,7 @@ def _liquid_of_file(file: Any, texts: Mapping[str, str]) -> dict[str, Any]:
         raise _LiquidFileFault(f"{file}: {error.problems[0]}", f"liquid-study check {file}") from error
     (first, *others) = document["liquids"].values()
     if others:
-        raise _LiquidFileFault(f"{file} holds {len(others) + 1} liquids", "use one file for each liquid")
+        raise _LiquidFileFault(f"{file} contains {len(others) + 1} liquids", "use a separate file for each liquid")
     body = document.get("scene", {}).get("body")
     return {**first, "body": body} if body else dict(first)
 
@@ -270,7 +271,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         broken = Problem("file", "is nested too deeply", hint="use fewer brackets within brackets")
         raise ProtocolError(name, (broken,)) from error
     except ValueError as error:  # Python's own limit of digits names no place either
-        raise ProtocolError(name, (Problem("file", "contains a whole number beyond 64 bits"),)) from error
+        raise ProtocolError(name, (Problem("file", "contains a whole number of more than 64 bits"),)) from error
     return document, Places(text)
 
 

@@ -56,7 +56,7 @@ __all__ = [
 
 MAX_FORCE_N = 8.0
 HandForceN: TypeAlias = Annotated[
-    float, within(0.1, MAX_FORCE_N, "a hand feels little below 0.1 N; 8 N is the safe maximum")
+    float, within(0.1, MAX_FORCE_N, "forces below 0.1 N are hardly felt, and 8 N is the safe maximum")
 ]
 
 
@@ -66,7 +66,7 @@ FORMAT: Final = 2
 
 def _check_format_number(value: Any) -> Any:
     if type(value) is not int:
-        raise invalid(f"must be {FORMAT}, the number of this format", use=("format", FORMAT))
+        raise invalid(f"must be {FORMAT}, the version number of this format", use=("format", FORMAT))
     return value
 
 
@@ -76,79 +76,94 @@ Format: TypeAlias = Annotated[Literal[2], BeforeValidator(_check_format_number)]
 class Credits(Table):
     """Names, licence and citation that an export to share states."""
 
-    authors: tuple[Printable, ...] = Field(default=(), max_length=200, description="Names of the authors, in order.")
+    authors: tuple[Printable, ...] = Field(
+        default=(), max_length=200, description="Authors' names, in the order in which they are cited."
+    )
     license: Printable | None = Field(
-        default=None, description="Licence of the data: an SPDX identifier such as CC-BY-4.0, or an address."
+        default=None, description="Data licence: an SPDX identifier such as CC-BY-4.0, or a web address."
     )
     citation: Printable | None = Field(default=None, description="How to cite the data or the paper.")
     funder: Printable | None = Field(default=None, description="Funder of the study.")
-    url: Printable | None = Field(default=None, description="Address of the study, such as its preregistration.")
+    url: Printable | None = Field(
+        default=None, description="Web address of the study, for example of its preregistration."
+    )
 
 
 class StudyHead(Table):
     """Name, version and languages of the study."""
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folders and files.")
-    title: Localised = Field(description="Title shown to people.")
+    name: str = Field(
+        pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in the names of folders and files."
+    )
+    title: Localised = Field(description="The study's title, as it is displayed.")
     description: Description = Field(
-        default="", description="The question of the study, for later readers of its results."
+        default="", description="The research question, for people who read the results later."
     )
     version: str = Field(
-        pattern=r"^[0-9A-Za-z.+-]+$", max_length=40, description="Version of this protocol; raise it with every change."
+        pattern=r"^[0-9A-Za-z.+-]+$",
+        max_length=40,
+        description="Version of this protocol; increase it with every change.",
     )
     languages: tuple[Language, ...] = Field(
-        min_length=1, description="Languages in which every text exists; the first is the default."
+        min_length=1, description="Languages in which every text is available; the first is the default."
     )
     resume: Literal["trial", "block"] = Field(
         default="trial",
-        description="trial: an interrupted session presents its trial again; block: it presents its block again.",
+        description="What is presented again when an interrupted session is resumed. trial: the interrupted trial; "
+        "block: the whole interrupted block.",
     )
     blinding: Literal["double", "single"] = Field(
         default="double",
         description=(
-            "double: neither participant nor operator knows the condition; single: the operator sees force "
-            "and wake during the session, but the participant does not know the condition."
+            "double: neither the participant nor the operator knows the condition; single: the operator sees the "
+            "force and the wake during the session, but the participant does not know the condition."
         ),
     )
     codes: Literal["study", "participant"] = later(
         default="study",
         description=(
-            "study: a code means the same for all participants; participant: until unblinding each "
-            "participant has separate codes."
+            "study: a code means the same for all participants; participant: until unblinding, each participant has "
+            "different codes."
         ),
     )
     block_order: OrderOfBlocks = later(
         default="fixed",
         description=(
-            "Order of the main blocks, which exchange positions; pages, forms and practice stay. fixed: as "
-            "written; balanced: counterbalanced, by rows of a Williams design, selected by the number in "
-            "the participant's ID or by the position in the participant's group; random: drawn in each "
-            "session."
+            "Order of the main blocks; pages, forms and other blocks keep their positions. fixed: as written; "
+            "balanced: counterbalanced using the rows of a Williams design, which are selected by the number in the "
+            "participant's ID or by the participant's position in the group; random: drawn for each session."
         ),
     )
     group_assignment: GroupAssignment = later(
         default="randomised",
-        description="randomised: the program assigns participants to groups at random; pre-existing: groups describe "
-        "who participants are, such as experts and novices, and the operator enters the group in each session.",
+        description="randomised: the program assigns participants to groups at random; pre-existing: participants "
+        "already belong to a group, such as experts or novices, and the operator enters the group in each "
+        "session.",
     )
-    credits: Credits | None = later(default=None, description="Authors, licence and citation that exports state.")
+    credits: Credits | None = later(default=None, description="Authors, licence and citation to be stated in exports.")
 
     @model_validator(mode="after")
     def _name_can_be_a_file(self) -> Self:
         if fault := file_name_fault(self.name):
-            raise invalid(f'"{self.name}" {fault}: a study is shared, so use another name', "name")
+            raise invalid(
+                f'"{self.name}" {fault}: studies are shared between systems, so choose a different name', "name"
+            )
         return self
 
 
 class DeviceNeeds(Table):
     """What the study requires of the device."""
 
-    rate_hz: Annotated[float, within(250, 4000, "slower forces are never stable; faster ticks cannot be finished")] = (
-        Field(default=1000, description="Rate of the servo [Hz].")
-    )
-    force_limit_n: HandForceN = Field(default=MAX_FORCE_N, description="Largest force on the hand [N].")
+    rate_hz: Annotated[
+        float,
+        within(
+            250, 4000, "at lower rates forces are never stable, and at higher rates ticks cannot be computed in time"
+        ),
+    ] = Field(default=1000, description="Servo rate [Hz].")
+    force_limit_n: HandForceN = Field(default=MAX_FORCE_N, description="Maximum force on the hand [N].")
     workspace_mm: tuple[float, float, float] = Field(
-        description="Full sizes of the drawn tank in x, y, z, hand frame, centred on the device's middle [mm]."
+        description="Dimensions of the drawn tank along x, y and z in the hand frame, centred on the middle of the "
+        "device's workspace [mm]."
     )
 
     @property
@@ -160,20 +175,22 @@ class DeviceNeeds(Table):
     @model_validator(mode="after")
     def _workspace_has_room(self) -> Self:
         if not all(10 <= size <= 1000 for size in self.workspace_mm):
-            raise invalid("every size must be from 10 to 1000 mm", "workspace_mm")
+            raise invalid("every dimension must be between 10 and 1000 mm", "workspace_mm")
         return self
 
 
 class SceneDefaults(Table):
     """The part of the scene that all conditions share: everything but the liquids."""
 
-    scale: SceneScale = Field(default=10, description="Metres in the scene per metre of the hand.")
-    origin_m: Metres = Field(default=(0, 0, 0), description="Point in the scene at the zero of the hand frame [m].")
+    scale: SceneScale = Field(default=10, description="Metres in the scene per metre of hand movement.")
+    origin_m: Metres = Field(
+        default=(0, 0, 0), description="Point in the scene that corresponds to the origin of the hand frame [m]."
+    )
     body: Body = Field(default_factory=Body, description="The ball that the participant moves.")
     velocity: Estimator = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
     knee: Knee = Field(default_factory=Knee, description="How high speeds are reduced before forces are computed.")
     motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move in the scene.")
-    accuracy: Accuracy = Field(default_factory=Accuracy, description='What effects = "auto" may omit.')
+    accuracy: Accuracy = Field(default_factory=Accuracy, description='What may be left out with effects = "auto".')
     fade_s: FadeS = later(default=FADE_S, description="Time over which the force fades in [s].")
 
 
@@ -196,7 +213,7 @@ class PageText(Table):
             "what the study was about."
         )
     )
-    title: Localised = Field(description="Heading of the page.")
+    title: Localised = Field(description="Page heading.")
     body: PageBody = Field(description="The text; a blank line begins a paragraph.")
     button: Localised | None = Field(default=None, description="Text on the button; default: Continue.")
     min_s: Seconds | None = Field(
@@ -210,7 +227,7 @@ class PageText(Table):
     @model_validator(mode="after")
     def _only_breaks_last(self) -> Self:
         if self.min_s is not None and self.kind != "break":
-            raise invalid(f"belongs to a page of kind break, not {self.kind}", "min_s", kind="surplus")
+            raise invalid(f"is only for pages of kind break, not {self.kind}", "min_s", kind="surplus")
         return self
 
 
@@ -254,48 +271,55 @@ def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[Stud
 class Limits(Table):
     """Limits within which a trial is valid."""
 
-    lateness_ms: Annotated[float, within(0.01, 1000, "servos are less punctual, and 1 s is a failure")] = Field(
-        default=2, description="99th percentile of the lateness of ticks [ms]."
+    lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
+        default=2, description="Maximum 99th percentile of tick lateness [ms]."
     )
-    worst_gap_ms: Annotated[float, within(0.25, 1000, "from a tick at 4 kHz to a second, which is a failure")] = Field(
-        default=20, description="Longest time between two ticks [ms]."
+    worst_gap_ms: Annotated[float, within(0.25, 1000, "no tick is shorter than at 4 kHz, and 1 s is a failure")] = (
+        Field(default=20, description="Maximum time between two ticks [ms].")
     )
-    delay_error_ms: Annotated[float, within(1, 1000, "screens are less punctual, and 1 s is a failure")] = Field(
-        default=25, description="95th percentile of achieved − requested delay [ms]."
+    delay_error_ms: Annotated[float, within(1, 1000, "no screen is more punctual, and 1 s is a failure")] = Field(
+        default=25, description="Maximum 95th percentile of the delay error, achieved minus requested delay [ms]."
     )
-    frame_gap_ms: Annotated[float, within(1, 1000, "screens are slower, and 1 s is a failure")] = Field(
+    frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
         default=250,
-        description="Longest time before the first frame, between two frames, or before the end of the trial [ms].",
+        description="Maximum time before the first frame, between two frames, or from the last frame to the end of "
+        "the trial [ms].",
     )
     withheld_percent: Annotated[
         float, within(0.01, 100, "a proportion of the force; some force is nearly always held back")
     ] = Field(
         default=5,
-        description=("Proportion of the force that slope limits, passivity controller and slew limit hold back [%]."),
+        description=(
+            "Maximum proportion of the force held back by the slope limits, the passivity controller and "
+            "the slew limit [%]."
+        ),
     )
     targets_percent: (
         Annotated[float, within(0.01, 100, "a proportion of the targets; without this limit any number is enough")]
         | None
     ) = later(default=None, description="Minimum proportion of a reaching task's targets that must be reached [%].")
     level_error_percent: Annotated[float, within(0.1, 100, "encoder counts alone give 0.2 %")] | None = later(
-        default=None, description="Error of an interval's delivered level [%]; default: 2."
+        default=None, description="Maximum error in an interval's delivered level [%]; default: 2."
     )
     level_error_ms: Annotated[float, within(0.1, 100, "frames of 120 Hz last 8 ms")] | None = later(
-        default=None, description="Error of the delay difference delivered in a trial [ms]; default: 2."
+        default=None, description="Maximum error in the delay difference delivered in a trial [ms]; default: 2."
     )
     pace_error_percent: Annotated[float, within(1, 1000, "a hand cannot keep a pace within 1 %")] | None = later(
-        default=None, description="Error of the hand's RMS speed relative to the followed target [%]; default: 40."
+        default=None,
+        description="Maximum error in the hand's RMS speed, relative to the speed of the target it "
+        "follows [%]; default: 40.",
     )
     attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
-        default=None, description="How many times a trial of intervals is presented until it is delivered; default: 3."
+        default=None,
+        description="Maximum number of times a trial with intervals is presented until it is delivered; default: 3.",
     )
     missing_percent: (
         Annotated[float, within(0, 100, "a proportion of the trials; with 0, trials must not be missing")] | None
     ) = later(
         default=None,
         description=(
-            "Proportion of a session's main trials of intervals that may be missing because they were not "
-            "delivered [%]; above this the session is incomplete; default: 5."
+            "Maximum proportion of a session's main trials with intervals that may be missing because they were not "
+            "delivered [%]; above this, the session is incomplete; default: 5."
         ),
     )
 
@@ -306,20 +330,22 @@ _Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller")]
 class Published(Table):
     """A value of another study, which figures show next to the study's own."""
 
-    block: Id = Field(description="The block to whose results it is compared.")
+    block: Id = Field(description="The block with whose results it is compared.")
     measure: Literal["weber", "threshold", "exponent", "pse"] = Field(
-        description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; pse: "
-        "the point of subjective equality."
+        description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; "
+        "pse: the point of subjective equality."
     )
-    value: _Reported = Field(description="The value; a threshold in the unit of the varied number.")
-    standard: _Reported | None = Field(default=None, description="Its standard, in that unit; default: all standards.")
+    value: _Reported = Field(description="The value; a threshold is in the unit of the varied parameter.")
+    standard: _Reported | None = Field(
+        default=None, description="The standard to which it applies, in the same unit; default: all standards."
+    )
     low: _Reported | None = Field(default=None, description="Lower end of its interval or range.")
     high: _Reported | None = Field(default=None, description="Upper end of its interval or range.")
     percent: Annotated[float, within(0, 100, "a proportion of answers")] | None = Field(
         default=None, description="Percentage of correct answers at this value; default: unknown."
     )
     n: Annotated[int, within(1, 1_000_000, "studies have fewer")] | None = Field(
-        default=None, description="Number of its participants."
+        default=None, description="Number of participants in the published study."
     )
     source: Brief = Field(default="", description="Where it was published.")
 
@@ -346,34 +372,36 @@ class Contrast(Table):
 
     measure: Id = Field(
         default="threshold",
-        description='"threshold", "exponent", "d_prime" or "pse" for blocks of levels, or the ID of a statement; with '
-        "form the ID of one of its questions or scores.",
+        description='"threshold", "exponent", "d_prime" or "pse" for blocks with levels, or the ID of a statement; '
+        "if form is specified, the ID of one of its questions or scores.",
     )
     form: Id | None = later(
-        default=None, description="The questionnaire after the blocks whose answers or score are compared."
+        default=None, description="The questionnaire whose answers or score are compared; it is asked after the blocks."
     )
     blocks: tuple[Id, ...] = Field(
         min_length=1,
         max_length=2,
-        description=("The two blocks to compare, or the block whose conditions or groups are compared."),
+        description=("The two blocks to compare, or the block in which conditions or groups are compared."),
     )
     conditions: tuple[Id, Id] | None = Field(
         default=None, description="The two conditions of the block to compare, within participants."
     )
     groups: tuple[Id, Id] | None = Field(
         default=None,
-        description="The two groups to compare; with two blocks or conditions: in the difference between those.",
+        description="The two groups to compare; if two blocks or conditions are specified, the groups are compared "
+        "in the difference between these.",
     )
     expected: Literal["higher", "lower"] | None = Field(
         default=None,
         description=(
-            "higher: the first is expected to be above the second; lower: below the second; default: either direction."
+            "higher: the first is expected to be higher than the second; lower: it is expected to be lower; "
+            "default: either direction."
         ),
     )
     bound: Annotated[float, within(1e-9, 1e9, "published differences are smaller")] | None = Field(
         default=None,
-        description="Largest difference that would not matter (for thresholds the largest ratio, such as "
-        "1.25); default: equivalence is not tested.",
+        description="Largest difference that would not matter (for thresholds, the largest ratio, such as 1.25); "
+        "default: equivalence is not tested.",
     )
 
     @model_validator(mode="after")
@@ -381,7 +409,7 @@ class Contrast(Table):
         if len(self.blocks) == 2 and self.conditions is not None:
             raise invalid("specify two blocks, or two conditions of one block", "conditions")
         if self.form is not None and (self.conditions is not None or self.measure in OF_LEVELS):
-            raise invalid("compare a question or score of the form, after blocks or between groups", "form")
+            raise invalid("with form, compare one of its questions or scores between blocks or groups", "form")
         if self.groups is None and self.within is None:
             raise invalid("specify two blocks, or one block and two conditions, or one block and two groups", "blocks")
         for first, second in filter(None, (self.groups, self.within)):
@@ -446,10 +474,10 @@ class Contrast(Table):
 BELOW_CHANCE_P: Final = 0.001
 _Rule: TypeAlias = Literal["below_chance", "threshold_beyond_levels", "constant_answers", "fast_answers"]
 RULES: Final[Mapping[_Rule, str]] = {
-    "below_chance": "fewer answers of a block are correct than by chance (binomial p below 0.001)",
-    "threshold_beyond_levels": "a threshold lies beyond the levels of its stimulus",
-    "constant_answers": "more than {limit:g} % of the answers to statements are equal",
-    "fast_answers": "half of the answers were chosen within {limit:g} s of the question",
+    "below_chance": "fewer answers in a block are correct than expected by chance (binomial p below 0.001)",
+    "threshold_beyond_levels": "a threshold lies outside the range of its stimulus's levels",
+    "constant_answers": "more than {limit:g} % of the answers to statements are identical",
+    "fast_answers": "half of the answers were given within {limit:g} s of the question",
 }
 """When each planned rule proposes a session for exclusion."""
 _LIMITS: Final[Mapping[_Rule, tuple[float, float]]] = {"constant_answers": (1, 100), "fast_answers": (0.05, 600)}
@@ -460,13 +488,14 @@ class ExclusionRule(Table):
     """A rule by which a session is proposed for exclusion; a person decides."""
 
     rule: _Rule = Field(
-        description="below_chance: fewer correct answers than by chance; threshold_beyond_levels: a threshold beyond "
-        "the levels; constant_answers: nearly always the same answer; fast_answers: answers without reading."
+        description="below_chance: fewer correct answers than expected by chance; threshold_beyond_levels: a "
+        "threshold outside the range of levels; constant_answers: nearly always the same answer; fast_answers: "
+        "answers given too fast to have read the question."
     )
     limit: float | None = Field(
         default=None,
-        description="constant_answers: largest percentage of equal answers; fast_answers: minimum median response time "
-        "in seconds; the other rules do not use a limit.",
+        description="constant_answers: maximum percentage of identical answers; fast_answers: minimum median "
+        "response time in seconds; the other rules do not use a limit.",
     )
 
     @model_validator(mode="after")
@@ -487,22 +516,23 @@ class ExclusionRule(Table):
 class Analysis(Table):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
 
-    alpha: Annotated[float, within(0.0001, 0.2, "studies of people cannot show less than 0.0001")] = Field(
-        default=0.05, description="Largest p that counts as significant."
+    alpha: Annotated[float, within(0.0001, 0.2, "studies with human participants cannot show less than 0.0001")] = (
+        Field(default=0.05, description="Largest p value that counts as significant.")
     )
     equivalence_bound: Annotated[float, within(0.05, 6, "the scale has 6 steps, and means differ by tenths")] | None = (
         Field(
             default=None,
-            description="Largest mean difference from no delay that would not matter, in points of the scale; default: "
-            "equivalence is not tested.",
+            description="Largest mean difference from the condition without delay that would not matter, in scale "
+            "points; default: equivalence is not tested.",
         )
     )
     primary: tuple[Id, ...] = Field(
-        default=(), description="Items of the primary questions; all others are exploratory; default: all are primary."
+        default=(), description="Primary items; all others are exploratory; default: all items are primary."
     )
     names: tuple[Id, ...] = Field(
         default=(),
-        description="Items that name a liquid; the item with the single highest answer is the participant's choice.",
+        description="Items that each name a liquid; if one item has a higher answer than all others, it is the "
+        "participant's choice.",
     )
     rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to increase with delay.")
     falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to decrease with delay.")
@@ -510,32 +540,33 @@ class Analysis(Table):
         default=None, description="Item for which agreement (5 to 7) means that the participant noticed a delay."
     )
     participants: Annotated[int, Field(ge=1, le=100_000)] | None = later(
-        default=None, description="How many participants are planned."
+        default=None, description="Planned number of participants."
     )
     precision: Annotated[float, within(0.001, 10, "relative to the group mean")] | None = later(
-        default=None, description="Planned half width of the 95 % interval of the group mean, relative to the mean."
+        default=None,
+        description="Planned half-width of the 95 % confidence interval for the group mean, relative to the mean.",
     )
     trends: Literal["ranks", "slopes"] = later(
         default="ranks",
         description=(
-            "Test for a trend of answers with delay; ranks: sign-flip test of the participants' rank "
-            "correlations; slopes: Student's t test of the participants' slopes."
+            "Test for a trend in answers with delay. ranks: sign-flip test on the participants' rank correlations; "
+            "slopes: Student's t test on the participants' slopes."
         ),
     )
     looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
         default=(),
-        description="Numbers of participants at which the key is opened and all hypotheses are tested; the "
-        "last equals participants; default: once, at the end.",
+        description="Numbers of participants at which the key is opened and all hypotheses are tested; the last "
+        "number equals participants; default: once, at the end.",
     )
     spending: Literal["obrien-fleming", "pocock"] = later(
         default="obrien-fleming",
         description=(
-            "How the looks share alpha (Lan and DeMets 1983); obrien-fleming: most of it at the last look; "
-            "pocock: about evenly."
+            "How alpha is spent across the looks (Lan and DeMets 1983). obrien-fleming: mostly at the last look; "
+            "pocock: roughly evenly."
         ),
     )
-    published: tuple[Published, ...] = later(default=(), description="Published values to compare with.")
-    contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses that are tested, and reported first.")
+    published: tuple[Published, ...] = later(default=(), description="Published values to compare with the results.")
+    contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses to be tested and reported first.")
     exclusions: tuple[ExclusionRule, ...] = later(
         default=(), description="Rules by which sessions are proposed for exclusion."
     )
@@ -555,7 +586,7 @@ class Analysis(Table):
         yield "Significance level", f"{self.alpha:g}"
         yield (
             "Equivalent",
-            "not tested" if bound is None else f"mean answers within {bound:g} {points} of the answers without delay",
+            "not tested" if bound is None else f"mean answers within {bound:g} {points} of those without delay",
         )
         yield "Primary", ", ".join(self.primary) or "all statements"
         yield "Recognition", ", ".join(self.names) or "none"
@@ -563,14 +594,15 @@ class Analysis(Table):
             yield "Recognised", ", ".join(named_by)
         yield "Increase with delay", ", ".join(self.rising) or "none"
         yield "Decrease with delay", ", ".join(self.falling) or "none"
-        yield "Detection", "not asked" if self.noticed is None else f"{self.noticed} of at least 5"
+        yield "Detection", "not asked" if self.noticed is None else f"an answer of at least 5 to {self.noticed}"
         if self.participants is not None:
             yield "Participants", f"{self.participants} planned"
         if self.looks:
             looks = ", ".join(map(str, self.looks))
-            yield "Interim analyses", f"at {looks} participants; alpha spending {self.spending}"
+            yield "Interim analyses", f"with {looks} participants; alpha spending: {self.spending}"
         if self.precision is not None:
-            yield "Precision", f"half width of the 95 % interval of the group mean: {100 * self.precision:g} %"
+            width = f"{100 * self.precision:g} %"
+            yield "Precision", f"half-width of the 95 % confidence interval for the group mean: {width}"
         yield from (("Proposes exclusion", rule.words) for rule in self.exclusions)
         yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
         yield from (("Published", value.described()) for value in self.published)
@@ -592,28 +624,32 @@ Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_with_ids)]
 class Protocol(Table):
     """The whole file."""
 
-    format: Format = Field(description="Version of this file format.")
+    format: Format = Field(description="Version of the file format.")
     study: StudyHead
     device: DeviceNeeds
     scene: SceneDefaults = Field(default_factory=SceneDefaults)
     liquids: Named[StudyLiquid] = Field(min_length=1)
     conditions: dict[Id, Condition] = Field(min_length=1)
-    tasks: dict[Id, AnyTask] = Field(min_length=1, description="What a participant does in a trial.")
+    tasks: dict[Id, AnyTask] = Field(min_length=1, description="What participants do in a trial.")
     scales: dict[Id, Scale] = Field(default_factory=dict)
     questionnaires: dict[Id, Questionnaire] = Field(default_factory=dict)
     pages: dict[Id, PageText] = Field(default_factory=dict)
     stimuli: dict[Id, Stimulus] = later(default_factory=dict)
-    designs: dict[Kind, AnyDesign] = later(default_factory=dict, description="How trials with intervals are built.")
+    designs: dict[Kind, AnyDesign] = later(
+        default_factory=dict, description="How trials with intervals are constructed."
+    )
     methods: dict[Kind, AnyMethod] = later(default_factory=dict, description="How the levels of a stimulus are chosen.")
     blocks: Named[Block] = Field(min_length=1)
     sequence: Steps = Field(
-        default=(), min_length=1, description="Pages, blocks and forms in the order of every session."
+        default=(), min_length=1, description="The pages, blocks and forms of every session, in order."
     )
-    sequences: Sequences = later(default=(), min_length=1, description="The steps of session 1, 2 … if they differ.")
+    sequences: Sequences = later(
+        default=(), min_length=1, description="The steps of sessions 1, 2 and so on, if they differ."
+    )
     groups: dict[Id, Group] = later(default_factory=dict)
     limits: Limits = Field(default_factory=Limits)
     analysis: Analysis | None = Field(
-        default=None, description="Decisions about the analysis that are made before the first session."
+        default=None, description="Decisions about the analysis, made before the first session."
     )
     simulated_participants: SimulatedParticipants | None = later(
         default=None, description="How simulated participants answer statements, in power analyses and rehearsals."

@@ -17,7 +17,7 @@ from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.table import Id, Localised, Table, invalid
 from study_app.protocol.wording.languages import language_name, missing_text
 
-_Weight = Annotated[float, within(-1e6, 1e6, "instruments use smaller weights")]
+_Weight = Annotated[float, within(-1e6, 1e6, "questionnaires use smaller weights")]
 
 
 class Score(Table):
@@ -29,13 +29,17 @@ class Score(Table):
     """
 
     items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items to combine.")
-    reverse: tuple[Id, ...] = Field(default=(), description="Which of these items are reversed.")
-    combine: Literal["mean", "sum"] = Field(default="mean", description="mean: their mean; sum: their sum.")
+    reverse: tuple[Id, ...] = Field(default=(), description="Which of these items are reverse-scored.")
+    combine: Literal["mean", "sum"] = Field(
+        default="mean", description="mean: the mean of the items; sum: the sum of the items."
+    )
     factor: _Weight = Field(default=1, description="Factor by which the result is multiplied.")
     offset: _Weight = Field(default=0, description="Number added to the result.")
     weights: dict[Id, _Weight] = Field(default_factory=dict, description="Weight of an item; default: 1.")
     weights_from: tuple[Id, ...] = Field(
-        default=(), description="Choices between items: each item's weight is how often it was chosen."
+        default=(),
+        description="Questions in which participants choose between items; each item's weight is the "
+        "number of times it was chosen.",
     )
 
     @model_validator(mode="after")
@@ -43,7 +47,7 @@ class Score(Table):
         for key in ("reverse", "weights"):
             for name in getattr(self, key):
                 if name not in self.items:
-                    raise invalid(f'"{name}" is not among the items of the score', key)
+                    raise invalid(f'"{name}" is not an item of the score', key)
         return self
 
 
@@ -77,11 +81,11 @@ def score(
 class Questionnaire(Table):
     """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
 
-    title: Localised | None = Field(default=None, description="Heading; default: the name of the trial.")
-    intro: Localised = Field(description="The question above the statements.")
-    scale: Id | None = Field(default=None, description="The scale of all statements; omit it if there are none.")
+    title: Localised | None = Field(default=None, description="Heading; default: the trial's name.")
+    intro: Localised = Field(description="The question shown above the statements.")
+    scale: Id | None = Field(default=None, description="The scale for all statements; omit it if there are none.")
     item_order: Literal["fixed", "shuffled"] = Field(
-        default="fixed", description="fixed: as written; shuffled: a new order in every trial."
+        default="fixed", description="fixed: as written; shuffled: a new order for every trial."
     )
     items: tuple[AnyQuestion, ...] = Field(
         min_length=1, description="The questions; a question without kind is a statement on the questionnaire's scale."
@@ -89,7 +93,7 @@ class Questionnaire(Table):
     instrument: str | None = later(
         default=None, description="The standard questionnaire whose items and scoring are used."
     )
-    scores: dict[Id, Score] = later(default_factory=dict, description="Numbers computed from the answers.")
+    scores: dict[Id, Score] = later(default_factory=dict, description="Scores calculated from the answers.")
 
     @property
     def statements(self) -> tuple[Question, ...]:
@@ -283,7 +287,7 @@ def _unpublished_fault(path: Path, of: str, language: str, lacks: Sequence[tuple
     )
     source = instrument(of)
     translation = source.get("published", {}).get(language)
-    published = f", but a translation is published, {translation}" if translation else ""
+    published = f", although a translation has been published ({translation})" if translation else ""
     why = (
         f"the program does not include {of} in {language_name(language)}{published}"
         if source["languages"]

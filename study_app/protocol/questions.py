@@ -36,9 +36,11 @@ class Scale(Table):
     """The points of an answer, lowest first: seven for statements, 2 to 11 for other ratings."""
 
     labels: dict[str, Annotated[tuple[Printable, ...], Field(min_length=FEWEST_POINTS, max_length=MOST_POINTS)]] = (
-        Field(description=("For each language the labels of the points, lowest first: 2 to 11."))
+        Field(description=("Labels of the scale's 2 to 11 points in each language, lowest first."))
     )
-    cannot_judge: Localised | None = Field(default=None, description="Label of an answer off the scale; default: none.")
+    cannot_judge: Localised | None = Field(
+        default=None, description="Label of an answer that is not on the scale, such as “cannot judge”; default: none."
+    )
 
     @property
     def points(self) -> int:
@@ -54,9 +56,9 @@ class ShowIf(Table):
 
     model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
 
-    item: Id = Field(description="The earlier item.")
+    item: Id = Field(description="The earlier item that determines whether this item is shown.")
     values: int | float | str | tuple[int | float | str, ...] | None = Field(
-        default=None, alias="is", description="The answer, or a list of answers."
+        default=None, alias="is", description="The answer, or a list of answers, for which the item is shown."
     )
     at_least: float | None = Field(default=None, description="Smallest number.")
     at_most: float | None = Field(default=None, description="Largest number.")
@@ -78,7 +80,7 @@ class ShowIf(Table):
     def _values_or_bounds(self) -> Self:
         bounded = self.at_least is not None or self.at_most is not None
         if (self.values is not None) == bounded:
-            raise invalid("needs is, or at_least, at_most or both", "is")
+            raise invalid("needs either is, or at_least and/or at_most", "is")
         return self
 
 
@@ -167,10 +169,11 @@ class Question(Table):
         description="Name of the item in every table. Do not change the name after data collection has begun."
     )
     text: Localised = Field(description="The statement shown to the participant.")
-    short: Localised = Field(description="Short label for figures and tables, one to three words.")
+    short: Localised = Field(description="Short label for figures and tables (one to three words).")
     required: bool = Field(default=True, description="Whether an answer is required to continue.")
     show_if: ShowIf | None = later(
-        default=None, description="The answer to an earlier item on which this item is shown; default: always shown."
+        default=None,
+        description="The answer to an earlier item that causes this item to be shown; default: always shown.",
     )
 
     @property
@@ -215,7 +218,7 @@ def plain_number(value: float) -> int | float:
 def answer_problem(question: Question, answer: Value, context: Context) -> str | None:
     """Return why a value is not a valid answer, as a sentence; None if it is."""
     if isinstance(answer, bool):
-        return f"answer {answer} is neither a number nor a text: specify one of these"
+        return f"answer {answer} is neither a number nor a text: specify a number or a text"
     texts = answer if isinstance(answer, tuple) else (answer,) if isinstance(answer, str) else ()
     if (letters := sum(map(len, texts))) > _MOST_LETTERS:
         return f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {_MOST_LETTERS:,}"
@@ -274,7 +277,10 @@ class Rated(Question):
         if answer is None:
             if scale.cannot_judge is not None:
                 return None
-            return "this questionnaire does not have an answer off the scale: choose one of its points"
+            return (
+                "this questionnaire does not permit an answer that is not on the scale: choose one of the scale's "
+                "points"
+            )
         if isinstance(answer, int) and 1 <= answer <= scale.points:
             return None
         return f"answer {answer} is not on the scale: choose 1 to {scale.points}"
@@ -291,7 +297,7 @@ class Rating(Rated):
     """A rating on one of the protocol's scales."""
 
     kind: Literal["rating"] = "rating"
-    scale: Id = Field(description="The scale, of 2 to 11 points.")
+    scale: Id = Field(description="The scale, which has 2 to 11 points.")
 
     def scale_of(self, context: Context) -> Scale:
         return context.scales[self.scale]
@@ -421,10 +427,12 @@ class Number(Question):
     value_type: ClassVar[ValueType] = "number"
 
     kind: Literal["number"] = "number"
-    least: _Bound | None = Field(default=None, alias="from", description="Smallest number; default: any.")
-    most: _Bound | None = Field(default=None, alias="to", description="Largest number; default: any.")
+    least: _Bound | None = Field(
+        default=None, alias="from", description="Smallest number permitted; default: no minimum."
+    )
+    most: _Bound | None = Field(default=None, alias="to", description="Largest number permitted; default: no maximum.")
     whole: bool = Field(default=False, description="Whether only whole numbers are permitted.")
-    unit: Localised | None = Field(default=None, description="Unit, shown after the field.")
+    unit: Localised | None = Field(default=None, description="Unit shown after the field.")
 
     @model_validator(mode="after")
     def _range_has_numbers(self) -> Self:
@@ -491,8 +499,8 @@ class Slider(Question):
     value_type: ClassVar[ValueType] = "number"
 
     kind: Literal["slider"] = "slider"
-    low: Localised = Field(description="Label at the lower end.")
-    high: Localised = Field(description="Label at the upper end.")
+    low: Localised = Field(description="Label for the lower end.")
+    high: Localised = Field(description="Label for the upper end.")
     least: _Bound = Field(default=0, alias="from", description="The number at the lower end.")
     most: _Bound = Field(default=100, alias="to", description="The number at the upper end.")
     step: float = Field(default=1, gt=0, description="Difference between neighbouring numbers.")
@@ -503,8 +511,10 @@ class Slider(Question):
             raise invalid(f"{self.most:g} must be greater than from = {self.least:g}", "to")
         steps = (self.most - self.least) / self.step
         if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= _MOST_STEPS:
-            permitted = f"a whole number of 1 to {_MOST_STEPS}"
-            raise invalid(f"is {self.step:g}: {steps:g} steps from end to end; {permitted} are permitted", "step")
+            permitted = f"a whole number from 1 to {_MOST_STEPS}"
+            raise invalid(
+                f"is {self.step:g}, which gives {steps:g} steps from end to end; this must be {permitted}", "step"
+            )
         return self
 
     def view(self, number: int, context: Context) -> ItemView:
@@ -549,7 +559,7 @@ class Text(Question):
 
     kind: Literal["text"] = "text"
     lines: int = Field(default=1, ge=1, le=10, description="Height of the field, in lines.")
-    longest: int = Field(default=500, ge=1, le=_MOST_LETTERS, description="Largest number of characters.")
+    longest: int = Field(default=500, ge=1, le=_MOST_LETTERS, description="Maximum number of characters.")
 
     def view(self, number: int, context: Context) -> ItemView:
         return self._shown(TextView, number, context, lines=self.lines, longest=self.longest)
@@ -613,7 +623,7 @@ else:
             Discriminator(
                 _kind_of,
                 custom_error_type="question_kind",
-                custom_error_message="is not a kind of question",
+                custom_error_message="is not a question kind",
                 custom_error_context={"place": "kind", "permitted": ", ".join(KINDS.own)},
             ),
         ],

@@ -28,30 +28,33 @@ class SimulatedParticipants(Table):
 
     noise_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
         default=1.10,
-        description="SD of a participant's answers to identical trials, in points (mean over participants).",
+        description="SD of a participant's answers to identical trials, in scale points (mean across participants).",
     )
     bias_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
         default=0.76,
-        description="SD between participants of their response bias, in points, which is added to every answer.",
+        description="Between-participant SD of response bias, which is added to every answer, in scale points.",
     )
-    slope_sd: Annotated[float, within(0, 2, "with 2, three in ten people respond in the opposite direction")] = Field(
-        default=0.50,
-        description=(
-            "SD between participants of the slope of their answers across conditions, relative to the mean "
-            "slope; used by power analyses, not by rehearsals."
-        ),
+    slope_sd: Annotated[float, within(0, 2, "with 2, three in ten participants respond in the opposite direction")] = (
+        Field(
+            default=0.50,
+            description=(
+                "Between-participant SD of the slope of answers across conditions, relative to the mean slope; used in "
+                "power analyses but not in rehearsals."
+            ),
+        )
     )
     lapse_rate: Annotated[float, within(0, 0.5, "fewer than half of the answers are errors")] = Field(
         default=0.0,
         description=(
-            "Proportion of answers given in error, 3 points too high; used by power analyses, not by rehearsals."
+            "Proportion of answers given in error, which are 3 points too high; used in power analyses but not in "
+            "rehearsals."
         ),
     )
 
     def described(self) -> str:
         """Return the values as text."""
         lapses = f", lapse rate {self.lapse_rate:g}" if self.lapse_rate else ""
-        return f"SD of noise {self.noise_sd:g}, of response bias {self.bias_sd:g}, of slopes {self.slope_sd:g}{lapses}"
+        return f"noise SD {self.noise_sd:g}, response bias SD {self.bias_sd:g}, slope SD {self.slope_sd:g}{lapses}"
 
 
 REHEARSED: Final = SimulatedParticipants(noise_sd=0.65, bias_sd=0.4, slope_sd=0)

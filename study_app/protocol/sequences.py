@@ -64,10 +64,10 @@ class Constraint:
         if repetitions == 1:
             return None
         if self.min_distance is not None and self.min_distance > codes:
-            possible = "one condition permits only 1" if codes == 1 else f"{codes} conditions permit only 1 to {codes}"
+            possible = "one condition requires 1" if codes == 1 else f"{codes} conditions require 1 to {codes}"
             return "min_distance", f"is {self.min_distance}, but {possible}"
         if self.max_repeats is not None and codes == 1 and self.max_repeats < repetitions:
-            possible = f"one condition presented {repetitions} times permits only {repetitions} or more"
+            possible = f"with one condition presented {repetitions} times it must be at least {repetitions}"
             return "max_repeats", f"is {self.max_repeats}, but {possible}"
         return None
 

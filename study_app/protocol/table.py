@@ -87,7 +87,7 @@ def _check_each_text(value: Any) -> Any:
         return _checked_text(value)
     if isinstance(value, dict) and value and all(isinstance(text, str) for text in value.values()):
         return {language: _checked_text(text) for language, text in value.items()}
-    raise invalid('a text is a string, or one string per language: {en = "…", nl = "…"}')
+    raise invalid('a text must be a string, or one string per language: {en = "…", nl = "…"}')
 
 
 @lru_cache(maxsize=16_384)  # saves 17 ms of each edit, after which a study is validated
@@ -108,7 +108,7 @@ def _check_printable(text: str) -> str:
     if (letter := unprintable_character(text, "\t\n\r")) is not None:
         raise invalid(f"contains the character U+{ord(letter):04X}, which cannot be printed: remove it")
     if not any(unicodedata.category(letter)[0] in VISIBLE for letter in text):
-        raise invalid("the text is empty: write a text")
+        raise invalid("the text is empty: write some text")
     return text
 
 
@@ -116,7 +116,7 @@ def _at_most_long(most: int) -> AfterValidator:
     def checked(value: str | dict[str, str]) -> str | dict[str, str]:
         longest = max(map(len, value.values() if isinstance(value, dict) else (value,)))
         if longest > most:
-            raise invalid(f"has {longest} characters, more than {most}: shorten it")
+            raise invalid(f"has {longest} characters, but at most {most} are permitted: shorten it")
         return value
 
     return AfterValidator(checked)

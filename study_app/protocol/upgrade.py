@@ -63,5 +63,7 @@ def upgraded_file(source: bytes, name: str) -> bytes:
         is_same = False
     if not is_same:
         hint = "write [scene], [scene.velocity] and [scene.accuracy] as tables with headers"
-        raise ProtocolError(name, (Problem("scene", "is an inline table, which cannot be upgraded", hint=hint),))
+        raise ProtocolError(
+            name, (Problem("scene", "is an inline table, which the program cannot upgrade", hint=hint),)
+        )
     return upgraded.encode()

@@ -88,7 +88,7 @@ class PredictedDelivery:
         """The predicted loss as sentences without full stops: "26 of 40 trials would not be delivered: …"."""
         why = limit_reason("withheld_percent", {"withheld_percent": self.limit_percent})
         missing = f"{self.missing} of {counted(self.asked, 'trial')} would not be delivered: {why}"
-        out = f"{self.out} of {counted(self.judged, 'trial')} would be out of limits: {why}"
+        out = f"{self.out} of {counted(self.judged, 'trial')} would exceed the limits: {why}"
         return (*([missing] if self.missing else []), *([out] if self.out else []))
 
 
@@ -187,20 +187,20 @@ def _warning_unless(name: str, value: str, about: str, advice: str, *, well: boo
 def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of the device's response, its force delay and the servo's rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
-    about = f"{facts.device}, a new sample on {share} of ticks"
+    about = f"{facts.device} sends a new sample on {share} of ticks"
     if facts.timing.ticks == 0 or facts.fresh_share < _LEAST_FRESH:
         advice = f"{facts.device} sends a new sample on only {share} of ticks: check its cable and power"
         yield Check("Device", "failure", "not responding", about=about, advice=advice)
     else:
         yield Check("Device", "ok", "responding", about=about)
 
-    about, requested_hz = "assumed: the device does not measure its delay", protocol.device.rate_hz
+    about, requested_hz = "assumed, because the device does not measure its delay", protocol.device.rate_hz
     if facts.dynamics.delay_s is not None:
-        about = f"delay until a force acts: {1e3 * facts.dynamics.delay_s:.2f} ms, measured by the device"
+        about = f"the device measured a delay of {1e3 * facts.dynamics.delay_s:.2f} ms until a force acts"
         if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
             about += " when it was opened; it has measured a longer delay since"
     well = facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS
-    advice = "The force limits are stricter; connect the device without a hub."
+    advice = "The force limits are stricter because of this delay; connect the device without a hub."
     yield _warning_unless("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
 
     value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {requested_hz:g} Hz"
@@ -217,8 +217,8 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     late_ms, gap_ms = facts.timing.lateness_p99_s * 1e3, facts.timing.worst_gap_s * 1e3
     worst = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
     about = (
-        f"for 99 % of ticks (limit {limits.lateness_ms:g} ms); largest gap {gap_ms:.1f} of "
-        f"{limits.worst_gap_ms:g} ms, {facts.timing.overruns} overruns"
+        f"99th percentile of ticks (limit: {limits.lateness_ms:g} ms); largest gap {gap_ms:.1f} ms (limit: "
+        f"{limits.worst_gap_ms:g} ms); {counted(facts.timing.overruns, 'overrun')}"
     )
     advice = "Trials would be invalid: close other programs."
     yield _warning_unless("Servo lateness", f"{late_ms:.2f} ms", about, advice, well=worst <= 1, share=worst)
@@ -247,9 +247,8 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
     """Yield the checks of screen, disk, key and videos."""
     limit_ms, screen = protocol.limits.delay_error_ms, facts.screen
     seen_ms = (facts.sample_age_s + 1 / max(screen.refresh_hz, 1.0)) * 1e3  # the age of a sample plus one frame
-    about, advice = f"beyond the requested delay, limit {limit_ms:g} ms", "use a screen with a higher refresh rate."
-    share = seen_ms / limit_ms
-    advice = f"Trials would be invalid: {advice}"
+    about, share = f"in addition to the requested delay (limit: {limit_ms:g} ms)", seen_ms / limit_ms
+    advice = "Trials would be invalid: use a screen with a higher refresh rate."
     yield _warning_unless(
         "Visual delay", f"up to {seen_ms:.1f} ms", about, advice, well=seen_ms <= limit_ms, share=share
     )
@@ -278,7 +277,7 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
         )
     else:
         value, well = f"{_megabytes(facts.free_bytes)} MB free", facts.free_bytes >= needed
-        advice = "" if well else f"{value}, {about}: free disk space"
+        advice = "" if well else f"{value}, {about}: free up some disk space"
         yield Check("Free space", "ok" if well else "failure", value, about=about, advice=advice)
 
     about = "the key is drawn and sealed when the first session begins"
@@ -300,14 +299,14 @@ def _outlet_checks(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
                 outlet.title,
                 "ok",
                 "off",
-                about="in a double-blind study: anyone who sees the force can identify the liquid",
+                about="because the study is double-blind and anyone who sees the force can identify the liquid",
             )
         elif outlet.lost:
             yield Check(
                 outlet.title, "warning", "not available", about=outlet.lost, advice="The session can run without it."
             )
         elif outlet.shows_force:
-            advice = "A viewer of the force can identify the liquid: do not show the stream to anyone."
+            advice = "Anyone who sees the force can identify the liquid, so do not show the stream to anyone."
             who = "listener" if outlet.listens else "no listener"
             yield Check(outlet.title, "warning", who, about="the study is double-blind", advice=advice)
         elif outlet.listens is False:
@@ -324,10 +323,10 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         share = facts.tick_s * protocol.device.rate_hz
         value, about = (
             f"{facts.tick_s * 1e9:.0f} ns per tick",
-            f"most expensive scene: {100 * share:.2g} % of each tick",
+            f"the most expensive scene takes {100 * share:.2g} % of each tick",
         )
         advice, well = "Remove an effect from the scene.", share <= _MOST_OF_A_TICK
-        yield _warning_unless("Cost of the scenes", value, about, advice, well=well, share=share)
+        yield _warning_unless("Scene cost", value, about, advice, well=well, share=share)
 
     if facts.velocity_errors and facts.dynamics.unknown and descriptor_of(facts.device).kind == "felt":
         now, known = (100 * error for error in facts.velocity_errors)
@@ -341,7 +340,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
     if facts.withheld:
         limit_percent, most_percent = protocol.limits.withheld_percent, 100 * max(facts.withheld.values())
-        about = f"in the fastest stroke of a task, limit {limit_percent:g} %"
+        about = f"in the fastest stroke of a task (limit: {limit_percent:g} %)"
         if protocol.study.blinding == "single":  # the operator may know liquids
             about += ": " + ", ".join(f"{name} {100 * of:.1f} %" for name, of in sorted(facts.withheld.items()))
         share, value = most_percent / limit_percent, f"at most {most_percent:.1f} %"
@@ -356,8 +355,10 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         yield _warning_unless("Trials delivered", value if lost else "all", about, f"{advice}.", well=not lost)
 
     if facts.ran_otherwise:
-        about = f"version {protocol.study.version} ran from another file with {facts.ran_otherwise}"
-        advice = "Set another study.version in the changed file; the report states the change in any case."
+        about = (
+            f"version {protocol.study.version} has already been run from a different file, with {facts.ran_otherwise}"
+        )
+        advice = "Set a different study.version in the changed file; the report will mention the change in any case."
         yield Check("Study file", "warning", "changed", about=about, advice=advice)
 
     if facts.untranslated:
@@ -366,12 +367,12 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         yield Check("Translation", "warning", counted(len(facts.untranslated), "text"), about=about, advice=advice)
 
     if protocol.assigns_rows and protocol.groups:
-        yield Check("Balance", "ok", "place in the group", about="determines the row of the square")
+        yield Check("Balance", "ok", "position in the group", about="determines the row of the square")
     elif protocol.assigns_rows and (number := enrolment_number(facts.participant)) is not None:
         yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")
     elif protocol.assigns_rows:
         advice = f"{facts.participant} does not contain a number, so its row is drawn at random; use IDs such as P007."
-        yield Check("Balance", "warning", "drawn", about="the row of the square", advice=advice)
+        yield Check("Balance", "warning", "drawn", about="row of the square", advice=advice)
 
 
 def _megabytes(count: float) -> str:

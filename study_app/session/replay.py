@@ -219,7 +219,9 @@ def replay(session_folder: Path) -> Replayed:
         if resumed != resumed_at:  # the servo was restarted: nothing continues from the previous recording
             before, resumed_at = None, resumed
         if resumed not in devices:
-            raise StoreError(f"{session.receipt} lacks the device used since {resumed}: restore it from a copy")
+            raise StoreError(
+                f"{session.receipt} does not contain the device used since {resumed}: restore it from a copy"
+            )
         name = attempt_name(*which)
         if not isinstance(line, events.Recorded):
             why = "the journal does not say why" if line is None else line.reason
@@ -227,7 +229,7 @@ def replay(session_folder: Path) -> Replayed:
             continue
         path = session.path / line.recording
         if not is_there(path):
-            replayed.missing += (f"{name}: {line.recording} is missing, but the journal mentions it",)
+            replayed.missing += (f"{name}: {line.recording} is missing, although the journal mentions it",)
             continue
         seed = link_seed(drawn_from, participant, *which)
         interval = which[-1]
@@ -363,7 +365,7 @@ def _compare_recording(replayed: Replayed, name: str, samples: Any, again: _Befo
         replayed.uncompared += (f"{name}: the recording is empty",)
         return
     if not again.knows_its_start:
-        replayed.uncompared += (f"{name}: continues from the force of a recording that is missing or has a gap",)
+        replayed.uncompared += (f"{name}: the recording continues from the force of one that is missing or has a gap",)
         return
     replayed.recordings += 1
     replayed.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9

@@ -104,7 +104,9 @@ def find_protocol(
         with contextlib.suppress(ProtocolError):
             if parse(source, name).study.name == start.study:
                 return name
-    raise SessionError(f"the protocol was not found for the study {start.study!r}: name its file with --protocol FILE")
+    raise SessionError(
+        f"the protocol of the study {start.study!r} was not found: specify its file with --protocol FILE"
+    )
 
 
 def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> int:
@@ -115,7 +117,8 @@ def _next_step(protocol: Protocol, schedule: Schedule, progress: Progress) -> in
     number = here.number if isinstance(here, Trial) else None
     if (progress.page, progress.trial) not in {(None, None), (named, number)}:
         raise SessionError(
-            "the journal does not follow the order determined by seed and participant, so the session cannot be resumed"
+            "the journal does not follow the order determined by the seed and the participant, so the session "
+            "cannot be resumed"
         )
     if number is not None and progress.invalid >= (protocol.limits.attempts or math.inf):
         return progress.step + 1  # it was presented the greatest permitted number of times

@@ -207,8 +207,7 @@ class Runner:
             self._notify_listeners()
         if isinstance(event, events.EndRequested) and stall is not None:
             raise StoreError(
-                f"{stall.reason}; the end of the session is not written either: resume the session later, or "
-                "end it then"
+                f"{stall.reason}; the end of the session cannot be written either, so resume or end the session later"
             )
 
     def _retry_writes(self, stall: Stall) -> None:

@@ -152,8 +152,8 @@ def check_row(row_of: str | None, study: Protocol) -> None:
         return
     if not study.assigns_rows:
         raise SessionError(
-            f"row of {row_of!r}: no block of {study.study.name} has a Williams or Latin order, so participants "
-            "do not have rows; omit it"
+            f"row of {row_of!r}: no block in {study.study.name} has a Williams or Latin order, so participants do "
+            "not have rows; omit this option"
         )
     if not ID_PATTERN.fullmatch(row_of) or enrolment_number(row_of) is None:
         raise SessionError(
@@ -205,7 +205,8 @@ def check_choices(chosen: NewSession, study: Protocol) -> None:
     if chosen.language not in study.study.languages:
         known = ", ".join(study.study.languages)
         raise SessionError(
-            f"language {chosen.language!r}: {study.study.name} is available in {known}; choose one of these"
+            f"language {chosen.language!r}: {study.study.name} is available only in {known}; choose one of these "
+            "languages"
         )
     if chosen.resumes is not None:
         return

@@ -243,8 +243,8 @@ def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> N
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ('"late", "load"]', '"late"]', "load is not asked after each compared block"),
-        ('measure = "raw"', 'measure = "raws"', '"load" does not have a number or score raws'),
+        ('"late", "load"]', '"late"]', "load is not asked after every block that is compared"),
+        ('measure = "raw"', 'measure = "raws"', '"load" does not have a numeric question or score raws'),
         ('measure = "raw"', 'measure = "threshold"', "compare a question or score of the form"),
     ],
 )

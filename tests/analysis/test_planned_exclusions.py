@@ -57,7 +57,7 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
         (first, "constant_answers", "undecided"),
         (second, "fast_answers", "undecided"),
     ]
-    assert found[0].why == f"100 % of {int((own & responses['counted']).sum())} answers to statements are equal"
+    assert found[0].why == f"100 % of {int((own & responses['counted']).sum())} answers to statements are identical"
     assert found[1].why == f"half of {int((hurried & answered['counted']).sum())} answers were chosen within 0.30 s"
 
 
@@ -137,7 +137,7 @@ def test_the_preregistration_quotes_the_rules(tmp_path: Path) -> None:
     rules = '[[analysis.exclusions]]\nrule = "constant_answers"\nlimit = 90\n'
     protocol = load(study_with(tmp_path, rules))
     text = preregistration(protocol, "0" * 64)
-    assert "a session is proposed for exclusion if more than 90 % of the answers to statements are equal" in text
+    assert "a session is proposed for exclusion if more than 90 % of the answers to statements are identical" in text
     assert commitment(protocol, "0" * 64).rules == ("constant_answers",)
 
 

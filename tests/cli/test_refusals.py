@@ -55,7 +55,11 @@ def test_edit_opens_a_study_by_name_or_file(visit: Visit, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize(
     ("words", "said"),
-    [(("edit", "nowhere"), "nowhere"), (("new", "My study"), "is not a short name"), (("new", "rek2024"), "rek2024")],
+    [
+        (("edit", "nowhere"), "nowhere"),
+        (("new", "My study"), "is not a valid short name"),
+        (("new", "rek2024"), "rek2024"),
+    ],
 )
 def test_what_cannot_be_is_refused_before_a_window_opens(visit: Visit, words: tuple[str, ...], said: str) -> None:
     refused = CliRunner().invoke(commands, words).exception

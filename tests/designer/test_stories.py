@@ -58,7 +58,7 @@ def drafts(story: Story) -> None:
     story.expect(undo="Change Version")
     act("to the file", lambda: designer.place.show_tab("file"))
     act("type into it", lambda: designer.place.file.editor.insertPlainText("# mine\n"))
-    story.expect(undo="Edit the file", kept="edited", at="Text of the file")
+    story.expect(undo="Edit the file", kept="edited", at="File text")
     edited = designer.text
     act("open a shipped one", lambda: designer.open("demo"))
     story.expect("This study ships with the program. Make a copy to change it.", undo="", kept="saved")
@@ -74,7 +74,7 @@ def drafts(story: Story) -> None:
     story.ask(SetValue(VERSION, "0.8"))
     act("leave", lambda: designer.window.go("home"))
     act("come back", lambda: designer.window.go("designer"))
-    story.expect(at="Outline of the study", kept="edited")
+    story.expect(at="Study outline", kept="edited")
     story.play("ctrl+s")
     story.expect(kept="saved")
     act("copy a shipped one", lambda: designer.controller.begin_study("demo", "mine"))
@@ -106,7 +106,7 @@ def banner(story: Story) -> None:
         assert not designer.place.banner.isVisible()
         assert (f'title = "{end}"' in designer.text) == (end in ("save", "close", "Esc"))
         story.play("ctrl+s")
-        story.expect(kept="saved", at="Title" if end == "close" else "Outline of the study")
+        story.expect(kept="saved", at="Title" if end == "close" else "Study outline")
 
 
 def never_saved(story: Story) -> None:
@@ -141,16 +141,16 @@ def others(story: Story) -> None:
         designer.change((old, new))
         look()
 
-    both = "Another program changed this file, and it was also edited here"
+    both = "Another program has changed this file, which has also been edited here"
     outside("A first look", "Another look")
-    story.expect(undo="Take the file's content", kept="saved")
+    story.expect(undo="Use the file's content", kept="saved")
     story.ask(SetValue(VERSION, "0.7"))
     outside("Another look", "A third look")
     story.expect(both, undo="Change Version", kept="edited")
     story.play("ctrl+s")
     assert "A third look" in designer.file.read_text("utf-8"), "not overwritten while that is asked"
-    story.play("[Take the file's]")
-    story.expect(undo="Take the file's content", kept="saved")
+    story.play("[Use the file's]")
+    story.expect(undo="Use the file's content", kept="saved")
     story.has('title = "A third look"', 'version = "1.0"')
     story.ask(SetValue(VERSION, "0.8"))
     outside("A third look", "A fourth look")
@@ -174,7 +174,7 @@ def others(story: Story) -> None:
     story.play("[Keep mine]")
     designer.file.unlink()
     look()
-    story.expect("Another program deleted or moved this file", kept="not saved")
+    story.expect("Another program has deleted or moved this file", kept="not saved")
     story.play("[Keep mine] ctrl+s")
     story.expect(kept="saved")
     other = designer.file.with_name("other.toml")
@@ -294,13 +294,14 @@ def versions(story: Story) -> None:
     story.ask(SetValue(REPETITIONS, 5))
     story.act("save as pantry", lambda: designer.saving.save_as_another("pantry"))
     story.expect(
-        "The study was not saved: version 0.1 was run by 1 session with different content: save it as version 0.2.",
+        "The study was not saved: version 0.1 has already been run with different content (1 session): save the "
+        "study as version 0.2.",
         kept="not saved",
     )
     story.play("ctrl+s")
     story.act("another", prompt().another.click)
     story.play("'kitchen' Return")
-    story.expect(at="Short name of the other study", kept="not saved")
+    story.expect(at="Short name for the new study", kept="not saved")
     story.play("ctrl+a 'kitchen2' Return")
     story.expect(kept="saved", undo="Save as kitchen2")
     assert designer.editing.opened.file.name == "kitchen2.toml"
@@ -331,7 +332,7 @@ def incomplete(story: Story) -> None:
     assert count == sum(1 for _ in texts_of(story.designer.study)), "each text is missing in Dutch"
     story.expect("1 problem", undo="Add Dutch")
     story.play("ctrl+s")
-    story.expect("Saved. It cannot be run yet: 1 problem", kept="saved")
+    story.expect("Saved, but the study cannot be run yet because of 1 problem", kept="saved")
     story.play("[Show the list] @device")
     (line,) = story.designer.place.problems.lines
     assert line.row.message == f"{count} texts are missing in Dutch; this is the first"
@@ -498,7 +499,7 @@ def adaptive(story: Story) -> None:
     named = {
         "liquids.damper.drag.damping_nspm": "Viscosity (damping)",
         "stimuli.damping.vary": "Varied quantity",
-        "blocks.viscosity.catch.wrong_most": "Maximum wrong catch trials",
+        "blocks.viscosity.catch.wrong_most": "Maximum incorrect catch trials",
     }
     for path, at in named.items():
         story.play(f"@{'.'.join(path.split('.')[:2])} :{path}")
@@ -564,12 +565,12 @@ def typed_into_the_file(story: Story) -> None:
     story.act("to the file", lambda: story.designer.place.show_tab("file"))
     story.act("behind a header", lambda: go_to("[study]", end=True))
     story.play("Return 'subtitle = ' '\"abc\"' ' # and more'")
-    story.expect("1 problem", undo="Edit the file", at="Text of the file")
+    story.expect("1 problem", undo="Edit the file", at="File text")
     story.has('subtitle = "abc" # and more')
     story.play("@blocks.liquids")
     story.act("into the order", lambda: go_to('order = "', end=False))
     story.play("'x'")
-    story.expect("2 problems", at="Text of the file")
+    story.expect("2 problems", at="File text")
     story.has('order = "xshuffled"')
     story.play("F8")
     story.expect(selected="study", at="Remove: Study, Subtitle")
@@ -581,7 +582,7 @@ def typed_into_the_file(story: Story) -> None:
 def unreadable(story: Story) -> None:
     """A file that was never readable is opened at the line of its fault, and nothing can be added to it."""
     story.play("[Add an element (Insert)]" if story.designer.place.outline.add.isEnabled() else "Insert")
-    story.expect(undo="", at="Text of the file", selected="study")
+    story.expect(undo="", at="File text", selected="study")
     story.act("correct it", lambda: story.designer.editing.make_step("Correct the file", text=DEMO))
     story.expect("No problems", undo="Correct the file", kept="edited")
     story.act("outline", story.designer.controller.show_outline)
@@ -659,7 +660,7 @@ def tab_key(story: Story) -> None:
     story.act("ask to delete", lambda: designer.controller.ask_to_delete(("liquids", "thick")))
     place = designer.place
     parts = {"header": place.header, "banner": place.banner, "outline": place.outline, "question": place.prompt}
-    parts |= {"path": designer.area("Path of the element"), "form": place.form, "views": place.pane}
+    parts |= {"path": designer.area("Element path"), "form": place.form, "views": place.pane}
     parts["problems"] = place.problems
 
     def areas(tabs: int) -> list[str]:
@@ -787,7 +788,7 @@ def new_study(story: Story) -> None:
     story.act("ask", ask)
     story.act("adaptive", next(one for one in page.buttons if one.choice.source == "template:viscosity-jnd").click)
     languages = [f"Language {name}" for name in ("English", "Dutch", "German", "French", "Arabic")]
-    for at in ("Short name of the new study", *languages, "Standards", "Trials for each"):
+    for at in ("Short name of the new study", *languages, "Standards", "Trials per standard"):
         story.play("Tab")
         story.expect(at=at)
     story.act("title", questions.title.setFocus)
@@ -812,7 +813,7 @@ def new_study(story: Story) -> None:
         story.expect("Draft kept HH:MM", kept="not saved")
     story.act("copy", lambda: ask("kitchen"))
     story.play("Return")
-    story.expect(kept="not saved", at="Outline of the study")
+    story.expect(kept="not saved", at="Study outline")
     assert designer.value("blocks") == read_study(story.text.encode(), designer.file.parent).document["blocks"]
     story.play("ctrl+s")
     story.expect(kept="saved")

@@ -102,7 +102,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     assert "Saved elsewhere" in designer.file.read_text("utf-8")
     designer.saving.save()
     assert "Saved elsewhere" in designer.file.read_text("utf-8")
-    assert designer.place.banner.words.text().startswith("Another program changed this file")
+    assert designer.place.banner.words.text().startswith("Another program has changed this file")
     designer.saving.answer_banner("keep")
     designer.saving.save()
     assert "repetitions = 3" in designer.file.read_text("utf-8")
@@ -132,7 +132,7 @@ def test_changes_begin_with_the_last_session_where_no_participant_was_run(
     designer.editing.handle_request(SetValue(REPETITIONS, 3))
     designer.place.show_tab("changes")
     changes = designer.controller.changes
-    assert changes.version.itemText(0) == "The file, without the edits"
+    assert changes.version.itemText(0) == "The file without the edits"
     assert changes.chosen == protocol_hash(source)
 
 

@@ -53,7 +53,7 @@ def test_a_receipt_that_does_not_say_what_a_block_compares_differs_in_nothing():
             ['blocks.feel.order: "shuffled" before, "constrained" now', "blocks.feel.max_repeats: new, 1"],
         ),
         ([("[30, 0, 0]", "[31, 0, 0]")], ["tasks.reach.targets_mm.2.1: 30 before, 31 now"]),
-        ([("[30, 0, 0],", "[30, 0, 0], [0, 20, 0],")], ["tasks.reach.targets_mm: 2 entries before, 3 now"]),
+        ([("[30, 0, 0],", "[30, 0, 0], [0, 20, 0],")], ["tasks.reach.targets_mm: previously 2 entries, now 3"]),
         ([('"hello", "warm_up"', '"warm_up", "hello"')], [
             'sequence.1: "hello" before, "warm_up" now',
             'sequence.2: "warm_up" before, "hello" now',
@@ -77,7 +77,7 @@ def test_items_in_another_order_are_said_to_be_just_that():
     cold, after = cold.split("[pages.hello]", 1)
     parts = (before, cold, warm, f"\n[pages.hello]{after}")
     turned = "[[questionnaires.short.items]]\n".join(parts[:3]) + parts[3]
-    assert differences(SMALL, parse(turned.encode(), "small")) == ("questionnaires.short.items: in another order",)
+    assert differences(SMALL, parse(turned.encode(), "small")) == ("questionnaires.short.items: in a different order",)
 
 
 SECRET = SOUND.replace("1400", "1013.7").replace("is_thick", "spinach").replace("delay_ms = 120", "delay_ms = 137")
@@ -109,8 +109,8 @@ def test_conditions_of_an_opened_key_are_compared():
 
 def test_a_condition_more_is_told_by_its_code():
     more = edited(('["is_thin", "is_thick"]', '["is_thin", "is_thick", "on_time"]'))
-    assert differences(SMALL, more) == ("blocks.feel.codes: 2 entries before, 3 now", CONDITIONS_DIFFER)
-    assert differences(kept(SMALL), more) == ("blocks.feel.codes: 2 entries before, 3 now",)
+    assert differences(SMALL, more) == ("blocks.feel.codes: previously 2 entries, now 3", CONDITIONS_DIFFER)
+    assert differences(kept(SMALL), more) == ("blocks.feel.codes: previously 2 entries, now 3",)
 
 
 def test_keys_that_an_older_receipt_does_not_know_are_no_difference_while_unused():

@@ -38,7 +38,7 @@ def test_a_condition_shows_a_camera_or_footage(study: Path) -> None:
     assert {"view", "overlay", "footage_sha256"}.isdisjoint(thin.model_dump())
     words = describe(protocol)
     assert "video: camera" in words
-    assert "video: waves/sea.mp4, without ball and targets" in words
+    assert "video: waves/sea.mp4, without the ball and the targets" in words
 
 
 def test_the_studys_hash_covers_the_footage(study: Path) -> None:

@@ -76,7 +76,7 @@ def test_a_study_excludes_unsteady_drag_for_its_liquid_files(tmp_path: Path) -> 
 def test_an_inline_table_is_refused_and_nothing_is_written(scene: str, place: str, tmp_path: Path) -> None:
     other = written(tmp_path / "a.toml", LIQUID)
     file = written(tmp_path / "b.toml", scene + LIQUID)
-    with pytest.raises(ProtocolError, match=f"{place}: is an inline table, which cannot be upgraded"):
+    with pytest.raises(ProtocolError, match=f"{place}: is an inline table, which the program cannot upgrade"):
         upgrade(tmp_path)
     assert (other.read_text("utf-8"), file.read_text("utf-8")) == (LIQUID, scene + LIQUID)
     assert sorted(tmp_path.iterdir()) == [other, file]

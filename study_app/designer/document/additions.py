@@ -42,10 +42,10 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
     """
     key, named = distinguishing_key(node_at(study.document, path))
     if not key or kind not in named:
-        raise Refused(f"there is no kind {kind!r} here: {', '.join(map(str, named))}")
+        raise Refused(f"the kind {kind!r} does not exist here; known kinds: {', '.join(map(str, named))}")
     node = table_of((named[kind],), {})
     if node is None:
-        raise Refused(f"{kind} is not a kind of table")
+        raise Refused(f"{kind} is not a table kind")
     value = value_at(study.document, path)
     table = value if isinstance(value, Mapping) else {}
     edits: list[Edit] = [Unset((*path, name)) for name in table if name != key and name not in node["properties"]]
@@ -92,7 +92,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     """Return the edits that add a language: plain texts become tables, whose new texts are missing."""
     codes = languages_of(study.document)
     if code in codes:
-        raise Refused(f"the study is in {language_name(code)} already")
+        raise Refused(f"the study already includes {language_name(code)}")
     if code not in LANGUAGES:
         raise Refused(f'the program does not have texts in "{code}"; known languages: {", ".join(LANGUAGES)}')
     tables = (Set(path, {codes[0]: text}) for path, text in texts_of(study) if isinstance(text, str))
@@ -322,7 +322,7 @@ def edits_to_add(
     """
     row = row_at(study.document, section)
     if row is None or row.kind not in {"tables", "list"}:
-        raise Refused(f"nothing can be added to {label_of(section[-1])}")
+        raise Refused(f"{label_of(section[-1])} does not accept new elements")
     several = row.kind == "list"
     value: dict[str, Any] = {}
     path: Path
@@ -467,7 +467,7 @@ def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
     """Return the number of an element that a series varies."""
     number = next((row for row in number_rows(document, path) if row.path == field), None)
     if number is None:
-        raise Refused("choose a numeric value of this element")
+        raise Refused("choose one of this element's numeric values")
     return number
 
 
@@ -478,10 +478,10 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
         if why := violated_bound(document, row, value):
             raise Refused(f"{exact_text(value)} is not permitted: {row.label} is {why}")
         if value in known:
-            raise Refused(f"{exact_text(value)} is listed twice, or is the value of the original")
+            raise Refused(f"{exact_text(value)} is listed twice or equals the original's value")
         known.append(value)
     if not 0 < len(values) <= _MOST:
-        raise Refused(f"a series has 1 to {_MOST} copies")
+        raise Refused(f"a series must have 1 to {_MOST} copies")
 
 
 def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:

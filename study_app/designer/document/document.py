@@ -117,7 +117,7 @@ def check_free_name(name: str) -> Path:
     _check_name(name)
     file = workspace().protocols / f"{name}.toml"
     if file.exists():
-        raise _refusal(f"{file} is already there", name)
+        raise _refusal(f"{file} already exists", name)
     return file
 
 
@@ -133,12 +133,12 @@ def write_new(study: Study, name: str) -> Path:
 
 def _check_name(name: str) -> None:
     if not _NAME.fullmatch(name):
-        rule = f"write at most {MAX_SHORT_NAME} lowercase letters and digits, a letter first"
-        raise _refusal(f'"{name}" is not a short name: {rule}', name)
+        rule = f"use at most {MAX_SHORT_NAME} lowercase letters and digits, starting with a letter"
+        raise _refusal(f'"{name}" is not a valid short name: {rule}', name)
     if fault := file_name_fault(name):
         raise _refusal(f'"{name}" {fault}', name)
     if name in shipped():
-        raise _refusal(f'"{name}" is a study that ships with the program', name)
+        raise _refusal(f'"{name}" is the name of a study that ships with the program', name)
 
 
 def taken_names() -> set[str]:
@@ -291,7 +291,7 @@ class Document:
         content = _file_content(self.file)
         self.saved = read_study(content, self.file.parent).text
         self._rebase(content_hash(content))
-        self.edit("Take the file's content", text=self.saved)
+        self.edit("Use the file's content", text=self.saved)
         self._forget_draft()
 
     def keep_edits(self, now_s: float) -> None:
@@ -346,8 +346,8 @@ class Document:
         source = self.source()
         if others := self.standing(known).others:
             raise Refused(
-                f"version {self.version} was run by {counted(others, 'session')} with different content: save "
-                f"it as version {next_version(self.version)}"
+                f"version {self.version} has already been run with different content "
+                f"({counted(others, 'session')}): save the study as version {next_version(self.version)}"
             )
         self._write_named_files(source)
         keep_content(source)
@@ -363,7 +363,7 @@ class Document:
         for name, text in unbundle(source)[1].items():
             path = folder / name
             if path.exists() and _file_content(path) != text.encode():
-                raise Refused(f"{path} exists and contains another liquid: rename one of the two files")
+                raise Refused(f"{path} already exists and contains a different liquid: rename one of the two files")
             write_whole(path, text.encode())
         for name, digest in hashes_in(source).items():
             if (digest_here := file_hash(folder / name)) is None:
@@ -373,7 +373,9 @@ class Document:
                 except OSError as error:
                     raise cannot_write(folder / name, error) from error
             elif digest_here != digest:
-                raise Refused(f"{folder / name} exists and contains another video: rename one of the two files")
+                raise Refused(
+                    f"{folder / name} already exists and contains a different video: rename one of the two files"
+                )
         self.study = replace(self.study, folder=folder)
 
     def copy_as(self, name: str) -> Document:
@@ -450,9 +452,9 @@ def version_standing(hash_: str, base: str, version: str, known: Iterable[Run]) 
 def check_version(version: str, known: Iterable[Run]) -> None:
     """Reject a text that cannot be the version of a content that was not run."""
     if not _VERSION.fullmatch(version):
-        raise Refused(f'"{version}" cannot be a version: write letters, digits, dots, plus and minus, such as 1.2')
+        raise Refused(f'"{version}" is not a valid version: use letters, digits, dots, plus and minus signs, as in 1.2')
     if any(run.sessions and run.version == version for run in known):
-        raise Refused(f"version {version} was run with different content: choose another number")
+        raise Refused(f"version {version} has already been run with different content: choose a different number")
 
 
 def next_version(version: str) -> str:

@@ -118,8 +118,8 @@ def edits_to_rename(
     free = free_id(taken | (recorded - {own}), wanted)
     check_id(name, free)
     if name in taken:
-        where = "" if item is None else " by another item of this questionnaire"
-        raise Refused(f'the name "{name}" is taken{where}: "{free}" is free')
+        where = "" if item is None else " by another item in this questionnaire"
+        raise Refused(f'the name "{name}" is already used{where}; "{free}" is free')
     if item is None:
         return (Rename(thing, name, references_to(document, thing)),)
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
@@ -199,9 +199,9 @@ def check_id(name: str, free: str = "") -> None:
     """Reject an invalid id and propose a valid one."""
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
-        rule = f"at most {MAX_ID} lowercase letters, digits and underscores, a letter first"
+        rule = f"at most {MAX_ID} lowercase letters, digits and underscores, starting with a letter"
         proposed = f'; "{free}" is free' if free else ""
-        raise Refused(f'"{name}" is not a valid ID: write {rule}{proposed}')
+        raise Refused(f'"{name}" is not a valid ID: use {rule}{proposed}')
 
 
 def _is_within(path: Path, outer: Path) -> bool:
@@ -435,7 +435,7 @@ _LABELS: Final = {
     "block_order": "Order of blocks",
     "break_every": "Trials between breaks",
     "catch": "Catch trials",
-    "code_prefix": "Letter of blind codes",
+    "code_prefix": "Letter for blind codes",
     "contrasts": "Hypotheses",
     "count": "Number of targets",
     "damping_nspm": "Viscosity (damping)",
@@ -455,14 +455,14 @@ _LABELS: Final = {
     "intro": "Introduction",
     "latin": "Latin square",
     "lead_s": "Lead-in",
-    "level_error_ms": "Level error of delays",
+    "level_error_ms": "Level error for delays",
     "log": "Logarithmic",
     "looks": "Interim analyses",
     "max_repeats": "Maximum repeats in a row",
     "max_s": "Maximum duration",
     "min_distance": "Minimum distance between repeats",
     "min_s": "Minimum duration",
-    "missed": "If not reached",
+    "missed": "If not met",
     "missing_percent": "Missing trials",
     "most_s": "Maximum duration",
     "names": "Recognition questions",
@@ -474,10 +474,10 @@ _LABELS: Final = {
     "participants": "Participants planned",
     "primary": "Primary questions",
     "pse": "PSE",
-    "replicates": "Equal conditions as one",
+    "replicates": "Pool equal conditions",
     "rising": "Increasing with delay",
     "sequence": "Session order",
-    "setting_label": "Neutral name of trials",
+    "setting_label": "Neutral trial name",
     "short": "Short label",
     "show_if": "Display condition",
     "single": "Single-blind",
@@ -492,7 +492,7 @@ _LABELS: Final = {
     "whole": "Whole numbers only",
     "williams": "Williams design",
     "withheld_percent": "Force held back",
-    "wrong_most": "Maximum wrong catch trials",
+    "wrong_most": "Maximum incorrect catch trials",
 }
 """Labels of keys and values whose names are unclear, without their unit; sources in `docs/glossary.md`."""
 
@@ -739,7 +739,7 @@ def initial_value(document: Mapping[str, Any], path: Path) -> Any:
     """Return a valid value for a key that is missing in the study."""
     row = row_at(document, path)
     if row is None or row.kind == "unknown":
-        raise Refused(f"{label_of(path[-1])} is not a key of this table")
+        raise Refused(f"{label_of(path[-1])} is not a key in this table")
     if row.default not in (None, [], {}):
         return row.default
     nodes = node_at(document, path)

@@ -160,7 +160,7 @@ class AddEntry(Request):
         value = self.value
         if value is None:
             if row is None:
-                raise Refused("nothing can be added here")
+                raise Refused("this place does not accept new elements")
             if row.kind == "list":
                 return Step(f"Add {element_noun(self.path[-1])}", edits_to_add(at.study, self.path)[0])
             first = initial_value({}, self.path) if not entries else entries[-1]
@@ -194,7 +194,7 @@ class SwitchKey(Request):
         value = _first_value(at.study.with_edits(*gone)[0], place)
         if value in ("", []):
             raise Refused(f"{label_of(self.to)} needs an element that does not exist yet: add it first")
-        return Step(f"Give {label_of(self.to)}", (*gone, Set(place, value)))
+        return Step(f"Specify {label_of(self.to)}", (*gone, Set(place, value)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -279,12 +279,15 @@ class AddLiquid(Request):
     def help(self, study: Study) -> str:
         """Return where the liquid comes from, and whether the scale of the scene changes or its forces differ."""
         theirs, own = self._scales(study)
-        origin = f"As in the shipped study {self.source}, with all its numbers"
+        origin = f"Copied from the shipped study {self.source}, with all its values"
         if theirs == own:
             return origin
         if value_at(study.document, _SCALE) is None:
-            return f"{origin}. The scale of the scene becomes {theirs:g}, as there, for all liquids."
-        return f"{origin}. Its forces differ: there the scale of the scene is {theirs:g}, here {own:g}."
+            return f"{origin}. The scene's scale becomes {theirs:g} for all liquids, as in that study."
+        return (
+            f"{origin}. Its forces differ, because the scene's scale is {theirs:g} in that study and {own:g} in "
+            "this one."
+        )
 
     def _scales(self, study: Study) -> tuple[float, float]:
         """Return the scale of the scene in the shipped study and in this one."""
@@ -544,7 +547,7 @@ def index_of(path: Path) -> int:
     """Return the index of an entry of a list."""
     last = path[-1]
     if not isinstance(last, int):
-        raise Refused(f"{label_of(last)} is not an entry of a list")
+        raise Refused(f"{label_of(last)} is not an entry in a list")
     return last
 
 

@@ -240,7 +240,7 @@ _LINE_REST: Final = re.compile(r"[ \t]*(\r?\n)")
 def _array_and_index(path: Path) -> tuple[Path, int]:
     index = path[-1]
     if not isinstance(index, int):
-        raise Refused("an entry of an array is identified by its number")
+        raise Refused("entries of an array are identified by number")
     return path[:-1], index
 
 
@@ -304,7 +304,7 @@ def _append_lines(spans: Spans, edit: Editor, last: Slot, body: str, tail: str =
 def _insert_table(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     array, index = _array_and_index(path)
     if not isinstance(value, Mapping):
-        raise Refused("an entry of an array of tables must be a table")
+        raise Refused("each entry in an array of tables must be a table")
     body = table_text(path, value, spans.newline, entry=True)
     if following := spans.pieces((*array, index)):
         edit.insert(following[0].start, body + spans.newline)
@@ -483,7 +483,7 @@ def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
     if not is_same_value(edited, meant) and not is_same_value(
         _pruned(copy.deepcopy(edited), edit.path), _pruned(meant, edit.path)
     ):
-        raise WriterError(f"{edit} produced a document other than the intended one")
+        raise WriterError(f"{edit} did not produce the intended document")
     return text, tuple(steps)
 
 
@@ -520,7 +520,7 @@ def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
         _duplicate(node, last, value, edit.name)
     elif isinstance(edit, Move):
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= edit.to < len(node):
-            raise Refused(f"{_path_text(edit.path)} cannot move to place {edit.to + 1}")
+            raise Refused(f"{_path_text(edit.path)} cannot be moved to position {edit.to + 1}")
         node.insert(edit.to, node.pop(last))
     else:
         _rename(meant, node, edit)
@@ -567,7 +567,7 @@ def _rename(document: Document, node: Any, edit: Rename) -> None:
 
 def _check_free(node: Mapping[str, Any], name: str) -> None:
     if name in node:
-        raise Refused(f'the name "{name}" is taken: choose another one')
+        raise Refused(f'the name "{name}" is already taken: choose a different one')
 
 
 def _check_value(value: Any) -> None:
@@ -579,7 +579,7 @@ def _check_value(value: Any) -> None:
         for part in value:
             _check_value(part)
     elif value is None:
-        raise Refused("a value cannot be empty: remove the key")
+        raise Refused("a value cannot be empty: remove its key instead")
     elif isinstance(value, str):
         check_encodable(value)
 
@@ -592,7 +592,7 @@ def check_encodable(text: str) -> None:
 
 def _value_at(node: Any, step: str | int) -> Any:
     if not _has_step(node, step):
-        raise Refused(f"there is no {step + 1 if isinstance(step, int) else step} in the study anymore")
+        raise Refused(f"the study no longer contains {f'entry {step + 1}' if isinstance(step, int) else step}")
     return node[step]
 
 

@@ -148,7 +148,7 @@ class _AxisView(Extra, Themed, QWidget):
         super().__init__()
         self.axis: _LevelAxis | None = None
         self.setFixedHeight(HEIGHT)
-        self.setAccessibleName("Axis of the levels")
+        self.setAccessibleName("Level axis")
 
     def show_facts(self, facts: Any) -> None:
         self.axis = facts
@@ -251,7 +251,7 @@ class _TrialStrip:
     @property
     def sentence(self) -> str:
         listed = ", ".join(f"{phase.name} {phase.duration}" for phase in self.phases)
-        return f"One trial of {self.duration}: {listed}."
+        return f"One trial takes {self.duration}: {listed}."
 
     @property
     def duration(self) -> str:

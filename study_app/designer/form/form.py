@@ -52,7 +52,7 @@ _ENTRIES: Final = "In this order"
 _DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
 KINDS: Final[Mapping[Path, str]] = {SEQUENCE: "Pages, blocks and questionnaires"}
-_UNREADABLE: Final = "Correct the text in the tab File"
+_UNREADABLE: Final = "Correct the text in the File tab"
 _WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 """Sections whose elements the lab opens."""
 
@@ -101,7 +101,7 @@ def form_of(study: Study, path: Path) -> Form:
         path=path,
         title=title,
         icon=icon_of(path, document),
-        kind=kind_of(path) or KINDS.get(path, "Section of the file"),
+        kind=kind_of(path) or KINDS.get(path, "File section"),
         id=None if name is None else str(name),
         sections=sections,
         faults=own,
@@ -138,14 +138,16 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
         if isinstance(block, Mapping) and "design" not in block and (other := block.get("questionnaire")) != path[1]:
             instead = "" if other is None else f", instead of {title_of(document, (path[0], str(other)))}"
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
-            yield f"After each trial of {title}\twith questions about that trial{instead}", asked
+            yield f"After each trial of {title}\twith questions about this trial{instead}", asked
     ends = {
         name: _places_after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)
     }
     for name, after in ends.items():
         yield from as_step(f"After {title_of(document, ('blocks', name))}\tonce, about the block", after)
     if len(ends) > 1:
-        yield from as_step(f"After each block\t{len(ends)} times, compared", _places_after(place for place, _ in main))
+        yield from as_step(
+            f"After each block\t{len(ends)} times, for comparison", _places_after(place for place, _ in main)
+        )
     lasts = {
         place[:-1]: place if step in names(document, "pages") else _places_after([place])[0] for place, step in steps
     }
@@ -268,7 +270,7 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
         counts, copied = texts_by_language(study), copied_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
             (present, wanted), alike = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
-            note = f"{present - alike} of {wanted} texts" + (f", {alike} to translate" if alike else "")
+            note = f"{present - alike} of {wanted} texts" + (f", {alike} still to translate" if alike else "")
             yield Entry((*row.path, at), language_name(str(code)), note, wanted - present)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))

@@ -37,7 +37,7 @@ from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import typed_numbers
 from study_app.protocol.source.document import Path
 
-_CAPTION: Final = f"force at {HAND_MPS:g} m/s of the hand"
+_CAPTION: Final = f"force at a hand speed of {HAND_MPS:g} m/s"
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ class EntryList(Field):
             self.list.keys |= {"Alt+Up": lambda: self.move_entry(self.chosen, self.chosen - 1),
                                "Alt+Down": lambda: self.move_entry(self.chosen, self.chosen + 2),
                                "Del": lambda: self.remove_entry(self.chosen), "Ctrl+D": self._duplicate}  # fmt: skip
-            self.list.setAccessibleDescription("Alt+Up and Alt+Down move entries, Delete removes them")
+            self.list.setAccessibleDescription("Alt+Up and Alt+Down move an entry, and Delete removes it")
         else:
             self.list.itemClicked.connect(lambda item: self.open_entry(self.list.row(item)))
         self.box.addWidget(self.list)
@@ -337,7 +337,7 @@ class _ConditionsField(EntriesField):
         for part in (note, force):
             part.setAlignment(RIGHT)
             shown.line.addWidget(part)
-        name, select = f"Open the liquid of {self.row.entries[at].title}", Do("select", (line.liquid,))
+        name, select = f"Open the liquid used in {self.row.entries[at].title}", Do("select", (line.liquid,))
         shown.add_button("drop", name, partial(self.asked.emit, select)).setEnabled(bool(line.liquid))
 
 
@@ -413,7 +413,9 @@ class LanguageListField(EntryList):
             description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
             shown = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.faults and at:
-                made = self.copies[code] = add_button(f"Copy {first} where {entry.title} is missing", f"Copy {first}")
+                made = self.copies[code] = add_button(
+                    f"Copy the {first} text where {entry.title} is missing", f"Copy {first}"
+                )
                 made.clicked.connect(partial(self.asked.emit, ChangeLanguage("copy", code)))
                 shown.line.addWidget(made)
             if len(codes) > 1:

@@ -64,18 +64,18 @@ def _order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
         return None
     order, codes = row.default if row.value is None else row.value, len(conditions)
     if order == "fixed":
-        return ("neutral", "ring", "same for all"), "Effects of condition and position cannot be separated."
+        return ("neutral", "ring", "same for everyone"), "The effects of condition and position cannot be separated."
     if not isinstance(order, str) or order not in _SQUARES:
-        drawn = "Drawn again in every session, so positions are balanced only on average."
+        drawn = "The order is drawn anew in every session, so positions are balanced only on average."
         return ("neutral", "ring", "balanced on average"), drawn
     square, repetitions = _SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)
     numbers = ", ".join(str(rows * number) for number in range(1, _ROUNDS + 1))
     carries = square == "williams" and isinstance(repetitions, int) and has_even_borders(codes, max(1, repetitions))
-    at = f"at every multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
+    at = f"for every multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
     if carries or codes == 2:
-        return ("ok", "check", f"balanced at {numbers} …"), f"Positions and carry-over are balanced {at}"
-    return ("warn", "warning", f"in part at {numbers} …"), f"Only positions are balanced, {at}"
+        return ("ok", "check", f"balanced for {numbers} …"), f"Positions and carry-over are balanced {at}"
+    return ("warn", "warning", f"partly for {numbers} …"), f"Only positions are balanced {at}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +108,7 @@ class QuestionRow(Themed, QWidget):
     def __init__(self, line: QuestionLine) -> None:
         super().__init__()
         self.line = line
-        title = next((text for text in line.texts if text), "without a text")
+        title = next((text for text in line.texts if text), "no text yet")
         self.setAccessibleName(f"Question {line.number}, {line.kind}: {title}")
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setMinimumHeight(38)
@@ -375,7 +375,7 @@ _RELATIONS: Final = (
 )  # fmt: skip
 BOUND, RATIO = 0.5, 1.25
 _NOTHING_TO_COMPARE: Final = (
-    "A hypothesis compares two main blocks, two conditions of a block, or two groups: add a second one."
+    "A hypothesis compares two main blocks, two conditions of a block, or two groups. Add a second one first."
 )
 
 

@@ -43,7 +43,7 @@ _MOST_CODES: Final = 8
 """Of more codes only how even they are is said."""
 _MOST_ROWS: Final = 6
 """Positions that are shown of a long block."""
-_NO_FORCES: Final = "Unknown until you correct the problems of device and scene."
+_NO_FORCES: Final = "Unknown until you correct the problems in the device and scene settings."
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,12 +140,12 @@ def _text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
     languages = " and ".join(language_name(code) for code in codes) if len(codes) < 3 else f"{len(codes)} languages"
     verdicts: list[Verdict] = [("bad", "warning", f"Missing texts: {missing}")]
     if not missing:
-        verdicts = [("ok", "check", f"Every text in {languages}")]
+        verdicts = [("ok", "check", f"Every text is available in {languages}")]
     if copied := ", ".join(f"{count} in {language_name(code)}" for code, count in copied_texts(study).items()):
         verdicts = [*(verdicts if missing else ()), ("neutral", "info", f"Texts to translate: {copied}")]
     if (protocol := valid_part(study).protocol) is not None:
         revealed = revealing_texts(study, protocol)
-        named = f"{revealed[0].element}: “{revealed[0].word}” reveals a condition" if revealed else ""
+        named = f"in {revealed[0].element}, “{revealed[0].word}” reveals a condition" if revealed else ""
         more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
         verdicts.append(
             ("warn", "warning", named + more) if revealed else ("ok", "check", "The texts do not reveal a condition")
@@ -165,22 +165,25 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
         verdict: Verdict = ("ok", "check", "balanced")
         if rows is not None:
             rounds = counted(participants // rows, "round")
-            verdict = ("ok", "check", f"balanced: {participants} participants are {rounds} of {rows}")
+            verdict = ("ok", "check", f"balanced: {participants} participants complete {rounds} of {rows}")
     elif rows is not None and participants % rows:
         last = participants - participants % rows
         even = f"{last} or {last + rows}" if last else f"{rows}"
         verdict = ("warn", "warning", f"balanced with {even} participants, for a {_SQUARE_NAMES[order]}")
     elif rows is not None:
-        verdict = ("warn", "warning", "positions balanced, carry-over not")
+        verdict = ("warn", "warning", "positions are balanced, but carry-over is not")
     elif order == "fixed":
-        verdict = ("warn", "warning", "all participants have the same order, which reveals the codes")
+        verdict = ("warn", "warning", "the order is the same for all participants, which reveals the codes")
     else:
-        verdict = ("neutral", "info", "balanced only on average: drawn for each session")
+        verdict = ("neutral", "info", "balanced only on average, because the order is drawn for each session")
     aside = f"{_title(study, block.id)}, {participants} {'participants' if planned is None else 'planned'}"
     if len(evenness.codes) > _MOST_CODES:
         cells = [count for line in evenness.positions for count in line]
         after = evenness.after_another
-        summary = f"positions {min(cells)} to {max(cells)} times, carry-over {min(after)} to {max(after)} times"
+        summary = (
+            f"each code is in each position {min(cells)} to {max(cells)} times and follows each other code "
+            f"{min(after)} to {max(after)} times"
+        )
         return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {summary}"),))]
     shown, codes = evenness.positions[:_MOST_ROWS], evenness.codes
     places = tuple(str(number + 1) for number in range(len(shown)))
@@ -199,7 +202,7 @@ def _force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[
     """Return the force of some liquids against a hand at 0.1 m/s."""
     if not valid_part(study).forces:
         unknown = tuple(Line(_title(study, name, "liquids"), UNKNOWN, 0.0) for name in names)
-        return _lines_card("Force of each liquid", "", unknown, (("neutral", "minus", _NO_FORCES),))
+        return _lines_card("Force for each liquid", "", unknown, (("neutral", "minus", _NO_FORCES),))
     limit_n = protocol.device.force_limit_n
     lines = []
     for name in names:
@@ -217,8 +220,10 @@ def _force_card(study: Study, facts: Facts, protocol: Protocol, names: Sequence[
     ]
     sentences: tuple[Verdict, ...] = tuple(("warn", "warning", f"{capitalised(warning)}.") for warning in alike)
     if not sentences and len(names) > 1:
-        sentences = (("ok", "check", "All pairs are distinguishable"),)
-    return _lines_card("Force of each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences)
+        sentences = (("ok", "check", "All pairs of liquids are distinguishable"),)
+    return _lines_card(
+        "Force for each liquid", f"0.1 m/s, {LIMIT_NAMES['norm']} {limit_n:g} N", tuple(lines), sentences
+    )
 
 
 def _title(study: Study, name: str, section: str = "") -> str:

@@ -87,7 +87,7 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
 
     def check(_words: str = "") -> None:
         if stop():
-            raise Stopped("the study was edited")
+            raise Stopped("the study has been edited")
 
     check()
     protocol, simulated = order.protocol, Simulated(waiting=WAITING)

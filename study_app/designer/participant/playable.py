@@ -351,11 +351,13 @@ class Feeling(QObject):
         protocol, problems = study.protocol or valid_part(study).protocol, study.problems
         named = protocol is not None and str(path[1]) in getattr(protocol, str(path[0]))
         if protocol is None or not named:
-            self.place.message.emit("It cannot be opened in the lab yet", f"Correct this first: {problems[0]}.")
+            self.place.message.emit(
+                "The element cannot be opened in the lab yet", f"Correct this problem first: {problems[0]}."
+            )
             return
         names = _liquids(protocol, path)
         if not names:
-            self.place.message.emit("It cannot be opened in the lab", "It does not contain a liquid.")
+            self.place.message.emit("The element cannot be opened in the lab", "It does not contain a liquid.")
             return
         titled = [
             (title_of(study.document, ("liquids", name)), protocol.scene_of(name)) for name in (names[0], names[-1])
@@ -369,20 +371,22 @@ class Feeling(QObject):
         """Set the liquid of a side to the values of a setting, as one step."""
         opened, before = self.editing.opened, self._sides.get(side)
         if opened is None or before is None or opened.file != self._file:
-            self.place.message.emit("It was not put back", "Another study is open in the designer now.")
+            self.place.message.emit("The liquid was not put back", "A different study is now open in the designer.")
             return
         if opened.read_only:
-            self.place.message.emit("It was not put back", opened.read_only)
+            self.place.message.emit("The liquid was not put back", opened.read_only)
             return
         path: Path = ("liquids", before.id)
         document = opened.study.document
         if value_at(document, path) is None:
-            self.place.message.emit("It was not put back", f"The study no longer contains the liquid {before.id}.")
+            self.place.message.emit(
+                "The liquid was not put back", f"The study no longer contains the liquid {before.id}."
+            )
             return
         title = title_of(document, path)
         if liquid_file_name(value_at(document, path)) is not None:
             sentence = f"{title} is in a separate liquid file. Save it there as a preset."
-            self.place.message.emit("It was not put back", sentence)
+            self.place.message.emit("The liquid was not put back", sentence)
             return
         after = setting.scene.liquids[0]
         edits = tuple(_liquid_edits(document, path, _liquid_values(before), _liquid_values(after)))
@@ -390,7 +394,7 @@ class Feeling(QObject):
             if edits:
                 self.editing.make_step(f"Put {title} back from the lab", *edits, select=path)
         except Refused as refusal:
-            self.place.message.emit("It was not put back", f"{refusal}.")
+            self.place.message.emit("The liquid was not put back", f"{refusal}.")
             return
         self._sides[side] = after.model_copy(update={"id": before.id})
         self.editing.select(path)
@@ -399,7 +403,7 @@ class Feeling(QObject):
         if shared:
             names = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
             self.place.message.emit(
-                f"{title} was put back", f"These settings apply to all liquids of the study: {names}."
+                f"{title} was put back", f"These settings apply to all liquids in the study: {names}."
             )
 
 

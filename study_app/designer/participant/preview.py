@@ -112,7 +112,7 @@ class _LivePage(Coloured, QGraphicsView):
         self.setFrameShape(QFrame.Shape.NoFrame)
         self.setRenderHints(QPainter.RenderHint.SmoothPixmapTransform | QPainter.RenderHint.TextAntialiasing)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setAccessibleDescription(f"{_LEAVES}; Tab after the last control does the same.")
+        self.setAccessibleDescription(f"{_LEAVES}, as does Tab after the last control.")
         self.setMinimumHeight(120)
         self.setTransformationAnchor(QGraphicsView.ViewportAnchor.NoAnchor)
         self.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
@@ -379,7 +379,7 @@ class ParticipantPreview(Card):
         self.setFocusProxy(self.page)
         self.note = label("", "small", "warn", wraps=True)
         self.note.hide()
-        self.languages = Segments("Language of the page")
+        self.languages = Segments("Page language")
         self.screens = make_dense(Choice(), "Screen")
         self.screens.setSizeAdjustPolicy(Choice.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.screens.setMinimumContentsLength(9)
@@ -391,8 +391,8 @@ class ParticipantPreview(Card):
             button.setAutoRepeat(True)
         self.step = label("", "label", wraps=True)
         self.step.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.moments = Segments("Page of the trial")
-        self.zoom = Segments("Size of the page")
+        self.moments = Segments("Trial page")
+        self.zoom = Segments("Page size")
         self.zoom.show_values(((True, "Fit"), (False, "100 %")), chosen=True)
         parts = (self.before, (self.step, 1), self.after, self.moments, self.zoom)
         self._row, self._second = hbox(*parts, spacing=8), hbox(STRETCH)
@@ -593,7 +593,7 @@ class ParticipantPreview(Card):
             faults = study.faults if study.is_toml else ()
             hiding = next((fault for fault in faults if fault.kind != "no text"), None)  # a missing text hides no page
             found = study.problems[:1] if hiding is None else (hiding.located(places_of(study.text)),)
-            problem = next(map(str, found), "there is no step")
+            problem = next(map(str, found), "the session does not have any steps")
             self.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
             return
         shown, index = place.shown, place.index
@@ -646,17 +646,19 @@ class ParticipantPreview(Card):
         faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
         count = len(study.problems) - len(study.faults) + len(faults)
         if not count:
-            return "This page does not occur in any session." if step.session == STANDALONE else ""
-        values = "only valid parts" if self._valid is None else "the last valid values"
+            return "This page is not part of any session." if step.session == STANDALONE else ""
+        values = "only the valid parts" if self._valid is None else "the last valid values"
         own = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
         if own is None:
-            return f"{counted(count, 'problem')} elsewhere: {values} are shown."
-        shown = f"{values} are"
+            return (
+                f"There {'is' if count == 1 else 'are'} {counted(count, 'problem')} elsewhere, so {values} are shown."
+            )
+        shown = f"{values} are shown"
         if own.kind == "alike":
-            shown = "the text as written is"
+            shown = "the text is shown as written"
         elif own.missing_language or own.kind == "one language":
-            shown = "the text of another language is"
-        return f"{title_of(study.document, self._selected)} has a problem ({own.message}): {shown} shown."
+            shown = "the text in another language is shown"
+        return f"{title_of(study.document, self._selected)} has a problem ({own.message}), so {shown}."
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:
         """Move the ball to the start of its path if the tank has changed."""

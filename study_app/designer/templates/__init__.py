@@ -6,17 +6,17 @@ from typing import Final
 FOLDER: Final = Path(__file__).parent
 
 QUESTIONS: Final[dict[str, tuple[tuple[str, tuple[str, ...]], ...]]] = {
-    "compare-liquids": (("Each liquid comes", ("blocks", "liquids", "repetitions")),),
+    "compare-liquids": (("Repetitions", ("blocks", "liquids", "repetitions")),),
     "viscosity-jnd": (
         ("Standards", ("stimuli", "damping", "standards")),
-        ("Trials for each", ("methods", "adaptive", "trials")),
+        ("Trials per standard", ("methods", "adaptive", "trials")),
     ),
     "delay-detection": (
-        ("Delays from, to", ("stimuli", "delay", "levels")),
+        ("Delays (from, to)", ("stimuli", "delay", "levels")),
         ("Trials", ("methods", "adaptive", "trials")),
     ),
     "two-liquids-abx": (("Trials", ("blocks", "liquids", "repetitions")),),
-    "rate-realism": (("Each liquid comes", ("blocks", "liquids", "repetitions")),),
+    "rate-realism": (("Repetitions", ("blocks", "liquids", "repetitions")),),
 }
 """What a template asks beyond title, name and languages: words, and the key that holds the answer."""
 

@@ -136,8 +136,12 @@ def _check_targets(parts: Draft) -> Iterator[Fault]:
     half = tuple(size / 2 for size in parts.device.workspace_mm)
     for name, task in parts.tasks.items():
         if isinstance(task, Follow) and task.amplitude_mm + task.radius_mm > half[0]:
-            message = f"{task.amplitude_mm:g} mm with radius {task.radius_mm:g} mm leaves the tank"
-            yield Fault(("tasks", name, "amplitude_mm"), message, f"device.workspace_mm reaches to {half[0]:g} mm")
+            message = f"with {task.amplitude_mm:g} mm and a radius of {task.radius_mm:g} mm, the target leaves the tank"
+            yield Fault(
+                ("tasks", name, "amplitude_mm"),
+                message,
+                f"device.workspace_mm extends to {half[0]:g} mm on either side",
+            )
         if not isinstance(task, Reach):
             continue
         for index, target in enumerate(task.targets_mm):
@@ -147,8 +151,9 @@ def _check_targets(parts: Draft) -> Iterator[Fault]:
                     most = math.floor(room - task.radius_mm)
                     yield Fault(
                         path,
-                        f"{'xyz'[axis]} = {place:g} mm with radius {task.radius_mm:g} mm leaves the tank",
-                        f"device.workspace_mm reaches to {room:g} mm on either side",
+                        f"at {'xyz'[axis]} = {place:g} mm, a target with a radius of {task.radius_mm:g} mm extends "
+                        "beyond the tank",
+                        f"device.workspace_mm extends to {room:g} mm on either side",
                         use=((*path, axis), int(math.copysign(most, place))) if most >= 0 else None,
                     )
 
@@ -161,10 +166,10 @@ def _check_liquids(parts: Draft) -> Iterator[Fault]:
             [liquid for liquid in condition.liquid_ids if liquid in parts.liquids],
         )
         if parts.scene is not None and len({parts.liquids[liquid].body_in(parts.scene) for liquid in known}) > 1:
-            message = "its liquids have different balls, but one ball moves through all of them"
+            message = "its liquids have different balls, but the same ball moves through all of them"
             yield Fault(place, message, "use the same ball for all of them")
         if len(condition.liquids) > MAX_LIQUIDS:
-            yield Fault(place, f"has {len(condition.liquids)} liquids", f"at most {MAX_LIQUIDS}")
+            yield Fault(place, f"has {len(condition.liquids)} liquids", f"specify at most {MAX_LIQUIDS}")
         for liquid in known:
             if parts.device is None or parts.scene is None:
                 continue
@@ -186,8 +191,8 @@ def _check_forces(parts: Draft) -> Iterator[Fault]:
                 yield Fault(
                     ("blocks", name, "conditions", index),
                     f'"{condition}" exerts {exerted_n:.2g} N in the fastest stroke of task "{block.task}" '
-                    f"({stroke.speed_mps:.2g} m/s), less than {LEAST_N:g} N: participants cannot perceive it",
-                    "select effects such as drag, or raise density, scale or the ball's diameter",
+                    f"({stroke.speed_mps:.2g} m/s), which is less than {LEAST_N:g} N: participants cannot perceive it",
+                    "select effects such as drag, or increase the density, the scale or the ball's diameter",
                 )
 
 
@@ -197,7 +202,9 @@ def _check_liquids_differ(parts: Draft) -> Iterator[Fault]:
     for name, liquid in parts.liquids.items():
         if (earlier := first.setdefault(repr(felt_numbers(liquid)), name)) != name:
             yield Fault(
-                ("liquids", name), f'has the same values as "{earlier}"', ("change it, or list that condition twice")
+                ("liquids", name),
+                f'has the same values as "{earlier}"',
+                ("change it, or list that liquid's condition twice"),
             )
 
 
@@ -240,7 +247,9 @@ def _check_comparisons(parts: Draft) -> Iterator[Fault]:
         if len(varied) > 1:
             differ = " and in ".join(quantity.removesuffix("s") for quantity in varied)
             message = f"its conditions differ in {differ}, whose effects the analysis cannot tell apart"
-            yield Fault(("blocks", name, "conditions"), message, "vary only one of them, or use a block for each")
+            yield Fault(
+                ("blocks", name, "conditions"), message, "vary only one of them, or use a separate block for each"
+            )
         elif block.compares is not None and varied not in ([], [block.compares]):
             message = f'is "{block.compares}", but its conditions differ in {compared(presented)}'
             yield Fault(("blocks", name, "compares"), message, "correct it, or omit it")
@@ -251,8 +260,8 @@ def _check_blocks(parts: Draft) -> Iterator[Fault]:
     owners: dict[str, str] = {}
     for name, block in parts.blocks.items():
         if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
-            message = f'block "{owners[block.code_prefix]}" has the prefix "{block.code_prefix}" too'
-            yield Fault(("blocks", name, "code_prefix"), message, "choose another letter")
+            message = f'block "{owners[block.code_prefix]}" already has the prefix "{block.code_prefix}"'
+            yield Fault(("blocks", name, "code_prefix"), message, "choose a different letter")
         page = parts.pages.get(block.break_page or "")
         if page is not None and page.kind != "break":
             message = f'page "{block.break_page}" is of kind "{page.kind}"'
@@ -267,7 +276,7 @@ def _check_parts(parts: Draft) -> Iterator[Fault]:
     if not (parts.whole and parts.blocks):
         return
     if all(block.phase != "main" for block in parts.blocks.values()):
-        yield Fault(("blocks",), "there is no main block", 'one needs phase = "main"')
+        yield Fault(("blocks",), "there is no main block", 'at least one block needs phase = "main"')
     latest = 0
     for name in dict.fromkeys(() if parts.sessions_differ else parts.sequence):
         part = parts.blocks[name].part if name in parts.blocks else None
@@ -275,7 +284,7 @@ def _check_parts(parts: Draft) -> Iterator[Fault]:
             continue
         if part not in {latest, latest + 1}:
             expected, path = f"{latest} or {latest + 1}" if latest else "1", ("blocks", name, "part")
-            message = f"is {part}, but must be {expected} at its position in sequence"
+            message = f"is {part}, but at this position in the sequence it must be {expected}"
             yield Fault(path, message, use=(path, latest or 1), kind="part")
         latest = max(latest, part)
 

@@ -95,7 +95,7 @@ def _unknown_name(path: Path, name: Any, kind: str, known: Collection[str]) -> I
 def _repeated_names(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
     for at, (path, name) in enumerate(listed):
         if name in [earlier for _, earlier in listed[:at]]:
-            yield Fault(path, f'"{name}" is listed twice', "remove one", kind="surplus")
+            yield Fault(path, f'"{name}" is listed twice', "remove one of them", kind="surplus")
 
 
 def check_references(document: Document) -> Iterator[Fault]:
@@ -112,12 +112,12 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     Blocks and forms occur once in a sequence. `check_groups` checks that no block is omitted in a study with groups.
     """
     pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
-    apart = "rename one of them: sequence cannot tell them apart"
+    apart = "rename one of them, because sequence cannot tell them apart"
     for name in pages:
         if name in blocks:
-            yield Fault(("blocks", name), "a page also has this name", apart)
+            yield Fault(("blocks", name), "a page has the same name", apart)
     if not document.keys() & {"sequence", "sequences", "groups"}:
-        hint = "list the pages and blocks of a session in their order"
+        hint = "list the pages and blocks of a session in order"
         yield Fault(("sequence",), "is missing", hint, kind="missing")
     breaks = [page for _, page in entries(document, "blocks.*.break_page")]
     used: set[str] = set()
@@ -128,10 +128,10 @@ def check_sequences(document: Document) -> Iterator[Fault]:
             path = (*place, index)
             yield from _unknown_name(path, name, "page or block", {*pages, *blocks, *forms})
             if name in blocks and name in seen:
-                yield Fault(path, f'block "{name}" occurs twice', "set repetitions in the block instead")
+                yield Fault(path, f'block "{name}" occurs twice', "use repetitions in the block instead")
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
-                yield Fault(("questionnaires", name), f"a {other} has this name too", apart)
+                yield Fault(("questionnaires", name), f"a {other} has the same name", apart)
             elif name in forms and name in since:
                 yield Fault(path, f'form "{name}" occurs twice after the same block', "put a block between them")
             seen.add(str(name))
@@ -160,9 +160,9 @@ def check_items(document: Document) -> Iterator[Fault]:
             continue
         text = value_at(document, (*path[:-1], "text"))
         if (path[1], name) in seen:
-            yield Fault(path, f'a second item "{name}" in this questionnaire', "every item needs its own ID")
+            yield Fault(path, f'this questionnaire already has an item "{name}"', "every item needs its own ID")
         elif statements.setdefault(name, text) != text:
-            yield Fault(path, f'item "{name}" has a different text in another questionnaire', "use another ID")
+            yield Fault(path, f'item "{name}" has a different text in another questionnaire', "use a different ID")
         seen.add((path[1], name))
 
 
@@ -189,8 +189,8 @@ def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str) -> Iterato
         texts = entry if isinstance(entry, Mapping) else {"": entry}
         read = {(language, visible_text(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
-            hint = "participants could not distinguish them: change one"
-            yield Fault(path, f"reads as an earlier {kind} does", hint, kind="alike")
+            hint = "participants could not tell them apart: change one"
+            yield Fault(path, f"reads the same as an earlier {kind}", hint, kind="alike")
         seen |= read
 
 
@@ -210,7 +210,7 @@ def check_languages(document: Document) -> Iterator[Fault]:
     for path, name in written:
         if name not in LANGUAGES or name in REFUSED:
             known = REFUSED.get(
-                name, f"known: {', '.join(LANGUAGES)}; liquid-study language {name} begins a file for it"
+                name, f"known: {', '.join(LANGUAGES)}; liquid-study language {name} creates a file for a new one"
             )
             yield Fault(path, f'the program does not have texts in "{name}"', known, permitted=tuple(LANGUAGES))
     wanted = tuple(name for _, name in written)
@@ -218,7 +218,7 @@ def check_languages(document: Document) -> Iterator[Fault]:
     for path, text in texts:
         if isinstance(text, str) and len(wanted) > 1:
             listed = ", ".join(f'{language} = "…"' for language in wanted)
-            message = "is in one language, but the study is in several"
+            message = "is in one language, but the study is in several languages"
             yield Fault(path, message, f"write {{ {listed} }}", kind="one language")
         elif isinstance(text, Mapping):
             for language in wanted:
@@ -236,23 +236,27 @@ OWN = ("sequence", "sequences")
 def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     """Check that there are several groups, and that every block and every sequence is used."""
     if all(key in document for key in OWN):
-        yield Fault(("sequences",), "specify either sequence or sequences")
+        yield Fault(("sequences",), "specify either sequence or sequences, not both")
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
         if value_at(document, ASSIGNMENT) == "pre-existing":
-            yield Fault(ASSIGNMENT, "the study does not have groups", "add groups, or omit it", kind="surplus")
+            yield Fault(ASSIGNMENT, "the study does not have groups", "add groups, or omit this key", kind="surplus")
         return
     if len(names(document, "groups")) == 1:
-        yield Fault(("groups",), "there is only one group", "add another group, or omit groups")
+        yield Fault(("groups",), "the study has only one group", "add another group, or omit groups")
     own = [any(key in table for key in OWN) for table in tables]
     for key in OWN:
         if key in document and all(own):
-            yield Fault((key,), "is not used: each group has its own", f"remove {key}, or omit it in a group")
+            yield Fault(
+                (key,),
+                "is not used, because each group has its own",
+                f"remove {key} here, or omit it in at least one group",
+            )
     used = {step for _, steps in sequences_in(document) for step in steps if isinstance(step, str)}
     for block in names(document, "blocks"):
         if used and block not in used:
             yield Fault(
-                ("groups",), f'block "{block}" is not in the sequence of any group', "add it to one, or remove it"
+                ("groups",), f'block "{block}" is not in the sequence of any group', "add it to a group, or remove it"
             )
 
 
@@ -294,10 +298,10 @@ def check_questions(document: Document) -> Iterator[Fault]:
         items = [item for _, item in sound]
         if any(isinstance(item, Statement) for item in items):
             if "scale" not in table:
-                message = "the questionnaire's scale is for statements; other items have a kind"
+                message = "the scale is needed for statements (items without a kind)"
                 yield Fault((*path, "scale"), "is missing", message, kind="missing")
             elif (scale := scales.get(str(table["scale"]))) is not None and scale.points != POINTS:
-                message = f"has {scale.points} points, and statements need {POINTS}"
+                message = f"has {scale.points} points, but statements need {POINTS}"
                 hint = f'write kind = "rating" and scale = "{table["scale"]}" in the items'
                 yield Fault((*path, "scale"), message, hint)
         yield from _check_show_if(table, sound, Context(scales, table.get("scale"), language))
@@ -306,7 +310,7 @@ def check_questions(document: Document) -> Iterator[Fault]:
         for key, answered, known in (("items", "a number", numbers), ("weights_from", "a choice", choices)):
             for place, name in entries(table, f"scores.*.{key}.*"):
                 if isinstance(name, str) and name not in known:
-                    message = f'there is no item "{name}" with {answered} as answer'
+                    message = f'there is no item "{name}" whose answer is {answered}'
                     yield unknown_name((*path, *place), message, name, known)
 
 

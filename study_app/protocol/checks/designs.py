@@ -83,7 +83,7 @@ def _missing_for(protocol: Protocol, rule: ExclusionRule) -> str | None:
     blocks = [block for block in protocol.main_blocks if block.design is not None]
     if rule.rule == "constant_answers":
         asked = filter(None, (protocol.questionnaire_of(block.id) for block in protocol.main_blocks))
-        return None if any(questionnaire.statements for questionnaire in asked) else "no main block asks statements"
+        return None if any(questionnaire.statements for questionnaire in asked) else "no main block has statements"
     if rule.rule == "threshold_beyond_levels":
         return None if any(block.stimulus is not None for block in blocks) else "no main block has levels"
     stimuli = {block.id: None if block.stimulus is None else protocol.stimuli[block.stimulus] for block in blocks}
@@ -99,7 +99,8 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
     correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:
-            what = "a forced choice at levels of values" if design.has_correct_answer else f'a design "{block.design}"'
+            forced = design.has_correct_answer
+            what = 'a forced choice with level = "value"' if forced else f'a design "{block.design}"'
             yield Fault((*place, key), f"{what} does not have a correct answer", "omit the key")
     if not correct and design.feedback not in {None, "never"}:
         yield Fault(
@@ -108,7 +109,7 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
             'omit the key (feedback = "never" is permitted)',
         )
     if block.break_every is not None and not (order := order_of(protocol, block)).breaks:
-        message = f"is {block.break_every}, but the block has {order.trials} trials: there would be no break"
+        message = f"is {block.break_every}, but the block has only {order.trials} trials, so there would be no break"
         yield Fault((*place, "break_every"), message)
     if fault := next(_check_design_and_method(protocol, block), None):
         yield fault
@@ -122,16 +123,16 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
             )
         return
     if design.has_standard and standards_of(protocol, block) == (None,):
-        message = f'"{block.design}" presents a standard in noise trials, but levels that are values do not have one'
+        message = f'"{block.design}" presents a standard in noise trials, but with level = "value" there is none'
         yield Fault((*place, "design"), message, 'level = "weber" or "difference"')
         return
     if not design.adaptive and method_of(protocol, block).adaptive:
-        message = f'"{block.design}" cannot be used: its answers do not determine a level'
+        message = f'is adaptive, but answers to "{block.design}" do not determine the next level'
         yield Fault((*place, "method"), message, 'method = "constant"')
     elif method_of(protocol, block).adaptive and not rises(protocol.stimuli[block.stimulus], design):
         message = (
-            f'"{block.design}" at levels of values has correct answers above and below the standard, so a '
-            "threshold does not exist"
+            f'"{block.design}" with level = "value" has correct answers both above and below the standard, so '
+            "there is no threshold"
         )
         yield Fault((*place, "method"), message, 'method = "constant", or level = "weber" or "difference"')
     if unknown := [
@@ -141,10 +142,14 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield Fault(
             (*place, "standards"),
             f"the stimulus does not have the standard {unknown[0]:g}",
-            f"these: {listed or 'none'}",
+            f"it has these: {listed or 'none'}",
         )
     if design.first is not None and len(tracks_of(protocol, block)) > 1:
-        yield Fault((*place, "design"), "a modulus needs a single standard", "omit it, or use one block per standard")
+        yield Fault(
+            (*place, "design"),
+            "a modulus needs a single standard",
+            "omit it, or use a separate block for each standard",
+        )
     yield from _check_levels(protocol, block)
 
 
@@ -153,7 +158,7 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
     of_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
     if published.block not in of_levels:
         fault = unknown_name(
-            (*place, "block"), f'there is no block of levels "{published.block}"', published.block, of_levels
+            (*place, "block"), f'there is no block "{published.block}" with levels', published.block, of_levels
         )
         yield fault if of_levels else fault._replace(hint="omit it")
         return
@@ -161,7 +166,7 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
         standard for standard in standards_of(protocol, protocol.blocks[published.block]) if standard is not None
     ]
     if published.standard is not None and published.standard not in standards:
-        listed = f"these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
+        listed = f"it has these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
         yield Fault((*place, "standard"), f"the block does not have the standard {published.standard:g}", listed)
     ends = (
         published.value if published.low is None else published.low,
@@ -169,7 +174,7 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
         published.value if published.high is None else published.high,
     )
     if list(ends) != sorted(ends):
-        yield Fault((*place, "low"), "low, value and high must ascend", "order them")
+        yield Fault((*place, "low"), "low, value and high must be in ascending order", "sort them")
 
 
 def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iterator[Fault]:
@@ -177,7 +182,7 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
     for name in contrast.blocks:
         block, asked = protocol.blocks[name], protocol.questionnaire_of(name)
         if block.phase != "main":
-            yield Fault((*place, "blocks"), f"{name} is not a main block, so it is not analysed", "choose another")
+            yield Fault((*place, "blocks"), f"{name} is not a main block, so it is not analysed", "choose a main block")
             continue
         if contrast.form is not None:
             yield from _check_form(protocol, contrast, contrast.form, name, place)
@@ -194,18 +199,22 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
                 (*place, "conditions"), f"block {name} does not have {missing[0]}", missing[0], block.conditions
             )
         if contrast.conditions is not None and block.design is not None:
-            yield Fault((*place, "conditions"), f"the results of {name} refer to all its levels", "compare two blocks")
+            yield Fault(
+                (*place, "conditions"), f"the results of {name} refer to all its levels", "compare two blocks instead"
+            )
 
 
 def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, place: Path) -> Iterator[Fault]:
     """Check that a form is asked after a block of a contrast, and has its measure."""
     exchanged = [] if protocol.study.block_order == "fixed" else [main.id for main in protocol.main_blocks]
     if block not in follows(protocol, form, protocol.blocks, exchanged):
-        yield Fault((*place, "form"), f"{form} is not asked after each compared block", f"ask it after {block}")
+        yield Fault(
+            (*place, "form"), f"{form} is not asked after every block that is compared", f"ask it after {block}"
+        )
     asked = protocol.questionnaires[form]
     known = [*(item.id for item in asked.items if item.value_type != "text"), *asked.scores]
     if contrast.measure not in known:
-        words = f'"{form}" does not have a number or score {contrast.measure}'
+        words = f'"{form}" does not have a numeric question or score {contrast.measure}'
         yield unknown_name((*place, "measure"), words, contrast.measure, known)
 
 
@@ -214,17 +223,17 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
     place = ("stimuli", name)
     if stimulus.condition is None and len(protocol.conditions) > 1:
         listed = f"known: {', '.join(protocol.conditions)}"
-        yield Fault((*place, "condition"), "is missing, but the study has several", listed)
+        yield Fault((*place, "condition"), "is missing, but the study has several conditions", listed)
         return
     condition = condition_of(protocol, stimulus)
     liquids = protocol.conditions[condition].liquid_ids
     if stimulus.vary in OF_CONDITION:
         return
     if len(liquids) > 1:
-        message = f"has {len(liquids)} liquids: state which liquid to vary"
-        yield Fault((*place, "condition"), message, "a condition with one liquid")
+        message = f"has {len(liquids)} liquids: only one can be varied"
+        yield Fault((*place, "condition"), message, "choose a condition with one liquid")
     elif protocol.liquids[liquids[0]].effects == "auto":
-        message = f'the effects of "{liquids[0]}" would be selected again at every level'
+        message = f'the effects of "{liquids[0]}" would be selected anew at every level'
         yield Fault((*place, "vary"), message, 'list them: effects = ["drag"]')
     else:
         try:
@@ -236,7 +245,7 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
         else:
             if not can_vary(stimulus.vary):
                 message = f"{stimulus.vary} is not a parameter of a liquid: it applies to the whole session"
-                hint = f"a parameter of the liquid, or {', '.join(OF_CONDITION)}"
+                hint = f"use a parameter of the liquid, or {', '.join(OF_CONDITION)}"
                 yield Fault((*place, "vary"), message, hint, kind="surplus")
 
 
@@ -253,8 +262,8 @@ def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     levels = sorted((*method.levels_of(stimulus), *([most] if block.catch else [])))
     if levels[0] < least * (1 - 1e-9) or levels[-1] > most * (1 + 1e-9):
         beyond = levels[0] if levels[0] < least * (1 - 1e-9) else levels[-1]
-        message = f"{beyond:g} is not within the stimulus' levels"
-        yield Fault(("methods", str(block.method), "levels"), message, f"from {least:g} to {most:g}")
+        message = f"{beyond:g} is outside the stimulus's levels"
+        yield Fault(("methods", str(block.method), "levels"), message, f"choose levels from {least:g} to {most:g}")
         return
     for standard in standards_of(protocol, block):
         if standard is not None and (fault := _standard_fault(protocol, block, stimulus, standard, least)) is not None:
@@ -266,7 +275,7 @@ def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
                 yield _out_of_range_fault(block, stimulus, standard, level)
                 return
             if (why := _presentation_problem(protocol, stimulus, value)) is not None:
-                what = f"standard {standard:g} at level {level:g} gives" if standard is not None else "the level"
+                what = f"a standard of {standard:g} at level {level:g} gives" if standard is not None else "the level"
                 yield Fault(("stimuli", str(block.stimulus), "levels"), f"{what} {value:g}: {why}")
                 return
     yield from _check_adjustment(protocol, block)
@@ -285,7 +294,7 @@ def _standard_fault(
     least = _LEAST_MS if stimulus.vary.endswith("_ms") else _LEAST_SHARE * (abs(standard) or 1.0)
     if level == 0 or stimulus.level_kind == "value" or abs(stimulus.comparison(standard, level) - standard) >= least:
         return None
-    message = f"{level:g} equals the standard of {standard:g}, so the intervals do not differ"
+    message = f"at level {level:g} the comparison equals the standard of {standard:g}, so the intervals do not differ"
     return Fault((*place, "levels"), message, f"the comparison must differ by at least {least:g}")
 
 
@@ -294,12 +303,12 @@ def _out_of_range_fault(block: Block, stimulus: Stimulus, standard: float | None
     place, value = ("stimuli", str(block.stimulus), "levels"), stimulus.comparison(standard, level)
     name, limit = stimulus.vary, OF_CONDITION[stimulus.vary]
     unit = " ms" if name.endswith("_ms") else ""
-    permitted = f"at most {limit:g}" if value > 0 else "no less than 0"
+    permitted = f"at most {limit:g}" if value > 0 else "at least 0"
     if standard is None or stimulus.level_kind != "difference":
-        return Fault(place, f"level {level:g} gives {value:g}{unit}; {name} may be {permitted}", f"{permitted}{unit}")
+        return Fault(place, f"level {level:g} gives {value:g}{unit}; {name} must be {permitted}", f"{permitted}{unit}")
     above = "above" if stimulus.direction == "up" else "below"
     most = limit - standard if stimulus.direction == "up" else standard
-    message = f"{level:g}{unit} {above} a standard of {standard:g} is {value:g}; {name} may be {permitted}"
+    message = f"{level:g}{unit} {above} a standard of {standard:g} is {value:g}; {name} must be {permitted}"
     return Fault(place, message, f"at most {most:g}")
 
 
@@ -319,14 +328,14 @@ def _check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault
     design, place = design_of(protocol, block), ("blocks", block.id)
     if block.stimulus is None:
         if design.adjusts:
-            message = "adjusts a parameter, but the block does not vary one"
+            message = "lets participants adjust a parameter, but the block does not vary one"
             yield Fault((*place, "design"), message, 'specify stimulus = "…" instead of conditions')
     elif design.adjusts and not method_of(protocol, block).adjusts:
         yield Fault(
-            (*place, "method"), f'levels of "{block.design}" are set by the participant', 'method = "adjustment"'
+            (*place, "method"), f'with "{block.design}" the participant sets the levels', 'method = "adjustment"'
         )
     elif method_of(protocol, block).adjusts and not design.adjusts:
-        message = f'"{block.method}" needs a level that the participant sets, but "{block.design}" does not have one'
+        message = f'"{block.method}" needs a design in which participants set the level, unlike "{block.design}"'
         yield Fault((*place, "method"), message, 'design = "adjustment", or method = "constant"')
 
 
@@ -340,7 +349,8 @@ def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
         if standard is not None and design.intervals > 1 and not values[0] < standard < values[1]:
             yield Fault(
                 ("stimuli", str(block.stimulus), "levels"),
-                f"settings from {values[0]:g} to {values[1]:g} are not on both sides of the standard {standard:g}",
+                f"the settings ({values[0]:g} to {values[1]:g}) do not extend to both sides of the standard "
+                f"{standard:g}",
                 'level = "value", with levels below and above the standard',
             )
             return
@@ -350,7 +360,8 @@ def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
             yield Fault(
                 ("methods", str(block.method), "step_size"),
                 f'"{stimulus.vary}" cannot change while it is presented',
-                "vary a parameter that can, such as drag.coefficient, or present levels by another method",
+                "vary a parameter that can change, such as drag.coefficient, or use a different method to choose "
+                "levels",
             )
             return
 

@@ -58,8 +58,8 @@ def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterato
     for block in protocol.blocks.values():
         for name in protocol.conditions_in(block.id) if isinstance(protocol.tasks[block.task], Reach) else ():
             if protocol.conditions[name].ball == "hidden":
-                message = f'is hidden, but block "{block.id}" has a reaching task: participants cannot aim the ball'
-                yield Fault(("conditions", name, "ball"), message, 'a task of kind "follow" or "explore"')
+                message = f'is hidden, but participants must see it for the reaching task of block "{block.id}"'
+                yield Fault(("conditions", name, "ball"), message, 'choose a task of kind "follow" or "explore"')
     yield from _check_estimator_lag(protocol)
     for blocks in blocks_by_stimulus(protocol):
         yield from check_clipping(protocol, blocks, delay_ticks)
@@ -84,8 +84,9 @@ def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
             most_hz = _rounded_down(fastest_hz(velocity, rate_hz, _LEAST_SHARE), 1)
             yield Fault(
                 ("tasks", name, "frequency_hz"),
-                f"at {task.frequency_hz:g} Hz the velocity estimator passes {100 * share:.1f} % of a damper's force",
-                f"at most {most_hz:g} Hz, where it passes {100 * _LEAST_SHARE:g} %",
+                f"at {task.frequency_hz:g} Hz the velocity estimator passes only {100 * share:.1f} % of a damper's "
+                "force",
+                f"choose at most {most_hz:g} Hz, where it passes {100 * _LEAST_SHARE:g} %",
             )
 
 
@@ -115,7 +116,7 @@ def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: 
         every = list(_levels_at_strongest_force(protocol, blocks))
         gives = _levels_with_verb(every, [level for level in every if level.damping_nspm > limit_nspm], _GIVES)
         hint = _remedy(stimulus, standard, level, limit_nspm)
-    message = f"{gives} {highest_nspm:g} N·s/m at the hand; {loop} is {limit_nspm:g}"
+    message = f"{gives} {highest_nspm:g} N·s/m at the hand, but {loop} is {limit_nspm:g}"
     return Fault(("stimuli", str(blocks[0].stimulus), "levels"), message, hint)
 
 
@@ -147,7 +148,7 @@ def check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int
         most = max(by_loop, key=lambda level: level.asked_n or 0.0)
         message = (
             f"{_levels_with_verb(list(every), by_loop, _IS)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
-            f"{hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s; {loop} leaves {most.sent_n:.1f} N"
+            f"{hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s; {loop} allows only {most.sent_n:.1f} N"
         )
         yield Fault(place, message, _highest_unclipped_level(protocol, every[most], most.standard))
     by_force = [level for level in every if (level.asked_n or 0.0) > scene.force_limit_n and level not in by_loop]
@@ -185,7 +186,8 @@ def unpaced_clipping_warning(protocol: Protocol, blocks: Sequence[Block]) -> str
     of = f" of {_level_ranges(every, some)}" if some else ""  # a number of the condition changes no force
     by_loop = any(steady_force(scene, UNPACED_MPS).limit == "slope" for scene in scenes)
     limit = "by the slope limit" if by_loop else f"at {protocol.device.force_limit_n:g} N"
-    return f"tasks.{task}: at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}: such trials are repeated; {PACED}"
+    clipped = f"at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}"
+    return f"tasks.{task}: {clipped}, and such trials are repeated; {PACED}"
 
 
 def _check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
@@ -206,7 +208,7 @@ def _check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what
     least = (beyond - 1) * 1e-6
     yield Fault(
         place,
-        f"{what} {drag_n:.1f} N at {FASTER:g} times the paced {pace_mps:.3g} m/s; device.force_limit_n is "
+        f"{what} {drag_n:.1f} N at {FASTER:g} times the paced {pace_mps:.3g} m/s, but device.force_limit_n is "
         f"{scene.force_limit_n:g}",
         f"amplitude_mm = {_rounded_down(least * task.amplitude_mm, 1):g} or "
         f"frequency_hz = {_rounded_down(least * task.frequency_hz, 2):g}",
@@ -229,14 +231,15 @@ def _slope_limit(scene: Scene, delay_ticks: int) -> tuple[float, str]:
 def _remedy(stimulus: Stimulus, standard: float | None, level: float, limit_nspm: float) -> str:
     """Return the remedy that keeps a damping within its limit."""
     if standard is None or stimulus.level_kind == "value":
-        return f"levels to {_rounded_down(limit_nspm, 1):g}"
+        return f"choose levels up to {_rounded_down(limit_nspm, 1):g}"
     if standard >= limit_nspm:
-        return f"the standard below {limit_nspm:g}"
+        return f"choose a standard below {limit_nspm:g}"
     if stimulus.level_kind == "weber":
         most_level, most_standard = limit_nspm / standard - 1, limit_nspm / (1 + level)
     else:
         most_level, most_standard = limit_nspm - standard, limit_nspm - level
-    return f"levels to {_rounded_down(most_level, 3):g}, or the standard to {_rounded_down(most_standard, 1):g}"
+    lower = f"a standard up to {_rounded_down(most_standard, 1):g}"
+    return f"choose levels up to {_rounded_down(most_level, 3):g}, or {lower}"
 
 
 def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float | None) -> str:
@@ -245,7 +248,7 @@ def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float |
     if limits is None or not limits.lowest:
         return ""
     highest = stimulus.level_between(standard, limits.lowest)
-    return f"levels to {_rounded_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
+    return f"choose levels up to {_rounded_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
 
 
 def _levels_with_verb(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:
@@ -321,9 +324,9 @@ def _returned_energy_fault(protocol: Protocol, block: Block, stroke: Stroke) -> 
         return None
     return Fault(
         ("stimuli", str(block.stimulus), "levels"),
-        f"{damping:.3g} N·s/m delayed by {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per motion reversal, "
-        f"which the passivity controller removes",
-        f"at most {longest_delay_ms(damping, stroke)} ms, which return {1000 * LIMIT_J:g} mJ",
+        f"{damping:.3g} N·s/m with a delay of {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per motion "
+        "reversal, which the passivity controller removes",
+        f"choose a delay of at most {longest_delay_ms(damping, stroke)} ms, which returns {1000 * LIMIT_J:g} mJ",
     )
 
 

@@ -89,7 +89,8 @@ def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
     match = re.fullmatch(r"([A-Za-z0-9]*?)([0-9]+)", first)
     if match is None:
         raise StudyError(
-            f"{first!r} cannot be the first participant: specify letters and digits that end in a number, such as P061"
+            f"{first!r} cannot be the first participant: specify an ID of letters and digits that ends in a number, "
+            "such as P061"
         )
     return tuple(f"{match[1]}{int(match[2]) + more:0{len(match[2])}d}" for more in range(count))
 
@@ -198,19 +199,19 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
         of = (
             ""
             if planned is None
-            else (f": {planned / blocks:.3g} of {planned} participants have a block in each position")
+            else (f": each block is in each position for {planned / blocks:.3g} of {planned} participants")
         )
-        return f"random: drawn in each session, so balanced only on average{of}"
+        return f"random: drawn for each session, so balanced only on average{of}"
     order_evenness = _block_evenness(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
     rows = row_count("williams", blocks)
-    by, of = ("place in the group", " per group") if in_group else ("number in the participant's ID", "")
-    text = f"balanced: {rows} orders, by the {by}"
+    by, of = ("position in the group", " per group") if in_group else ("number in the participant's ID", "")
+    text = f"balanced: {rows} orders, assigned by the {by}"
     if planned is None or order_evenness is None:
-        return f"{text}; any multiple of {rows} participants{of} is balanced"
+        return f"{text}; balanced for any multiple of {rows} participants{of}"
     counts = [count for line in order_evenness.positions for count in line]
     even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
-    more = "" if order_evenness.balanced else f"; {planned + -planned % rows} would be even"
-    return f"{text}; {planned} participants{of} have each block in each position {even}{more}"
+    more = "" if order_evenness.balanced else f"; {planned + -planned % rows} would be balanced"
+    return f"{text}; with {planned} participants{of} each block is in each position {even}{more}"
 
 
 def _block_evenness(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
@@ -224,7 +225,7 @@ def describe_balance(judged: Balance) -> str:
     """Return the tables of every block with their interpretation."""
     people = "1 participant" if judged.participants == 1 else f"{judged.participants} participants"
     whose = f", {judged.session}" if judged.session else ""
-    head = f"{judged.study}{whose}: the orders of {people}, each with seed {judged.seed}"
+    head = f"{judged.study}{whose}: orders for {people}, each with seed {judged.seed}"
     if not judged.blocks:
         return f"{head}\n\nAll blocks have only one code, so there is nothing to balance."
     return "\n\n".join((head, *("\n".join(_block_lines(block)) for block in judged.blocks)))
@@ -259,12 +260,12 @@ def _verdict_lines(counted: Evenness) -> Iterator[str]:
     if counted.positions_even:
         yield f"Positions are balanced: each code occurs in each position {_times_text(cells[0])}."
     else:
-        yield f"Positions are not balanced: a code occurs in a position {_range_text(cells)}."
+        yield f"Positions are not balanced: each code occurs in each position {_range_text(cells)}."
     after = counted.after_another
     if counted.follows_even:
         yield f"Carry-over is balanced: each code follows each other code {_times_text(after[0])}."
     else:
-        yield f"Carry-over is not balanced: a code follows another code {_range_text(after)}."
+        yield f"Carry-over is not balanced: each code follows each other code {_range_text(after)}."
     if counted.shortest_distance is not None:
         least = f"the minimum distance between repeats is {counted.shortest_distance}"
         yield f"At most {counted.longest_run} presentations of a condition occur in a row; {least}."
@@ -278,18 +279,19 @@ def _advice(block: _BlockBalance) -> Iterator[str]:
             yield "Everyone gets the same order, so effects of condition and position cannot be separated."
         case "shuffled" | "constrained":
             yield (
-                "Drawn again in every session, so orders are balanced only on average; each seed gives "
+                "Orders are drawn anew in every session, so they are balanced only on average; each seed gives "
                 "different tables."
             )
             if repetitions == 1:
                 rows = row_count("williams", codes)
-                yield f'order = "williams" would be even exactly, for every {rows} participants.'
+                yield f'order = "williams" would be exactly balanced for every {rows} participants.'
         case "williams" | "latin" as square:
             yield from _round_lines(block, row_count(square, codes))
             if square == "williams" and not has_even_borders(codes, repetitions):
                 enough = next(more for more in count(repetitions) if has_even_borders(codes, more))
                 yield (
-                    f"With this number of repetitions carry-over cannot be balanced; with {enough} repetitions it can."
+                    f"Carry-over cannot be balanced with this number of repetitions, but it can with {enough} "
+                    "repetitions."
                 )
             if square == "latin" and codes > 2:
                 yield 'A Latin square balances only positions; order = "williams" also balances carry-over.'
@@ -300,16 +302,19 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
     codes, people = len(block.evenness.codes), block.evenness.orders
     if block.unnumbered:
         yield (
-            f"IDs without a number: {', '.join(block.unnumbered)}. Their rows are drawn, so they are balanced "
-            "only on average."
+            f"These IDs do not contain a number: {', '.join(block.unnumbered)}. Their rows are drawn at random, so "
+            "they are balanced only on average."
         )
     elif people % rows == 0 and block.evenness.positions_even:
         rounds = people // rows
-        yield f"{people} participants are {'a full round' if rounds == 1 else f'{rounds} full rounds'} of {rows} rows."
+        yield (
+            f"{people} participants complete {'a full round' if rounds == 1 else f'{rounds} full rounds'} of {rows} "
+            "rows."
+        )
     elif people % rows == 0:
         yield (
-            f"A full round consists of the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on, but these IDs are "
-            "incomplete."
+            f"A full round consists of the numbers 1 to {rows}, {rows + 1} to {2 * rows} and so on, but some of "
+            "these numbers are missing from the IDs."
         )
     else:
         enough = people + -people % rows
@@ -317,7 +322,7 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
         if block.order == "williams" and has_even_borders(codes, block.repetitions):
             follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
             then += f" and follows each other code {_times_text(follows)}"
-        yield f"A full round consists of {rows} participants. The next complete number is {enough}: {then}."
+        yield f"A full round consists of {rows} participants. The next complete round ends at {enough}: {then}."
 
 
 def _times_text(number: int) -> str:

@@ -272,19 +272,19 @@ def reproduce(
 def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
     """Yield the differences between a recorded trial and the planned one with its number."""
     if planned is None:
-        yield f"trial {run.number}: recorded, but the seed does not produce this trial"
+        yield f"trial {run.number}was recorded, but the seed does not produce this trial"
         return
     for name in _TOLD:
         ours, theirs = getattr(planned, name), getattr(run, name)
         if ours != theirs:
             said, given = ("none" if value is None else value for value in (theirs, ours))
-            yield f"trial {run.number}: recorded {name} {said}, but the seed gives {given}"
+            yield f"trial {run.number}: the recorded {name} is {said}, but the seed gives {given}"
     if run.items is None:
         return
     expected = tuple(item for item in planned.items if item in run.items) if run.may_hide else planned.items
     if run.items != expected:
         said, given = (", ".join(items) or "none" for items in (run.items, planned.items))
-        yield f"trial {run.number}: recorded items {said}, but the seed gives {given}"
+        yield f"trial {run.number}: the recorded items are {said}, but the seed gives {given}"
 
 
 def _progress_differences(
@@ -301,7 +301,7 @@ def _progress_differences(
         again = {first[planned[number].block] for number in due & planned.keys()} if blocks else set()
         if number not in due | again:
             after = f"after trial {before}" if before else "first"
-            yield f"trial {number} came {after}, but trial {before + 1} was due"
+            yield f"trial {number} was presented {after}, but trial {before + 1} was due"
         before = number
     last = len(planned)
     if complete and before < last:

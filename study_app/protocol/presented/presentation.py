@@ -48,9 +48,9 @@ def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:
 def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
     """Yield phrases for a condition's unusual force link: delay [ms], jitter [ms], losses."""
     if delay_ms:
-        yield f"force {delay_ms:g} ms late"
+        yield f"force delayed by {delay_ms:g} ms"
     if jitter_ms:
-        yield f"force jitter {jitter_ms:g} ms"
+        yield f"force jitter of {jitter_ms:g} ms"
     if loss:
         yield f"{100 * loss:g} % of forces lost"
 

@@ -64,7 +64,7 @@ def frozen(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: frozen(entry) for key, entry in value.items()}
     if isinstance(value, int) and not -(2**63) <= value < 2**63:
-        raise ValueError("TOML has whole numbers of 64 bits")
+        raise ValueError("TOML permits whole numbers of up to 64 bits")
     return value
 
 

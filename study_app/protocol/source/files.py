@@ -207,12 +207,16 @@ def protocol_file(name_or_path: str | Path) -> Path:
         for folder in (workspace().protocols, _shipped_folder()):
             if (file := folder / f"{path.name}.toml").is_file():
                 return file
-        raise _not_found(name_or_path, "no protocol of this name", did_you_mean(path.name, known_protocols()))
+        raise _not_found(
+            name_or_path, "there is no protocol with this name", did_you_mean(path.name, known_protocols())
+        )
     if path.is_dir():
         raise _not_found(name_or_path, "is a folder, not a protocol file", "specify one of the .toml files in it")
     if path.exists():
         raise _not_found(name_or_path, "is a pipe or a device, not a protocol file", "specify a .toml file")
-    raise _not_found(name_or_path, "no such file", f"or a name: {', '.join(shipped())}")
+    raise _not_found(
+        name_or_path, "there is no such file", f"specify a file, or one of these names: {', '.join(shipped())}"
+    )
 
 
 def _not_found(name_or_path: str | Path, message: str, hint: str) -> ProtocolError:
@@ -233,7 +237,7 @@ def source_bytes(name_or_path: str | Path) -> bytes:
 def check_size(source: bytes, name: str) -> None:
     """Raise an error if a source is larger than any study, before it is parsed."""
     if len(source) > _MOST_BYTES:
-        size = f"has {len(source) / 1e6:.1f} MB; a study has at most {_MOST_BYTES / 1e6:g} MB"
+        size = f"is {len(source) / 1e6:.1f} MB in size, but study files are at most {_MOST_BYTES / 1e6:g} MB"
         raise ProtocolError(name, (Problem("file", size, hint="check that it is a study file"),))
 
 

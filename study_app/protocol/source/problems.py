@@ -55,13 +55,13 @@ class Fault(NamedTuple):
 
 
 _PATTERNS = {
-    r"^[a-z][a-z0-9_]*$": "lowercase letters, digits and underscores, a letter first",
+    r"^[a-z][a-z0-9_]*$": "lowercase letters, digits and underscores, starting with a letter",
     r"^[a-z0-9][a-z0-9_]*$": "lowercase letters, digits and underscores",
-    r"^[a-z][a-z0-9]*$": "lowercase letters and digits, a letter first, no underscore",
-    r"^[a-z]{2}$": "a language of two lowercase letters, such as en",
+    r"^[a-z][a-z0-9]*$": "lowercase letters and digits (no underscores), starting with a letter",
+    r"^[a-z]{2}$": "a language code of two lowercase letters, such as en",
     r"^[A-Z]$": "one capital letter",
     r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$": "tank, camera, or a file such as film.mp4",
-    r"^[0-9A-Za-z.+-]+$": "letters, digits, dots, plus and minus",
+    r"^[0-9A-Za-z.+-]+$": "letters, digits, dots, plus and minus signs",
 }
 
 _KINDS = {
@@ -84,8 +84,8 @@ _BOUNDS = {
     "less_than_equal": ("le", "at most"),
 }
 _LENGTHS = {
-    "too_short": "has {actual_length} entries, needs at least {min_length}",
-    "too_long": "has {actual_length} entries, more than {max_length}",
+    "too_short": "has too few entries ({actual_length}): it needs at least {min_length}",
+    "too_long": "has too many entries ({actual_length}): it may have at most {max_length}",
     "string_too_long": "{shown} is longer than {max_length} characters",
 }
 
@@ -171,7 +171,7 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
     if kind in _BOUNDS:
         (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
-        sentence = f"is {shown_value(value)}, must be {expected} {shown_value(bound)}"
+        sentence = f"is {shown_value(value)}, but must be {expected} {shown_value(bound)}"
         return Fault(path, sentence, next(filter(None, hints), ""), use=(path, bound) if key in {"ge", "le"} else None)
     if kind in _KINDS:
         number: _FaultKind = "not a number" if "number" in _KINDS[kind] else ""

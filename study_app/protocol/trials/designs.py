@@ -45,9 +45,9 @@ class Attention(Protocol):
 class Modulus(Table):
     """The level of a block's first trial and the number that the participant is given for it; it is not analysed."""
 
-    level: float = Field(description="The level that is presented.")
+    level: float = Field(description="The level presented.")
     number: Annotated[float, within(1e-6, 1e9, "numbers that people use")] = Field(
-        description="The number that represents it."
+        description="The number assigned to it."
     )
 
 
@@ -68,18 +68,18 @@ class Design(Table):
     )
     question: Localised | None = Field(default=None, description="The question; default: the program's own text.")
     pause_s: Annotated[float, within(0.3, 10, "hands need 0.3 s to settle; memory fades within seconds")] = Field(
-        default=0.6, description="Interstimulus interval: zero force between two intervals [s]."
+        default=0.6, description="Interstimulus interval, during which the force is zero [s]."
     )
     between_s: Annotated[float, within(0.0, 60, "use a break page for a minute or more")] = Field(
-        default=0.8, description="Zero force between an answer and the next trial [s]."
+        default=0.8, description="Time between an answer and the next trial, during which the force is zero [s]."
     )
     feedback: _Feedback | None = Field(
         default=None,
-        description="When the participant sees whether an answer was correct. practice: only in practice, the default; "
-        "always: after every answer; never: not at all. If no answer can be correct, the default is never.",
+        description="When participants see whether an answer was correct. practice: only in practice (the default); "
+        "always: after every answer; never: not at all (the default if answers cannot be correct).",
     )
     feedback_s: Annotated[float, within(0.2, 10, "people need 0.2 s to see a sign")] = Field(
-        default=0.6, description="How long the feedback is shown [s]."
+        default=0.6, description="How long feedback is shown [s]."
     )
 
     answers: ClassVar[tuple[str, ...]] = ()
@@ -269,7 +269,7 @@ class YesNo(Design):
     kind: Literal["yesno"] = "yesno"
     noise_share: Annotated[
         float, within(0.05, 0.5, "with fewer noise trials false alarms are unknown; half is balanced")
-    ] = Field(default=0.3, description="Proportion of trials that present the standard.")
+    ] = Field(default=0.3, description="Proportion of trials in which the standard is presented.")
     paper_name: ClassVar = "yes–no"
     answers: ClassVar = ("yes", "no")
     arrangements: ClassVar = ((True,), (False,))
@@ -305,7 +305,7 @@ class Rated(_JudgementDesign):
     """How much was it? One point of a scale for each level."""
 
     kind: Literal["rating"] = "rating"
-    scale: Id = Field(description="The scale of the answer.")
+    scale: Id = Field(description="The scale for the answer.")
     paper_name: ClassVar = "ratings"
     reply: ClassVar = "rating"
 
@@ -315,7 +315,9 @@ class Estimation(_JudgementDesign):
 
     kind: Literal["estimation"] = "estimation"
     modulus: Modulus | None = Field(
-        default=None, description="Level and number of the first trial; default: participants choose their own scale."
+        default=None,
+        description="The level presented in the first trial and the number assigned to it; default: "
+        "participants choose their own scale.",
     )
     paper_name: ClassVar = "magnitude estimation"
     reply: ClassVar = "number"
@@ -327,7 +329,7 @@ class Adjusted(_JudgementDesign):
 
     kind: Literal["adjustment"] = "adjustment"
     standard: bool = Field(
-        default=True, description="Whether an interval with the standard precedes the adjusted interval."
+        default=True, description="Whether the adjusted interval is preceded by an interval with the standard."
     )
     paper_name: ClassVar = "the method of adjustment"
     reply: ClassVar = "setting"

@@ -99,7 +99,7 @@ class Method(Table):
         description="interleaved: the tracks alternate in random order; blocked: one track follows another.",
     )
 
-    tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="How many tracks each standard has.")
+    tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="Number of tracks for each standard.")
 
     adaptive: ClassVar[bool] = True
     """Whether answers choose the next level."""
@@ -189,7 +189,7 @@ class Method(Table):
         return 0
 
 
-Trials = Annotated[int, within(1, 1000, "participants do not answer more in one track")]
+Trials = Annotated[int, within(1, 1000, "no participant can answer more in one track")]
 
 
 class _Adaptive(Method):
@@ -197,7 +197,7 @@ class _Adaptive(Method):
 
     trials: Trials = Field(default=60, description="Maximum number of trials per standard, divided among the tracks.")
     begin: Annotated[tuple[float, ...], Field(max_length=4)] | float | None = Field(
-        default=None, description="The first level, or the first level of each track."
+        default=None, description="The first level, or a list with the first level of each track."
     )
 
     def presentations(self, stimulus: Stimulus) -> int:
@@ -212,12 +212,12 @@ class _Adaptive(Method):
             yield "trials", message, f"a multiple of {self.tracks}"
         least, most = stimulus.levels
         begin = self.begin if isinstance(self.begin, tuple) else () if self.begin is None else (self.begin,)
-        hint = f"one for each track, {least:g} to {most:g}"
+        hint = f"specify one level per track, from {least:g} to {most:g}"
         if isinstance(self.begin, tuple) and len(begin) != self.tracks:
             yield "begin", f"{counted(len(begin), 'level')} for {counted(self.tracks, 'track')}", hint
         for level in begin:
             if not least <= level <= most:
-                yield "begin", f"{level:g} is not within levels", hint
+                yield "begin", f"{level:g} is outside the stimulus's levels", hint
 
     def first(self, track: int) -> float | None:
         """Return the first level of a track (from 1) as stated; None: the method's own."""
@@ -231,6 +231,7 @@ class _Adaptive(Method):
         """Return the level that follows these answers."""
 
 
+_LOG_STEP: Final = "with logarithmic spacing a step must be a factor greater than 1"
 _STEPS: Final = 40
 """Steps from the smallest level to the largest, by default."""
 _START_SHARE: Final = 0.125
@@ -251,11 +252,11 @@ class Adjustment(Method):
         default=None,
         description=(
             "Step size: a factor if levels are spaced logarithmically, otherwise a difference; "
-            "default: a 40th of the span."
+            "default: one fortieth of the range."
         ),
     )
     most_s: Annotated[float, within(2, 600, "a hand needs 2 s to feel a change and tires within minutes")] = Field(
-        default=60, description="Longest time for a setting [s]."
+        default=60, description="Maximum time for each setting [s]."
     )
 
     def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
@@ -277,14 +278,15 @@ class Adjustment(Method):
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         low, high = stimulus.domain
         if stimulus.spacing == "log" and self.step_size is not None and self.step_size <= 1:
-            yield "step_size", f"is {self.step_size:g}; with log spacing a step is a factor above 1", "such as 1.05"
+            yield "step_size", f"is {self.step_size:g}, but {_LOG_STEP}", "such as 1.05"
         elif self.step(stimulus) > (high - low) / 2:
             most = stimulus.level_of((high - low) / 4)
-            yield "step_size", f"is {self.step_size:g}: more than half the range of levels", f"such as {most:.3g}"
+            message = f"is {self.step_size:g}, which is more than half the range of levels"
+            yield "step_size", message, f"such as {most:.3g}"
 
     def warnings(self) -> Iterator[tuple[str, str]]:
         if self.repetitions % 2:
-            message = f"{self.repetitions} settings cannot start equally often at both ends: choose an even number"
+            message = f"{self.repetitions} settings cannot start equally often at each end: choose an even number"
             yield "repetitions", message
 
     def adjusting(self, stimulus: Stimulus, standard: float | None, start: float) -> Adjusting:
@@ -345,10 +347,12 @@ class Constant(Method):
     paper_name: ClassVar = "the method of constant stimuli"
     adaptive: ClassVar[bool] = False
     levels: _Count | _Listed = Field(
-        default=CONSTANT_LEVELS, description="The levels, or how many, evenly spaced over the stimulus' range."
+        default=CONSTANT_LEVELS,
+        description="A list of levels, or the number of levels, which are then spaced "
+        "evenly over the stimulus's range.",
     )
     repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
-        default=20, description="How often each level is presented."
+        default=20, description="Number of times each level is presented."
     )
 
     def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
@@ -370,14 +374,16 @@ class Constant(Method):
         return constant_tracks(levels, self.repetitions, observers, draws)
 
 
-_Positive = Annotated[float, within(1e-6, 1e6, "a psychometric function is neither a step nor flat")]
+_Positive = Annotated[float, within(1e-6, 1e6, "a psychometric function is neither a step nor a flat line")]
 Lapse = Annotated[float, Field(ge=0, lt=0.5)]
 
 
 class Precision(Table):
     """When a track ends early: once the threshold's 95 % interval is narrow enough."""
 
-    ratio: Annotated[float, Field(gt=1, le=1e12)] = Field(description="Largest ratio of its upper to its lower end.")
+    ratio: Annotated[float, Field(gt=1, le=1e12)] = Field(
+        description="Maximum ratio of the interval's upper end to its lower end."
+    )
     after: Trials = Field(default=30, description="Minimum number of answers.")
 
 
@@ -387,7 +393,7 @@ class QuestPlus(_Adaptive):
     kind: Literal["questplus"] = "questplus"
     learn: Literal["threshold", "all"] = Field(
         default="threshold",
-        description="threshold: the entropy of the threshold is minimised; all: the entropy of all parameters.",
+        description="What is minimised. threshold: the entropy of the threshold; all: the entropy of all parameters.",
     )
     family: Family | None = Field(
         default=None,
@@ -395,13 +401,15 @@ class QuestPlus(_Adaptive):
         "otherwise; logistic: a logistic function.",
     )
     widths: tuple[_Positive, _Positive] | None = Field(
-        default=None, description="Smallest and largest width, from 5 to 95 % [decades, or units of the level]."
+        default=None,
+        description="Smallest and largest width of the function, measured from 5 to 95 % [decades, or "
+        "units of the level].",
     )
     width_prior: tuple[_Positive, Annotated[float, Field(gt=1, le=1e6)]] | None = Field(
-        default=None, description="Median and factor of the width's log-normal prior."
+        default=None, description="Median and spread factor of the width's log-normal prior."
     )
     lapses: Annotated[tuple[Lapse, ...], Field(min_length=1, max_length=10)] = Field(
-        default=LAPSES, description="Lapse rates that are considered."
+        default=LAPSES, description="Lapse rates to be considered."
     )
     stop: Precision | None = Field(default=None, description="When a track ends early; default: never.")
 
@@ -409,9 +417,9 @@ class QuestPlus(_Adaptive):
         yield from super().faults(stimulus)
         if self.widths is not None and not self.widths[0] < self.widths[1]:
             low, high = self.widths
-            yield "widths", f"{low:g} and {high:g}: the first width must be smaller", ""
+            yield "widths", f"{low:g} is not less than {high:g}: the first width must be the smaller one", ""
         if self.family == "weibull" and stimulus.spacing == "linear":
-            yield "family", '"weibull" is a function of the logarithm of a level', 'spacing = "log", or "normal"'
+            yield "family", '"weibull" is a function of the logarithm of the level', 'spacing = "log", or "normal"'
 
     @property
     def paper_name(self) -> str:
@@ -487,7 +495,7 @@ def _nearest(coordinates: Sequence[float], u: float) -> int:
 class Reversals(Table):
     """When a track ends early: after so many changes of direction."""
 
-    reversals: Trials = Field(description="How many reversals, at least.")
+    reversals: Trials = Field(description="Minimum number of reversals.")
     after: Trials = Field(default=1, description="Minimum number of answers.")
 
 
@@ -498,30 +506,30 @@ class UpDown(_Adaptive):
     rule: Literal["1down1up", "2down1up", "3down1up", "4down1up"] = Field(
         default="2down1up",
         description=(
-            "1down1up: one step down after each correct answer; 2down1up: after 2 consecutive correct "
-            "answers; 3down1up: after 3; 4down1up: after 4."
+            "1down1up: one step down after each correct answer; 2down1up, 3down1up, 4down1up: one step down "
+            "after 2, 3 or 4 consecutive correct answers."
         ),
     )
     step_up: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
         default=None,
         description=(
             "Step after an incorrect answer: a factor if levels are spaced logarithmically, otherwise a "
-            "difference; default: a tenth of the span."
+            "difference; default: one tenth of the range."
         ),
     )
     ratio: Annotated[float, Field(gt=0, le=10)] | None = Field(
         default=None,
-        description="Ratio of the step down to the step up; default: the value of García-Pérez for the rule.",
+        description="Ratio of the step down to the step up; default: the value that García-Pérez gives for the rule.",
     )
     average: Annotated[int, Field(ge=2, le=100)] = Field(
-        default=8, description="Maximum number of last reversals to average."
+        default=8, description="Maximum number of final reversals to average."
     )
     stop: Reversals | None = Field(default=None, description="When a track ends early; default: never.")
 
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         yield from super().faults(stimulus)
         if stimulus.spacing == "log" and self.step_up is not None and self.step_up <= 1:
-            yield "step_up", f"is {self.step_up:g}; with log spacing a step is a factor above 1", "such as 1.4"
+            yield "step_up", f"is {self.step_up:g}, but {_LOG_STEP}", "such as 1.4"
 
     def warnings(self) -> Iterator[tuple[str, str]]:
         successes = int(self.rule[0])
@@ -529,11 +537,11 @@ class UpDown(_Adaptive):
             reached, published = (100 * converges_to(successes, ratio) for ratio in (self.ratio, RATIOS[successes]))
             yield (
                 "ratio",
-                f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % only for small steps; omit "
-                f"ratio for {published:.1f} % with any step",
+                f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % only if steps are small; "
+                f"omit ratio to converge to {published:.1f} % with steps of any size",
             )
         if self.tracks == 1:
-            yield "tracks", "participants can predict a single up–down track: choose tracks = 2"
+            yield "tracks", "participants can predict the levels of a single up–down track: choose tracks = 2"
 
     def target(self, guess: float | None, success: str) -> str | None:
         return f"converges to {self.target_percent:.1f} % {success}"
@@ -541,7 +549,7 @@ class UpDown(_Adaptive):
     @property
     def paper_name(self) -> str:
         return (
-            f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} of the steps up; García-Pérez "
+            f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} times the steps up; García-Pérez "
             f"1998), which converge to {self.target_percent:.1f} %"
         )
 
@@ -627,7 +635,7 @@ KINDS: Final = Registry[type[Method]](
             f"a whole number from 1 to {_MOST_PRESENTATIONS:,}",
             lambda value: isinstance(value, Integral) and 1 <= int(value) <= _MOST_PRESENTATIONS,
         ),
-        "levels_of": Returns("numbers, at least one", lambda values: are_numbers(values) and len(values) > 0),
+        "levels_of": Returns("at least one number", lambda values: are_numbers(values) and len(values) > 0),
         "level": number_between(-1e12, 1e12),
         "ended": Returns("True or False", lambda value: value in (True, False)),
         "paper_name": instance_of(str),

@@ -45,37 +45,38 @@ class Condition(Table):
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("liquid", "liquids"),)
 
-    liquid: Id | None = Field(default=None, description="The liquid; or specify liquids.")
+    liquid: Id | None = Field(default=None, description="The liquid; alternatively, specify liquids.")
     liquids: tuple[Id, ...] = Field(
-        default=(), description=("Several liquids; where they overlap, the last one applies.")
+        default=(), description=("Several liquids; where they overlap, the one listed last applies.")
     )
     delay_ms: Annotated[
         float, within(0, MOST_DELAY_MS, "a picture that is more than a second late is not feedback")
     ] = Field(default=0, description="Delay of everything drawn in the tank [ms].")
     label: Id | None = Field(
-        default=None, description="The item of analysis.names that names it correctly; default: none."
+        default=None, description="The item in analysis.names that names this condition correctly; default: none."
     )
     ball: Literal["shown", "hidden"] = later(
-        default="shown", description="shown: the ball is always drawn; hidden: it is drawn only during a task's lead."
+        default="shown",
+        description="shown: the ball is always drawn; hidden: it is drawn only during the task's lead-in.",
     )
     force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a longer delay pushes the hand")] = later(
-        default=0, description="Delay of the force [ms]; the picture is not delayed."
+        default=0, description="Force delay [ms]; the picture is not delayed."
     )
     force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks have smaller deviations")] = later(
-        default=0, description="Largest additional delay of the force, drawn at random at every tick [ms]."
+        default=0, description="Maximum additional force delay, drawn at random at every tick [ms]."
     )
     force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond this most forces are held values")] = later(
-        default=0, description="Proportion of ticks whose force is lost; the previous force is held."
+        default=0, description="Proportion of ticks at which the force is lost and the previous force is held."
     )
     view: str = later(
         default="tank",
         pattern=r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$",
-        description="tank: the drawn tank; camera: the live picture of this machine's camera; or a video file, its "
-        "path relative to this file.",
+        description="tank: the drawn tank; camera: the live picture from this computer's camera; or the path of a "
+        "video file, relative to this file.",
     )
     overlay: Literal["shown", "hidden"] = later(
         default="shown",
-        description="shown: ball and targets are drawn over a video; hidden: the video is shown instead of them.",
+        description="shown: the ball and the targets are drawn over a video; hidden: the video is shown without them.",
     )
     footage_sha256: SkipJsonSchema[str | None] = later()
     """That of the video file; ``load`` fills it in."""
@@ -119,23 +120,25 @@ class Stimulus(Table):
     itself where it is a ``value``. Levels are evenly spaced in u = log10 L or in u = L.
     """
 
-    condition: Id | None = Field(default=None, description="The condition to vary; default: the only condition.")
+    condition: Id | None = Field(
+        default=None, description="The condition to vary; default: the study's only condition."
+    )
     vary: str = Field(
-        max_length=60, description=f"The parameter to vary, as in simulate --set, or {', '.join(OF_CONDITION)}."
+        max_length=60, description=f"The parameter to vary, named as in simulate --set, or {', '.join(OF_CONDITION)}."
     )
     level: _LevelKind | None = Field(
         default=None,
-        description="weber: (comparison − standard)/standard, the default; difference: comparison − standard, the "
-        "default for a time (…_ms); value: the comparison itself.",
+        description="What a level means. weber: (comparison − standard)/standard (the default); difference: "
+        "comparison − standard (the default for times, …_ms); value: the comparison itself.",
     )
     standards: tuple[float, ...] = Field(
-        default=(), max_length=8, description="The standard stimuli; default: the present value."
+        default=(), max_length=8, description="The standard stimuli; default: the parameter's present value."
     )
     levels: tuple[float, float] = Field(description="The smallest and the largest level.")
     spacing: Literal["log", "linear"] = Field(
-        default="log", description="log: levels in between have even ratios; linear: even steps."
+        default="log", description="Spacing of the levels in between. log: equal ratios; linear: equal steps."
     )
-    steps: Annotated[int, Field(ge=2, le=LEVELS_MOST)] = Field(default=31, description="How many levels there are.")
+    steps: Annotated[int, Field(ge=2, le=LEVELS_MOST)] = Field(default=31, description="Number of levels.")
     direction: Literal["up", "down"] = Field(
         default="up", description="up: comparisons are above the standard; down: below it."
     )
@@ -186,9 +189,13 @@ class Stimulus(Table):
     def _levels_ascend(self) -> Self:
         low, high = self.levels
         if not low < high:
-            raise invalid(f"{low:g} and {high:g}: the first level must be smaller", "levels")
+            raise invalid(f"{low:g} is not less than {high:g}: the first level must be the smaller one", "levels")
         if self.spacing == "log" and low <= 0:
-            raise invalid(f"{low:g} does not have a logarithm", "levels", 'spacing = "linear", or a level above 0')
+            raise invalid(
+                f"{low:g} cannot be spaced logarithmically, because it is not above 0",
+                "levels",
+                'spacing = "linear", or a level above 0',
+            )
         if low < 0 and self.level_kind != "value":
             raise invalid(f"{low:g} is below 0", "levels", 'direction = "down" for comparisons below the standard')
         return self
@@ -196,9 +203,9 @@ class Stimulus(Table):
     @model_validator(mode="after")
     def _standards_make_sense(self) -> Self:
         if self.level_kind == "weber" and any(standard == 0 for standard in self.standards):
-            raise invalid("a Weber fraction of a standard of 0 does not exist", "level", 'level = "difference"')
+            raise invalid("a Weber fraction does not exist for a standard of 0", "level", 'level = "difference"')
         if len(set(self.standards)) < len(self.standards):
-            raise invalid("a standard is listed twice", "standards")
+            raise invalid("the same standard is listed twice", "standards")
         return self
 
 

@@ -17,9 +17,9 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Localised, OfKinds, Table, invalid
 
 Seconds: TypeAlias = Annotated[
-    float, within(0.1, 3600, ("a hand needs 0.1 s to move, and a trial takes less than an hour"))
+    float, within(0.1, 3600, ("a hand needs at least 0.1 s to move, and a trial takes less than an hour"))
 ]
-Radius: TypeAlias = Annotated[float, within(0.5, 100, "a hand at rest trembles by a few tenths of a millimetre")]
+Radius: TypeAlias = Annotated[float, within(0.5, 100, "even a resting hand trembles by a few tenths of a millimetre")]
 Point: TypeAlias = tuple[float, float, float]
 
 
@@ -114,7 +114,7 @@ class Explore(Task):
     kind: Literal["explore"]
     min_s: float = Field(ge=0, le=3600, description="Minimum time before the participant may continue [s].")
     max_s: Seconds = Field(description="Time after which the task ends automatically [s].")
-    instruction: Localised = Field(description="One sentence shown under the tank.")
+    instruction: Localised = Field(description="Sentence shown under the tank.")
 
     activity: ClassVar[str] = "free exploration"
     least_s = property(lambda self: self.min_s)
@@ -148,20 +148,20 @@ class Follow(Task):
     """
 
     kind: Literal["follow"]
-    axis: Literal["x"] = Field(default="x", description="Axis along which the target moves, hand frame.")
+    axis: Literal["x"] = Field(default="x", description="Axis of the hand frame along which the target moves.")
     amplitude_mm: Annotated[float, within(1, 250, "the tank is 10 to 1000 mm wide, and a hand trembles")] = Field(
-        default=20, description="From the middle to either end, hand frame [mm]."
+        default=20, description="Distance from the middle to either end in the hand frame [mm]."
     )
     frequency_hz: Annotated[
         float, within(0.05, 5, "a hand cannot follow a faster motion, and a slower one is hardly a motion")
-    ] = Field(default=1, description="Frequency of the target [Hz].")
-    cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods after the lead, which are evaluated.")
-    radius_mm: Radius = Field(default=6, description="Radius of the target [mm].")
+    ] = Field(default=1, description="Frequency of the target's motion [Hz].")
+    cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods evaluated after the lead-in.")
+    radius_mm: Radius = Field(default=6, description="Target radius [mm].")
     lead_s: Annotated[float, within(0.1, 10, "a hand needs 0.2 s to react; the lead-in is not evaluated")] = Field(
-        default=1, description="Time over which the amplitude rises before the evaluated periods [s]."
+        default=1, description="Time over which the amplitude increases before the evaluated periods [s]."
     )
     instruction: Localised | None = Field(
-        default=None, description="One sentence shown under the tank; default: the program's own text."
+        default=None, description="Sentence shown under the tank; default: the program's own text."
     )
 
     activity: ClassVar[str] = "following a target"
@@ -174,8 +174,8 @@ class Follow(Task):
     def summary(self) -> str:
         swings = f"{self.cycles} swing" if self.cycles == 1 else f"{self.cycles} swings"
         return (
-            f"follow a target of {self.radius_mm:g} mm that swings ±{self.amplitude_mm:g} mm at {self.frequency_hz:g} "
-            f"Hz: {swings} after {self.lead_s:g} s"
+            f"follow a target with a radius of {self.radius_mm:g} mm that oscillates by ±{self.amplitude_mm:g} mm at "
+            f"{self.frequency_hz:g} Hz: {swings} after a lead-in of {self.lead_s:g} s"
         )
 
     @property
@@ -225,18 +225,18 @@ class Reach(Task):
 
     kind: Literal["reach"]
     targets_mm: tuple[tuple[_Millimetres, _Millimetres, _Millimetres], ...] = Field(
-        min_length=2, max_length=100, description="Centres of the targets, hand frame [mm]."
+        min_length=2, max_length=100, description="Target centres in the hand frame [mm]."
     )
-    radius_mm: Radius = Field(description="Radius of a target [mm].")
-    dwell_s: float = Field(ge=0, le=10, description="How long the ball must stay in the lit target [s].")
+    radius_mm: Radius = Field(description="Radius of each target [mm].")
+    dwell_s: float = Field(ge=0, le=10, description="How long the ball must stay in the highlighted target [s].")
     count: int | None = Field(
-        default=None, ge=1, le=1000, description=("Number of targets to reach; alternatively specify duration_s.")
+        default=None, ge=1, le=1000, description=("Number of targets to reach; alternatively, specify duration_s.")
     )
     duration_s: Seconds | None = Field(
-        default=None, description="Duration of the task [s]; alternatively specify count."
+        default=None, description="Duration of the task [s]; alternatively, specify count."
     )
-    timeout_s: Seconds = Field(default=120, description="Time after which the task ends in any case [s].")
-    instruction: Localised = Field(description="One sentence shown under the tank.")
+    timeout_s: Seconds = Field(default=120, description="Maximum duration of the task [s].")
+    instruction: Localised = Field(description="Sentence shown under the tank.")
 
     activity: ClassVar[str] = "reaching targets"
     tracker: ClassVar[str] = "study_app.session.tasks:ReachTracker"
@@ -249,8 +249,8 @@ class Reach(Task):
     def summary(self) -> str:
         end = f"until {self.count} are reached" if self.count is not None else f"for {self.duration_s:g} s"
         return (
-            f"reach for {len(self.targets_mm)} targets of {self.radius_mm:g} mm in turn, {self.dwell_s:g} s in each, "
-            f"{end}, at most {self.timeout_s:g} s"
+            f"reach for {len(self.targets_mm)} targets with a radius of {self.radius_mm:g} mm in turn, "
+            f"staying {self.dwell_s:g} s in each, {end}, for at most {self.timeout_s:g} s"
         )
 
     @property
@@ -289,7 +289,7 @@ class Reach(Task):
         limit, targets = self.duration_s or self.timeout_s, self.count or 1
         if targets * self.dwell_s >= limit:
             subject = "a target" if targets == 1 else f"each of {targets} targets"
-            lasting_s = f"takes as long as the whole task (at most {limit:g} s)"
+            lasting_s = f"takes as long as the whole task (which lasts at most {limit:g} s)"
             raise invalid(f"dwell_s = {self.dwell_s:g} in {subject} {lasting_s}: shorten it", "dwell_s")
         return self
 
@@ -298,8 +298,8 @@ class Reach(Task):
         for index, (target, other) in enumerate(pairwise((*self.targets_mm, self.targets_mm[0])), start=1):
             distance = math.dist(target, other)
             if distance <= 2 * self.radius_mm:
-                apart = f"target {index} and the next are {distance:g} mm apart"
-                raise invalid(f"{apart} and overlap at radius_mm = {self.radius_mm:g}", "targets_mm")
+                apart = f"target {index} and the next one are {distance:g} mm apart"
+                raise invalid(f"{apart} and overlap, because radius_mm is {self.radius_mm:g}", "targets_mm")
         return self
 
 

@@ -99,7 +99,7 @@ def delay_warnings(protocol: Protocol) -> Iterator[str]:
             else _table_warning(protocol, name, listed, delay_ms)
         )
         if problem is not None:
-            yield f"conditions.{name}.force_delay_ms: {problem}, or delay the picture"
+            yield f"conditions.{name}.force_delay_ms: {problem}, or delay the picture instead"
 
 
 def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) -> str | None:
@@ -114,8 +114,9 @@ def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) 
         return None
     force_n = steady_force(protocol.scene_for(name), STIRRED.speed_mps).drag_n
     return (
-        f"with {delay_ms:.3g} ms the passivity controller holds back about {percent:.0f} % of the force from a light "
-        f"hand ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} m/s): choose at most "
+        f"with a delay of {delay_ms:.3g} ms and a light hand, the passivity controller holds back about "
+        f"{percent:.0f} % of the force ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} "
+        "m/s): choose at most "
         f"{most_ms:g} ms"
     )
 
@@ -134,9 +135,9 @@ def _energy_warning(protocol: Protocol, name: str, delay_ms: float) -> str | Non
         return None
     damping = damping_nspm(scene, stroke)
     return (
-        f"with {delay_ms:.3g} ms a force of {damping * stroke.speed_mps:.2g} N at {stroke.speed_mps:.2g} m/s returns "
-        f"{1000 * energy_j:.1f} mJ per motion reversal, and the passivity controller holds back part of it: choose at "
-        f"most {longest_returned_ms(damping, stroke)} ms"
+        f"with a delay of {delay_ms:.3g} ms, a force of {damping * stroke.speed_mps:.2g} N at "
+        f"{stroke.speed_mps:.2g} m/s returns {1000 * energy_j:.1f} mJ per motion reversal, and the passivity "
+        f"controller holds back part of the force: choose at most {longest_returned_ms(damping, stroke)} ms"
     )
 
 

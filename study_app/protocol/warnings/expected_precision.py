@@ -429,20 +429,20 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
     if plan is None:
         return
     if not (found := expected_of(plan)).measured:
-        yield "Expected precision", "none: the levels of most thresholds are clipped"
+        yield "Expected precision", "not available, because the levels for most thresholds are clipped"
         return
     log = found.spacing == "log"
     kind, most = found.worst
     median, worst = (f"×/÷ {10.0**half:.1f}" if log else f"±{half:.2g}{plan.unit}" for half in (found.median, most))
-    one = median if median == worst else f"{median}, at worst {worst} ({kind})"
+    one = median if median == worst else f"{median} (at worst {worst}, {kind})"
     people, precision = _planned(protocol)
-    over = "" if found.standards == 1 else " over all standards"
+    over = "" if found.standards == 1 else " across all standards"
     group = ""
     if people is not None:
-        group = f"; {people} participants ±{100 * found.of_group(people):.0f} %{over}"
+        group = f"; ±{100 * found.of_group(people):.0f} %{over} for {people} participants"
     elif precision is not None and (needed := found.participants_for(precision)) is not None:
-        group = f"; ±{100 * precision:g} %{over} takes {needed} participants"
-    yield "Expected precision", f"{plan.words}one participant {one}{group} (95 % intervals)"
+        group = f"; ±{100 * precision:g} %{over} requires {needed} participants"
+    yield "Expected precision", f"{plan.words}{one} for one participant{group} (95 % intervals)"
 
 
 def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
@@ -453,7 +453,7 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
     found = expected_of(plan)
     if isinstance(plan, ThresholdPlan) and not found.measured:
         clips, named = plan.clipping, "" if plan.clipping is None else plan.clipping.named
-        what = f"levels above {plan.highest:.3g}{named and f' of standard{named}'} are"
+        what = f"levels above {plan.highest:.3g}{named and f' for standard{named}'} are"
         if clips is not None and clips.clips_standard:
             what = f"the standard{named} is"
         yield (
@@ -472,9 +472,9 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
         *([] if wanted is None else [f"{wanted} participants"]),
     ]
     yield (
-        f"{place}.{key}: {plan.trials} trials{plan.per} give ±{100 * reached:.0f} % with "
-        f"{people} planned participants, not ±{100 * precision:g} %: "
-        f"{' or '.join(ways) + ' would on average' if ways else 'a larger analysis.precision'}"
+        f"{place}.{key}: {plan.trials} trials{plan.per} and {people} planned participants give ±{100 * reached:.0f} "
+        f"% instead of ±{100 * precision:g} %; "
+        f"{' or '.join(ways) + ' would suffice on average' if ways else 'choose a larger analysis.precision'}"
     )
 
 

@@ -76,8 +76,9 @@ def _similar_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[st
                 continue
             seen.add(pair)
             yield (
-                f"{liquid} and {other} of block {block.id} are hard to tell apart: {felt[liquid].force_n:.2f} and "
-                f"{felt[other].force_n:.2f} N at {HAND_MPS:g} m/s of the hand; they differ by less than {_TELLING:.0%}"
+                f"{liquid} and {other} in block {block.id} are hard to tell apart: at a hand speed of {HAND_MPS:g} "
+                f"m/s their forces ({felt[liquid].force_n:.2f} and {felt[other].force_n:.2f} N) differ by less than "
+                f"{_TELLING:.0%}"
             )
 
 
@@ -90,14 +91,15 @@ def _liquids_of(protocol: Protocol, block: Block) -> dict[str, None]:
 def _clipped_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[str]:
     for name, it in felt.items():
         if it.limit is not None:
-            limit = "the force limit" if it.limit == "norm" else "the slope limit, which keeps the servo stable,"
+            limit = "the force limit" if it.limit == "norm" else "the slope limit (which keeps the servo stable)"
             scale = _unclipped_scale(protocol.scene_of(name))
             most_percent = protocol.limits.withheld_percent
-            beyond = "" if 100 * (1 - it.force_n / it.drag_n) <= most_percent else ", beyond limits.withheld_percent"
+            is_valid = 100 * (1 - it.force_n / it.drag_n) <= most_percent
+            beyond = "" if is_valid else ", a reduction beyond limits.withheld_percent"
             advice = "" if scale is None else f"; with scene.scale = {scale} it is not clipped"
             yield (
-                f"{name} is clipped: at {HAND_MPS:g} m/s of the hand {limit} lets {it.force_n:.2f} of its "
-                f"{it.drag_n:.2f} N through{beyond}{advice}"
+                f"{name} is clipped: at a hand speed of {HAND_MPS:g} m/s {limit} reduces its {it.drag_n:.2f} N to "
+                f"{it.force_n:.2f} N{beyond}{advice}"
             )
 
 
@@ -119,13 +121,14 @@ def _ignoring_viscosity(protocol: Protocol, felt: dict[str, Steady]) -> Iterator
         if "drag" in liquid.effects and liquid.drag.law == "constant":
             why, instead = "its constant drag coefficient ignores it", f'drag = {{ law = "{REFERENCE}" }}'
         elif felt[name].drag_n == 0.0:
-            named_n, why, instead = 0.0, "its effects omit drag", 'name "drag" among them'
+            named_n, why, instead = 0.0, "its effects do not include drag", 'add "drag" to its effects'
         else:
             continue
         if abs(named_n - true_n) > max(scene.accuracy.relative * true_n, scene.accuracy.absolute_n):
             yield (
-                f"{name} has a viscosity, but {why}: at {HAND_MPS:g} m/s of the hand its drag is {named_n:.2f} instead "
-                f'of {true_n:.2f} N, an error of {abs(named_n - true_n):.2f} N: write effects = "auto" or {instead}'
+                f"{name} has a viscosity, but {why}: at a hand speed of {HAND_MPS:g} m/s its drag is {named_n:.2f} "
+                f'instead of {true_n:.2f} N, an error of {abs(named_n - true_n):.2f} N; write effects = "auto", or '
+                f"{instead}"
             )
 
 
@@ -139,8 +142,8 @@ def _practised_liquids(protocol: Protocol) -> Iterator[str]:
         for name in used[block.id]:
             if name in judged:
                 yield (
-                    f"practice block {block.id} presents {name}, and so does block {judged[name]}: participants then "
-                    "know it from practice"
+                    f"practice block {block.id} presents {name}, which is also in block {judged[name]}, so "
+                    "participants will already know it from practice"
                 )
 
 
@@ -151,8 +154,8 @@ def _balls_of_different_sizes(protocol: Protocol) -> Iterator[str]:
         if len(sizes) > 1:
             listed = ", ".join(f"{size:g}" for size in sorted(sizes))
             yield (
-                f"block {block.id} shows balls of different sizes ({listed} mm): participants can tell its conditions "
-                "apart by sight"
+                f"block {block.id} shows balls of different sizes ({listed} mm): participants can see which "
+                "condition is which"
             )
 
 
@@ -201,7 +204,7 @@ def _unpaced_blocks(protocol: Protocol, block: Block) -> Iterator[str]:
         fast_hz = fastest_hz(protocol.scene.velocity, protocol.device.rate_hz, 1 - error_percent / 100)
         yield (
             f"tasks.{block.task}: in motions above {fast_hz:.1f} Hz the velocity estimator removes more than "
-            f"{error_percent:g} % of a damper's force; such trials are repeated; {PACED}"
+            f"{error_percent:g} % of a damper's force; such trials are repeated, so {PACED}"
         )
 
 
@@ -221,15 +224,15 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
             gives_none = force_n(protocol.scene_for(name), stroke) < LEAST_N
             for key, place in places.items():
                 if key == DELAY and name in hides:
-                    yield f'{place}: the ball is hidden, so participants cannot see its delay; write ball = "shown"'
+                    yield f'{place}: the ball is hidden, so participants cannot see its delay: write ball = "shown"'
                 elif key in OF_LINK and (without_force or gives_none):
                     what = f"{without_force or 'the condition'} does not produce force"
                     yield f"{place}: {what}, so participants cannot feel whether it is late or lost"
         of_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
         if without_force and of_liquids and block.phase == "main":
-            seen = ": participants see how the liquids slow the ball down, but do not feel it"
+            seen = ", so participants see but do not feel how the liquids slow the ball down"
             seen = (
-                ", and the ball is hidden: participants cannot perceive its liquids"
+                ", and the ball is hidden, so participants cannot perceive the block's liquids"
                 if len(hides) == len(conditions)
                 else seen
             )
@@ -242,8 +245,8 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
     for block in protocol.main_blocks:
         if block.order == "fixed" and block.design is None and len(block.conditions) > 1:
             yield (
-                f"blocks.{block.id}.order: all participants experience the {protocol.compared_in(block.id)} in "
-                "one order, so their effect is confounded with practice and fatigue; choose shuffled, latin or "
+                f"blocks.{block.id}.order: all participants experience the {protocol.compared_in(block.id)} in the "
+                "same order, so their effect is confounded with practice and fatigue; choose shuffled, latin or "
                 "williams"
             )
         yield from _forced_choice_warnings(protocol, block)
@@ -256,8 +259,8 @@ def _analysis_warnings(protocol: Protocol) -> Iterator[str]:
         )
     if decided is not None and decided.participants is None:
         yield (
-            "analysis.participants is missing: a study that ends at the first significant result has more "
-            "false positives than alpha"
+            "analysis.participants is missing: a study that stops at the first significant result has a "
+            "false-positive rate above alpha"
         )
     yield from _attribute_groups(protocol)
     yield from _block_order_warnings(protocol)
@@ -272,7 +275,7 @@ def _attribute_groups(protocol: Protocol) -> Iterator[str]:
         if suggests_attribute(name):
             yield (
                 f"groups.{name}: the name suggests an attribute that participants already have, but groups are "
-                'randomised; if so, choose study.group_assignment = "pre-existing"'
+                'randomised; if they do have it, choose study.group_assignment = "pre-existing"'
             )
 
 
@@ -289,8 +292,9 @@ def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
     for number, contrast in enumerate(() if protocol.analysis is None else protocol.analysis.contrasts):
         if len(contrast.blocks) == 2 and protocol.study.block_order == "fixed" and not protocol.groups:
             yield (
-                f"analysis.contrasts.{number}: all participants have {' and '.join(contrast.blocks)} in one "
-                "order, so their difference is confounded with practice and fatigue; choose study.block_order "
+                f"analysis.contrasts.{number}: all participants complete {' and '.join(contrast.blocks)} in the same "
+                "order, so the difference between them is confounded with practice and fatigue; choose "
+                "study.block_order "
                 '= "balanced"'
             )
     blocks = protocol.blocks_in_order
@@ -298,8 +302,8 @@ def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
     for block in blocks[main[0] : main[-1]] if main and protocol.study.block_order != "fixed" else ():
         if block.phase != "main":
             yield (
-                f"study.block_order: block {block.id} ({block.phase}) keeps its position while the main blocks "
-                "change; put it before the first main block"
+                f"study.block_order: block {block.id} ({block.phase}) keeps its position while the order of the "
+                "main blocks varies; put it before the first main block"
             )
 
 
@@ -309,8 +313,8 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     alone = block.design is None and block.questionnaire is not None and len(conditions) == 1
     if alone and len(protocol.main_blocks) > 1:
         yield (
-            f"blocks.{block.id}.conditions: has only one condition, so there is nothing to compare it with; a "
-            "main block needs two"
+            f"blocks.{block.id}.conditions: there is only one condition, so there is nothing to compare it with; a "
+            "main block needs at least two"
         )
     if protocol.compared_in(block.id) == "delays":
         for delay_ms, other in pairwise(sorted({condition.delay_ms for condition in conditions})):
@@ -326,7 +330,7 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     for name in sorted(
         {*block.conditions, *(liquid for condition in conditions for liquid in condition.liquid_ids)} & title_words
     ):
-        yield f"blocks.{block.id}.setting_label: mentions the condition “{name}”, which participants then know"
+        yield f"blocks.{block.id}.setting_label: names the condition “{name}”, which reveals it to participants"
 
 
 def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Iterator[str]:
@@ -347,7 +351,7 @@ def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Itera
         if len(differing) > 1:
             yield (
                 f"blocks.{block.id}.conditions: “{name}” and the standard “{standard}” differ in "
-                f"{' and '.join(differing)}: answers cannot tell which of them was noticed"
+                f"{' and '.join(differing)}: answers do not show which of these was noticed"
             )
 
 
@@ -358,14 +362,14 @@ def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
     if block.catch is None and has_correct_answer(design, stimulus):
         yield (
-            f"blocks.{block.id}.catch: catch trials are missing, so participants who guess cannot be "
-            "distinguished from participants with a high threshold"
+            f"blocks.{block.id}.catch: catch trials are missing, so participants who merely guess cannot be told "
+            "apart from participants with a high threshold"
         )
     factor = method_of(protocol, block).assumed(stimulus, design).width_prior[1]
     if factor < _NARROW:
         yield (
-            f"methods.{block.method}.width_prior: a factor of {factor:g} lets the prior determine the slope and "
-            f"bias the thresholds of other participants; choose {_NARROW:g} or more"
+            f"methods.{block.method}.width_prior: a factor of {factor:g} is so narrow that the prior determines the "
+            f"slope and biases the thresholds of participants with other slopes; choose {_NARROW:g} or more"
         )
 
 
@@ -377,8 +381,8 @@ def _unbracketed_value(protocol: Protocol, number: int, published: Published) ->
     levels = method_of(protocol, block).levels_of(stimulus_of(protocol, block))
     if not min(levels) <= published.value <= max(levels):
         yield (
-            f"analysis.published.{number}.value: {published.value:g} is outside the levels of block {block.id}, "
-            f"{min(levels):g} to {max(levels):g}; such a threshold cannot be measured"
+            f"analysis.published.{number}.value: {published.value:g} is outside the levels of block {block.id} "
+            f"({min(levels):g} to {max(levels):g}), so such a threshold cannot be measured"
         )
 
 
@@ -389,8 +393,8 @@ def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
     for name in dict.fromkeys(block.task for block in protocol.main_blocks):
         if isinstance(protocol.tasks[name], Reach):
             yield (
-                f"tasks.{name}: a trial that ends without any target reached is valid; set "
-                "limits.targets_percent to the minimum proportion of targets"
+                f"tasks.{name}: a trial is valid even if no target is reached; set limits.targets_percent to the "
+                "minimum proportion of targets"
             )
 
 
@@ -399,8 +403,8 @@ def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
         of = questionnaire.instrument
         if of is not None and (recalled := instrument(of).get("from_memory")) is not None:
             yield (
-                f"questionnaires.{name}: written from memory, not compared with a source ({recalled}); compare "
-                "it with your copy"
+                f"questionnaires.{name}: its texts were written from memory and not compared with a source "
+                f"({recalled}); compare them with your copy"
             )
 
 
@@ -409,4 +413,7 @@ def _untitled_forms(protocol: Protocol) -> Iterator[str]:
     others = [language_name(language) for language in protocol.study.languages if language != "en"]
     for name in protocol.forms if others else ():
         if protocol.questionnaires[name].title is None:
-            yield f"questionnaires.{name}.title: is missing; participants see the ID as heading: add it in {others[0]}"
+            yield (
+                f"questionnaires.{name}.title: is missing, so participants see the ID as the heading; add a title "
+                f"in {others[0]}"
+            )

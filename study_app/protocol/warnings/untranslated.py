@@ -87,10 +87,10 @@ def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) ->
     texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
     for (language, source), count in Counter((text.language, text.source) for text in texts).items():
         stated, wanted = language_name(source), language_name(language)
-        what = f"{counted(count, 'text')} to translate to {wanted}, still in {stated}"
+        what = f"{counted(count, 'text')} to translate into {wanted}, still in {stated}"
         if only_one:
             are = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
-            what = f"{are} still in {stated} but the study's only language is {wanted}"
+            what = f"{are} still in {stated}, but the study's only language is {wanted}"
         of_these = [text for text in texts if (text.language, text.source) == (language, source)]
         yield f"study.languages: {what}{f': {listed_places(of_these)}' if lists_places else ''}"
 
@@ -107,8 +107,8 @@ def check_translated(document: Mapping[str, Any]) -> None:
         language, source = language_name(texts[0].language), language_name(texts[0].source)
         count = f"{counted(len(texts), 'text')} on {language} pages {'is' if len(texts) == 1 else 'are'}"
         raise SessionError(
-            f"{count} still in {source}: {listed_places(texts)}; translate what the designer lists under Languages, or "
-            "run a pilot session"
+            f"{count} still in {source}: {listed_places(texts)}; translate the texts that the designer lists under "
+            "Languages, or run a pilot session"
         )
 
 

@@ -98,10 +98,10 @@ def read_language(file: File) -> Words:
     try:
         table = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise StudyError(f"{file} cannot be read as TOML ({error}): correct it") from error
+        raise StudyError(f"{file} cannot be read as TOML ({error}): correct the file") from error
     faults = [*_language_faults("", _ENGLISH, table)]
     if table.get("language") != file.stem:
-        faults.append(f'language must be "{file.stem}", like the file name')
+        faults.append(f'language must be "{file.stem}", as in the file name')
     if faults:
         more = f"; and {len(faults) - _SHOWN} more" if len(faults) > _SHOWN else ""
         raise StudyError(f"{file}: {'; '.join(faults[:_SHOWN])}{more}")
@@ -129,7 +129,10 @@ def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str,
         elif key == "interval_coming" and len(text) != len(model):
             yield f"{place}{key} needs {len(model)} texts"
         elif isinstance(text, str) and (wrong := _wrong_slots(text, model)):
-            yield f"{place}{key} must contain the same slots as “{model}”; different: {{{'}, {'.join(sorted(wrong))}}}"
+            yield (
+                f"{place}{key} must contain the same placeholders as “{model}”; these differ: "
+                f"{{{'}, {'.join(sorted(wrong))}}}"
+            )
 
 
 def _wrong_slots(text: str, model: str) -> set[str]:
@@ -156,7 +159,7 @@ def own_languages(folder: File) -> tuple[dict[str, Words], dict[str, str]]:
         return {}, {folder.name: f"{folder} cannot be read ({error.strerror})"}
     for file in files:
         if file.stem in SHIPPED:
-            refused[file.stem] = f"{file}: the program contains this language; remove the file"
+            refused[file.stem] = f"{file}: the program already includes this language; remove the file"
             continue
         try:
             languages[file.stem] = read_language(file)
@@ -194,7 +197,7 @@ def language_name(code: str) -> str:
 
 def missing_text(path: Path, language: str) -> Fault:
     """Return the fault about a text missing in one of the study's languages."""
-    hint = f"add {language}: every text must exist in every language of the study"
+    hint = f"add {language}: every text is needed in every language of the study"
     return Fault(path, f"is missing in {language_name(language)}", hint, missing_language=language, kind="no text")
 
 
@@ -202,7 +205,7 @@ def words(language: str) -> Words:
     """Return the texts of a language (StudyError if there are none)."""
     if language not in LANGUAGES:
         raise StudyError(
-            f'the program does not have texts for participants\' pages in "{language}" '
+            f'the program does not have texts for the participant\'s pages in "{language}" '
             f"({did_you_mean(language, LANGUAGES)})"
         )
     return LANGUAGES[language]

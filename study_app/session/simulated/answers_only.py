@@ -289,11 +289,11 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
     lines.until = step
     answering.run(until=step)
     if step and answering.state.index < step:
-        raise SessionError(f"step {step + 1} is not reached: {lines.reason or 'the session ends before it'}")
+        raise SessionError(f"step {step + 1} is not reached: {lines.reason or 'the session ends before this step'}")
     clock = SessionClock(lambda: 0, datetime.now().astimezone() - timedelta(seconds=passed.seconds))
     with begin_session(results, study, source, start, clock=clock) as store:
         if store.key.codes != shown.codes:
-            raise SessionError(f"{results} contains sessions with another seed: use a new folder")
+            raise SessionError(f"{results} contains sessions with a different seed: use a new folder")
         if step:
             text = f"Steps 1 to {step} were answered by a simulated participant, without force."
             store.append(Note(kind="note", text=text), t_s=0.0, waits=False)

@@ -47,6 +47,6 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
             yield (
                 f"{where}: level {' and '.join(missed)} cannot be delivered to a hand that follows the target, "
                 "because the safety layer removes energy that the liquid returns. Such trials are repeated and "
-                "stay unanswered. Choose a smaller scene.scale, or effects without added_mass, history and "
+                "remain unanswered. Choose a smaller scene.scale, or effects without added_mass, history and "
                 "unsteady_drag"
             )

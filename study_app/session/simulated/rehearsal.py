@@ -199,7 +199,7 @@ def rehearsal_rig(study: Protocol, person: str, seed: int, device: str) -> Rig:
     """Return a device with a simulated hand, and its servo on a virtual clock that only the servo advances."""
     if not descriptor_of(device).moves_by_itself:
         alone = " or ".join(device.name for device in all_devices() if device.moves_by_itself)
-        raise SessionError(f"device '{device}' needs a person: rehearse with {alone}")
+        raise SessionError(f"device '{device}' needs a person to move it: rehearse with {alone}")
     settings = study_settings(study, stream(seed, f"rehearsal/{person}/hand"))
     rig = open_rig(device, settings, clock=VirtualClock())
     if hand_of(rig.device) is None:
@@ -403,7 +403,7 @@ class RehearsedSession(SimulatedParticipant):
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
             raise SessionError(
-                f"{', '.join(map(repr, sorted(unknown)))} does not occur on this page: answer {possible}"
+                f"{', '.join(map(repr, sorted(unknown)))} does not occur on this page; questions on it: {possible}"
             )
         visible = [
             item for item in page.items if item.id in shown_questions(page.items, answers) and item.id in answers
@@ -585,7 +585,7 @@ def finish_session(
     else:  # the program was killed between the session's last line and its proofs
         rebuild_session(session.path)
         if progress is not None:
-            progress(f"{participant}: tables and checksums of the finished session rebuilt")
+            progress(f"{participant}: rebuilt the tables and checksums of the finished session")
 
 
 def _run_to_end(
@@ -600,7 +600,7 @@ def _run_to_end(
         rehearsal.run()
     if progress is not None:
         took_s = time.perf_counter() - began
-        held = f"{store.clock.seconds() / 60:.1f} min of session in {took_s:.1f} s (simulated)"
+        held = f"{store.clock.seconds() / 60:.1f} min of session time simulated in {took_s:.1f} s"
         missing = f"; {store.missing_trials}" if store.missing_trials.count else ""
         answers = sum(progress_of(store.lines).answered.values())
         progress(f"{participant}: {answers} responses, {held}, fingerprint {store.fingerprint}{missing}")

@@ -89,7 +89,9 @@ def choose_language(state: SessionState, event: LanguageChosen) -> Result:
         return state, ()
     if event.language not in state.languages:
         offered = (
-            f"choose {' or '.join(state.languages)}" if state.languages else "the language is chosen before the consent"
+            f"choose {' or '.join(state.languages)}"
+            if state.languages
+            else "the language is chosen before the consent page"
         )
         raise SessionError(f"language {event.language!r} cannot be chosen now: {offered}")
     chosen = replace(state, plan=replace(state.plan, language=event.language))

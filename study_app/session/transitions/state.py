@@ -135,7 +135,7 @@ class SessionState:
         """The id of the current text page; raises SessionError if there is none."""
         if isinstance(step := self.step, PageStep):
             return step.page_id
-        raise SessionError("a page is not being read now: wait for the next page")
+        raise SessionError("no page is currently being read: wait for the next page")
 
     @property
     def stays_until_s(self) -> float | None:
@@ -156,7 +156,7 @@ class SessionState:
         """The current trial; raises SessionError if there is none."""
         if isinstance(step := self.step, Trial):
             return step
-        raise SessionError("a trial is not running now: wait for the next trial")
+        raise SessionError("no trial is currently running: wait for the next trial")
 
     @property
     def task(self) -> AnyTask:
@@ -219,5 +219,7 @@ class SessionState:
         if isinstance(self.step, FormStep):
             return self.plan.protocol.questionnaires[self.step.form]
         if (questionnaire := self.plan.protocol.questionnaire_of(self.trial.block)) is None:
-            raise SessionError(f"block {self.trial.block!r} does not have a questionnaire: there is nothing to answer")
+            raise SessionError(
+                f"block {self.trial.block!r} does not have a questionnaire, so there is nothing to answer"
+            )
         return questionnaire

@@ -272,7 +272,7 @@ def submit_answers(state: SessionState, event: Submitted) -> Result:
     missing = [n for n, item in numbered if state.questionnaire.item(item).required and not answers[item].given]
     if missing:
         listed = ", ".join(map(str, missing))
-        raise SessionError(f"not every required statement is answered: answer {listed} first")
+        raise SessionError(f"some required statements have not been answered: answer {listed} first")
     items = tuple(
         Response(item=item, number=number, kind=state.questionnaire.item(item).kind_id, **asdict(answers[item]))
         for number, item in numbered
@@ -321,13 +321,13 @@ def _page_fields(state: SessionState) -> dict[str, Any]:
 def _check_item(state: SessionState, item: str) -> None:
     if item not in state.items:
         listed = ", ".join(state.items)
-        raise SessionError(f"item {item!r} is not on this page: its items are {listed}")
+        raise SessionError(f"item {item!r} is not on this page, which has the items {listed}")
 
 
 def _check_shown(state: SessionState, item: str) -> None:
     _check_item(state, item)
     if item not in state.shown:
-        raise SessionError(f"item {item!r} is not shown: an earlier answer hides it")
+        raise SessionError(f"item {item!r} is not shown, because an earlier answer hides it")
 
 
 def _remove_answer(state: SessionState, item: str) -> Result:

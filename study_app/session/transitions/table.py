@@ -119,9 +119,11 @@ def initial_state(
     """
     if language not in protocol.study.languages:
         known = ", ".join(protocol.study.languages)
-        raise SessionError(f"language {language!r}: {protocol.study.name} is available in {known}; choose one of these")
+        raise SessionError(
+            f"language {language!r}: {protocol.study.name} is available only in {known}; choose one of these languages"
+        )
     if not secret and any(block.design is not None for block in protocol.blocks.values()):
-        raise SessionError("the levels of this study are drawn from the sealed key: the secret of the key is required")
+        raise SessionError("the levels in this study are drawn from the sealed key, so the key's secret is required")
     return SessionState(plan=Plan(protocol, schedule, key, language, start, secret))
 
 
@@ -130,7 +132,7 @@ def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Comm
     move = _TRANSITIONS.get((state.phase, type(event)))
     if move is None:
         if state.stall is not None:
-            waits = f"{state.stall.reason}; the session waits until then"
+            waits = f"{state.stall.reason}; until then, the session waits"
             raise SessionError(f"{type(event).__name__} cannot happen while {state.phase.value}: {waits}")
         taken = ", ".join(sorted(kind.__name__ for phase, kind in _TRANSITIONS if phase is state.phase))
         raise SessionError(

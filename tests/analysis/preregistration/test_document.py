@@ -68,7 +68,7 @@ def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() ->
     text = preregistration(study(*edits, ("part = 1\n", ""), ('code_prefix = "V"\n', ""), more=more), "0" * 64)
     assert "- Block rate: d_a of each level relative to the lowest, from the area under the ROC curve." in text
     assert "Block viscosity: d_a" not in text
-    assert "at d_a = 1: one participant ±" in text
+    assert "at d_a = 1: ±" in text
 
 
 def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:

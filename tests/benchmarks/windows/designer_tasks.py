@@ -99,7 +99,7 @@ class Tasks:
     def changes(self) -> None:
         """What differs from the version that was saved."""
         self.user.choose("Study", "Three drinks  ·  threedrinks.toml")
-        self.user.choose("View of the study", "Changes")
+        self.user.choose("Study view", "Changes")
         texts = self.user.window.findChildren(QPlainTextEdit)
         wait_until(lambda: any(it.toPlainText() for it in texts if it.accessibleName() == "Differences"), "differences")
 
@@ -147,7 +147,7 @@ class Tasks:
         user.write("Title", "Thicker", accept=False)
         user.press("Make study")
         user.select("Viscosity", "Session, in order")
-        user.choose("View of the study", "Participant")
+        user.choose("Study view", "Participant")
         for _ in range(9):
             user.press("Next step")
         user.shortcut("F5", "Play from here")
@@ -160,7 +160,7 @@ class Tasks:
         """Are the planned people enough, and which level is clipped."""
         user = self.user
         user.select("Viscosity", "Session, in order")
-        user.choose("View of the study", "Measures")
+        user.choose("Study view", "Measures")
         wait_until(lambda: any("studies within ±" in label.text() for label in user.window.findChildren(QLabel)
                                if label.isVisible()), "the numbers", 120_000)  # fmt: skip
 

@@ -122,7 +122,7 @@ def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
 
 @pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
 def test_check_id_refuses_what_is_no_id(name: str) -> None:
-    with pytest.raises(StudyError, match="is not a valid ID: write at most"):
+    with pytest.raises(StudyError, match="is not a valid ID: use at most"):
         check_id(name)
 
 
@@ -149,10 +149,10 @@ def study() -> Study:
     [
         ((2000,), "2000 is not permitted: Visual delay is at most 1000"),
         ((-5, 30), "-5 is not permitted: Visual delay is at least 0"),
-        ((30, 30.0), "30 is listed twice, or is the value of the original"),
-        ((30, 0), "0 is listed twice, or is the value of the original"),
-        ((), "a series has 1 to 24 copies"),
-        (tuple(range(1, 26)), "a series has 1 to 24 copies"),
+        ((30, 30.0), "30 is listed twice or equals the original's value"),
+        ((30, 0), "0 is listed twice or equals the original's value"),
+        ((), "a series must have 1 to 24 copies"),
+        (tuple(range(1, 26)), "a series must have 1 to 24 copies"),
     ],
 )
 def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, ...], why: str) -> None:
@@ -203,7 +203,7 @@ def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_
     count = sum(any(map(str.isalpha, str(text["en"]))) for _, text in texts_of(translated))
     assert (translated.faults, copied_texts(translated)) == ((), {"nl": count, "de": count})
     assert words(translated) == [
-        f"study.languages: {count} texts to translate to {name}, still in English" for name in ("Dutch", "German")
+        f"study.languages: {count} texts to translate into {name}, still in English" for name in ("Dutch", "German")
     ]
     assert (copied_texts(DEMO), words(DEMO)) == ({}, [])
     for edit in (Set((*TITLE, "nl"), "Een eerste blik"), Unset((*TITLE, "nl"))):

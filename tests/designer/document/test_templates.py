@@ -136,7 +136,7 @@ def test_new_refuses_to_overwrite(protocols: Path) -> None:
     before = (protocols / "mine.toml").read_bytes()
     again = new("mine", "--template", "rate-realism")
     assert isinstance(again.exception, StudyError)
-    assert str(again.exception).endswith('mine.toml is already there; "mine2" is free')
+    assert str(again.exception).endswith('mine.toml already exists; "mine2" is free')
     assert (protocols / "mine.toml").read_bytes() == before
 
 

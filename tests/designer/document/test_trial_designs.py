@@ -140,18 +140,20 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     entries = {entry.words: entry for entry in addable_elements(study, ())}
     slime = entries["Slime liquid (slime)"]
     assert isinstance(slime.asks, AddLiquid)
-    assert slime.help.endswith("The scale of the scene becomes 3, as there, for all liquids.")
+    assert slime.help.endswith("The scene's scale becomes 3 for all liquids, as in that study.")
     other = after(study, SetValue(("scene", "scale"), 10))
-    assert slime.asks.help(other).endswith("Its forces differ: there the scale of the scene is 3, here 10.")
+    assert slime.asks.help(other).endswith(
+        "Its forces differ, because the scene's scale is 3 in that study and 10 in this one."
+    )
     assert after(other, slime.asks).document["scene"] == {"scale": 10}
     same = after(study, SetValue(("scene", "scale"), 3))
-    assert slime.asks.help(same) == "As in the shipped study slime, with all its numbers"
+    assert slime.asks.help(same) == "Copied from the shipped study slime, with all its values"
     added = after(study, slime.asks)
     assert added.faults == ()
     assert added.document["scene"] == {"scale": 3}
     assert "slime_2 is clipped" not in warned(added)
     clipped = warned(after(added, SetValue(("scene", "scale"), 10)))
-    assert "17.36 N through, beyond limits.withheld_percent; with scene.scale = 3 it is not clipped" in clipped
+    assert "to 17.36 N, a reduction beyond limits.withheld_percent; with scene.scale = 3 it is not clipped" in clipped
     table = added.document["liquids"]["slime_2"]
     assert dict(table) == dict(shipped_liquids()["slime", "slime"])
     assert added.document["conditions"]["slime_2"] == {"liquid": "slime_2"}

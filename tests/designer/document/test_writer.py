@@ -187,13 +187,13 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
 @pytest.mark.parametrize(
     ("edit", "sentence"),
     [
-        (Unset(("b",)), "there is no b in the study anymore"),
+        (Unset(("b",)), "the study no longer contains b"),
         (Set(("a", "b"), 1), "a is not a table"),
-        (Set(("c",), None), "a value cannot be empty: remove the key"),
+        (Set(("c",), None), "a value cannot be empty: remove its key instead"),
         (Set(("c",), {"d": "\ud800"}), "incomplete character"),
         (Duplicate(("a",), "l"), 'the name "l" is taken'),
         (Rename(("a",), "l"), 'the name "l" is taken'),
-        (Move(("l", 0), 2), "cannot move to place 3"),
+        (Move(("l", 0), 2), "cannot be moved to position 3"),
         (Insert(("l", 4), 1), "does not have position 4"),
         (Unset(("l", 7)), "there is no 8"),
     ],

@@ -126,7 +126,7 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     qtbot.mouseClick(likert.place.header.version, Qt.MouseButton.LeftButton)
     changes = likert.controller.changes
     assert changes.version.currentText().startswith("1.0: 1 pilot, last today")
-    assert changes.note.text() == "The study does not differ from this version."
+    assert changes.note.text() == "The study is identical to this version."
     lines = lines_of(study)
     (shown,) = sessions(likert.results, {})
     played = datetime.fromisoformat(next(line["at"] for line in lines if line["event"] == "session_resumed"))
@@ -233,7 +233,7 @@ def test_another_device_is_asked_for_and_a_fault_ahead_is_named(
     mouse = next(action for action in header.play.menu.actions() if action.text().startswith("Mouse"))
     mouse.trigger()
     press_f5(qtbot, likert)
-    assert "with the device Mouse? This device does not produce force" in header.strip.words.text()
+    assert "using the device Mouse? This device does not produce force" in header.strip.words.text()
     qtbot.keyClick(header.strip.buttons["close"], Qt.Key.Key_Escape)
     assert not header.strip.isVisible()
     press_f5(qtbot, likert)

@@ -28,9 +28,8 @@ from tests.designer.support.inputs import Hand, name_of, wait_until, window_in_f
 MOST_TABS = 120
 COLUMN_PX = 400
 STEP_MS = 40
-VIEWS = "View of the study"
-"""The tabs of the views, to which their key goes when it is pressed again."""
-AREAS = (("Header", "ctrl+5"), ("Outline", "ctrl+1"), ("Form", "ctrl+2"), ("Views of the study", "ctrl+3"))
+VIEWS = "Study viewThe tabs of the views, to which their key goes when it is pressed again."
+AREAS = (("Header", "ctrl+5"), ("Outline", "ctrl+1"), ("Form", "ctrl+2"), ("Study views", "ctrl+3"))
 
 
 def place_of(box: QComboBox, words: str) -> int:
@@ -270,8 +269,8 @@ class KeyUser(User):
         if not self.outline.tree.hasFocus():
             self.key("ctrl+1")
         self.key("Insert")
-        wait_until(lambda: self.sees("What can be added"), "the list of additions", 3000)
-        listed = self.part("What can be added")
+        wait_until(lambda: self.sees("Elements that can be added"), "the list of additions", 3000)
+        listed = self.part("Elements that can be added")
         self.type(words)
         for _ in range(listed.count()):  # type: ignore[attr-defined]  # a list of Qt
             if listed.currentItem().text() == words:  # type: ignore[attr-defined]
@@ -381,9 +380,9 @@ class MouseUser(User):
     def add(self, words: str) -> None:
         self.open_outline()
         self.press("Add an element (Insert)")
-        wait_until(lambda: self.sees("What can be added"), "the list of additions", 3000)
+        wait_until(lambda: self.sees("Elements that can be added"), "the list of additions", 3000)
         self.type(words)
-        listed = self.part("What can be added")
+        listed = self.part("Elements that can be added")
         places = range(listed.count())  # type: ignore[attr-defined]  # a list of Qt
         at = next(at for at in places if listed.item(at).text() == words)  # type: ignore[attr-defined]
         self.click_row(listed, listed.model().index(at, 0))  # type: ignore[attr-defined, arg-type]

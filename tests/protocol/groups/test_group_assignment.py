@@ -71,7 +71,7 @@ def test_check_states_the_balance_of_each_group() -> None:
     """16 participants are 8 per group, and each of the two orders comes 4 times there."""
     for study, assignment in ((experts(), "randomised in permuted"), (experts(PREEXISTING), "pre-existing: entered")):
         text = describe(study)
-        assert text.count("8 participants per group have each block in each position 4 times") == 2
+        assert text.count("with 8 participants per group each block is in each position 4 times") == 2
         assert assignment in text
 
 
@@ -89,7 +89,7 @@ def test_the_preregistration_says_how_groups_are_formed() -> None:
     assert "permuted blocks" not in text
     assert "belong to the groups experts and novices by an existing attribute" in text
     assert "Groups are not randomised" in text
-    assert "The order of blocks is balanced: 2 orders, by the place in the group" in text
+    assert "The order of blocks is balanced: 2 orders, assigned by the position in the group" in text
 
 
 def test_groups_are_dealt_by_their_shares() -> None:

@@ -100,5 +100,5 @@ def test_where_limits_clip_the_levels_no_precision_is_expected():
             f"stimuli.damping.levels: ±15 % cannot be reached at a threshold of 0.11: {what} clipped"
         ]
         assert dict(precision_rows(clipped, clipped.blocks["thicker"])) == {
-            "Expected precision": "none: the levels of most thresholds are clipped"
+            "Expected precision": "not available, because the levels for most thresholds are clipped"
         }
