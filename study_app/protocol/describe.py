@@ -80,7 +80,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         *(_question_lines(protocol, name, language) for name in protocol.questionnaires),
         _titled("Decisions about the analysis", decided),
         *([] if people is None else [_titled("Simulated participants", [("Answers", people.described())])]),
-        _titled("Limits of a valid trial", limit_rows(protocol)),
+        _titled("Limits for a valid trial", limit_rows(protocol)),
         *([("Warnings", *warned)] if warned else []),
     )
     return "\n\n".join("\n".join(section) for section in sections)
@@ -240,7 +240,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         felt_n = [steady_force(level_scene, pace_mps).drag_n for level_scene in scenes]
         fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(compared) :])
         yield (
-            "Force at the paced speed",
+            "Force when paced",
             f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
             f"{FASTER:g} times that speed",
         )

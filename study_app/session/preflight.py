@@ -273,7 +273,11 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
     about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:
         yield Check(
-            "Free space", "warning", "not known", about=about, advice="The system does not report the free space."
+            "Free space",
+            "warning",
+            "not known",
+            about=about,
+            advice="The operating system does not report the free space.",
         )
     else:
         value, well = f"{_megabytes(facts.free_bytes)} MB free", facts.free_bytes >= needed

@@ -152,7 +152,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     ended = next((line for line in own if isinstance(line, _ENDS) and line.which == which), None)
     samples, times_s = _timed_samples(recorded, own, last=at + 1 == len(begins))
     if not len(samples):
-        raise StoreError(f"the recording of {named} is empty: choose another trial")
+        raise StoreError(f"the recording for {named} is empty: choose another trial")
     page = _page(study, session.receipt, lines, started, which[-1])
     lasted_s = None if ended is None else ended.others.get("duration_s")
     tracker = new_tracker(page.task)

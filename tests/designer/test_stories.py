@@ -321,7 +321,7 @@ def versions(story: Story) -> None:
     ran("P009", early, started_at="2026-11-18T12:00:00+00:00")
     story.act("compare", lambda: card.compare_with(protocol_hash(early)))
     differences = " ".join(told(designer.place.pane))
-    assert 'study.version: "0.9" before, "1.1" now' in differences
+    assert 'study.version: previously "0.9", now "1.1"' in differences
     assert "300" not in differences, "what the conditions were is sealed"
 
 

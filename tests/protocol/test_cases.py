@@ -81,9 +81,9 @@ def test_windows_line_ends_change_nothing() -> None:
     ("text", "said"),
     [
         ("a = " + "[" * 3000 + "]" * 3000, "file: is nested too deeply"),
-        ("format = " + "9" * 6000, "file: contains a whole number beyond 64 bits"),
-        (SOUND.replace('en = "Small"', f'en = "{"a" * 5000}"'), "more than 500"),
-        (SOUND.replace('en = "Read this."', f'en = "{"read " * 5000}"'), "more than 20000"),
+        ("format = " + "9" * 6000, "file: contains a whole number of more than 64 bits"),
+        (SOUND.replace('en = "Small"', f'en = "{"a" * 5000}"'), "at most 500 are"),
+        (SOUND.replace('en = "Read this."', f'en = "{"read " * 5000}"'), "at most 20000 are"),
         (SOUND.replace("[tasks.explore]", f"[tasks.{'a' * 5000}]"), "is longer than 60"),
         (SOUND.replace('version = "1.0"', f'version = "{"1" * 5000}"'), "longer than 40"),
         (SOUND.replace('task = "reach"', f'task = "{"task.x" * 1000}"'), "there is no task"),
@@ -110,7 +110,7 @@ def test_a_title_in_any_script_is_a_title(text: str) -> None:
     [
         ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "1", 0, "Duration"),
         ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "2", 2,
-         "gives up to 25.6 N·s/m at the hand; the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
+         "gives up to 25.6 N·s/m at the hand, but the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
         ("", "", "5", 2, "5 is not in the range"),
         ("levels = [0.02, 0.6]", "levels = [0.6, 0.02]", "1", 2, "stimuli.damping.levels"),
     ],

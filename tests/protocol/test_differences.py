@@ -44,26 +44,26 @@ def test_a_receipt_that_does_not_say_what_a_block_compares_differs_in_nothing():
 @pytest.mark.parametrize(
     ("edits", "expected"),
     [
-        ([("repetitions = 2", "repetitions = 3")], ["blocks.feel.repetitions: 2 before, 3 now"]),
-        ([("force_limit_n = 8", "force_limit_n = 7.5")], ["device.force_limit_n: 8 before, 7.5 now"]),
-        ([("dwell_s = 0.5", "dwell_s = 0.5000001")], ["tasks.reach.dwell_s: another text or number"]),
-        ([('en = "Read this."', 'en = "Read that."')], ['pages.hello.body.en: "Read this." before, "Read that." now']),
+        ([("repetitions = 2", "repetitions = 3")], ["blocks.feel.repetitions: previously 2, now 3"]),
+        ([("force_limit_n = 8", "force_limit_n = 7.5")], ["device.force_limit_n: previously 8, now 7.5"]),
+        ([("dwell_s = 0.5", "dwell_s = 0.5000001")], ["tasks.reach.dwell_s: a different text or number"]),
+        ([('en = "Read this."', 'en = "Read that."')], ['pages.hello.body.en: previously "Read this.", now "Read that."']),
         (
             [(ORDER, 'order = "constrained"\nmax_repeats = 1\nrepetitions = 2')],
-            ['blocks.feel.order: "shuffled" before, "constrained" now', "blocks.feel.max_repeats: new, 1"],
+            ['blocks.feel.order: previously "shuffled", now "constrained"', "blocks.feel.max_repeats: new: 1"],
         ),
-        ([("[30, 0, 0]", "[31, 0, 0]")], ["tasks.reach.targets_mm.2.1: 30 before, 31 now"]),
+        ([("[30, 0, 0]", "[31, 0, 0]")], ["tasks.reach.targets_mm.2.1: previously 30, now 31"]),
         ([("[30, 0, 0],", "[30, 0, 0], [0, 20, 0],")], ["tasks.reach.targets_mm: previously 2 entries, now 3"]),
         ([('"hello", "warm_up"', '"warm_up", "hello"')], [
-            'sequence.1: "hello" before, "warm_up" now',
-            'sequence.2: "warm_up" before, "hello" now',
+            'sequence.1: previously "hello", now "warm_up"',
+            'sequence.2: previously "warm_up", now "hello"',
         ]),
         ([('id = "cold"', 'id = "tepid"')], [
-            "questionnaires.short.items.cold: gone, it was a table",
-            "questionnaires.short.items.tepid: new, a table",
+            "questionnaires.short.items.cold: removed; it was a table",
+            "questionnaires.short.items.tepid: new: a table",
         ]),
         ([('en = "It is cold."', 'en = "It is icy."')], [
-            'questionnaires.short.items.cold.text.en: "It is cold." before, "It is icy." now',
+            'questionnaires.short.items.cold.text.en: previously "It is cold.", now "It is icy."',
         ]),
     ],
 )  # fmt: skip

@@ -237,7 +237,7 @@ def test_session_without_a_row_of_another_has_no_such_key(square: Path) -> None:
 @pytest.mark.parametrize(
     ("source", "row_of", "message"),
     [
-        ("demo", "P002", "no block of demo has a Williams or Latin order"),
+        ("demo", "P002", "no block in demo has a Williams or Latin order"),
         ("square", "anna", "rows are assigned by the number in a participant's ID"),
         ("square", "P 2", "rows are assigned by the number in a participant's ID"),
     ],

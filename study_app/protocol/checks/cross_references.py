@@ -288,7 +288,9 @@ def check_questions(document: Document) -> Iterator[Fault]:
     for name, scale in scales.items():
         if len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
             listed = " and ".join(map(str, sorted(counts)))
-            yield Fault(("scales", name, "labels"), f"has {listed} points", "every language must have the same points")
+            yield Fault(
+                ("scales", name, "labels"), f"has {listed} points", "every language must have the same number of points"
+            )
     language = next((name for _, name in entries(document, "study.languages.*") if isinstance(name, str)), "en")
     for path, table in entries(document, "questionnaires.*"):
         if not isinstance(table, Mapping):

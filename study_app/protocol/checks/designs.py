@@ -288,7 +288,7 @@ def _standard_fault(
     place = ("stimuli", str(block.stimulus))
     if stimulus.vary in OF_CONDITION and not 0 <= standard <= OF_CONDITION[stimulus.vary]:
         permitted = f"from 0 to {OF_CONDITION[stimulus.vary]:g}"
-        return Fault((*place, "standards"), f"{standard:g} is not possible for {stimulus.vary}", permitted)
+        return Fault((*place, "standards"), f"{standard:g} is not permitted for {stimulus.vary}", permitted)
     if (why := _presentation_problem(protocol, stimulus, standard)) is not None:
         return Fault((*place, "standards"), f"{standard:g}: {why}")
     least = _LEAST_MS if stimulus.vary.endswith("_ms") else _LEAST_SHARE * (abs(standard) or 1.0)

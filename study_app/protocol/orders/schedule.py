@@ -272,7 +272,7 @@ def reproduce(
 def _trial_differences(planned: Trial | None, run: RecordedTrial) -> Iterator[str]:
     """Yield the differences between a recorded trial and the planned one with its number."""
     if planned is None:
-        yield f"trial {run.number}was recorded, but the seed does not produce this trial"
+        yield f"trial {run.number} was recorded, but the seed does not produce this trial"
         return
     for name in _TOLD:
         ours, theirs = getattr(planned, name), getattr(run, name)

@@ -94,7 +94,7 @@ class Tasks:
         user.choose("Order", "Williams")
         QTest.qWait(1500)
         words = [label.text() for label in user.window.findChildren(QLabel) if label.isVisible()]
-        assert any("12 participants are 3 rounds of 4" in one for one in words), words
+        assert any("12 participants complete 3 rounds of 4" in one for one in words), words
 
     def changes(self) -> None:
         """What differs from the version that was saved."""

@@ -57,7 +57,7 @@ def test_a_range_of_ids_is_judged_from_its_first_one():
         for first in ("P004", "P061")
     }
     assert even == {"P004": False, "P061": True}
-    with pytest.raises(StudyError, match="end in a number"):
+    with pytest.raises(StudyError, match="ends in a number"):
         numbered_participants(6, "anna")
 
 

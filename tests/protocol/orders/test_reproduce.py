@@ -44,20 +44,20 @@ def test_an_untouched_session_is_reproduced(seed: int, participant: str, order: 
     ("change", "expected"),
     [
         (lambda trials: [*trials[:1], replace(trials[1], block="look"), *trials[2:]],
-         "trial 2: recorded block look, but the seed gives feel"),
+         "trial 2: the recorded block is look, but the seed gives feel"),
         (lambda trials: [*trials[:1], replace(trials[1], part=None), *trials[2:]],
-         "trial 2: recorded part none, but the seed gives 1"),
+         "trial 2: the recorded part is none, but the seed gives 1"),
         (lambda trials: [*trials[:1], replace(trials[1], items=trials[1].items[::-1]), *trials[2:]],
-         "trial 2: recorded items cold, warm, but the seed gives warm, cold"),
+         "trial 2: the recorded items are cold, warm, but the seed gives warm, cold"),
         (lambda trials: [*trials[:1], replace(trials[1], items=()), *trials[2:]],
-         "trial 2: recorded items none, but the seed gives warm, cold"),
+         "trial 2: the recorded items are none, but the seed gives warm, cold"),
         (lambda trials: [*trials, replace(trials[-1], number=8)],
-         "trial 8: recorded, but the seed does not produce this trial"),
+         "trial 8 was recorded, but the seed does not produce this trial"),
         (lambda trials: trials[:-1], "trial 7 was not recorded, although the session is complete"),
         (lambda trials: trials[:-3], "trials 5 to 7 were not recorded, although the session is complete"),
         (lambda trials: [], "trials 1 to 7 were not recorded, although the session is complete"),
-        (lambda trials: trials[:2] + trials[3:], "trial 4 came after trial 2, but trial 3 was due"),
-        (lambda trials: trials[1:], "trial 2 came first, but trial 1 was due"),
+        (lambda trials: trials[:2] + trials[3:], "trial 4 was presented after trial 2, but trial 3 was due"),
+        (lambda trials: trials[1:], "trial 2 was presented first, but trial 1 was due"),
     ],
 )  # fmt: skip
 def test_whatever_was_changed_is_named(change: Callable[[list[RecordedTrial]], list[RecordedTrial]], expected: str):
@@ -74,8 +74,8 @@ def test_another_order_of_a_block_is_found():
     block = REK.blocks["liquids"].model_copy(update={"order": "fixed"})
     other = REK.model_copy(update={"blocks": {**REK.blocks, "liquids": block}})
     assert reproduce(other, 1, "P001", run(REK, "P001", 1), complete=True) == (
-        "trial 2: recorded code L2, but the seed gives L1",
-        "trial 3: recorded code L1, but the seed gives L2",
+        "trial 2: the recorded code is L2, but the seed gives L1",
+        "trial 3: the recorded code is L1, but the seed gives L2",
     )
 
 
@@ -97,11 +97,11 @@ def test_a_block_that_a_resumed_session_presents_again_is_reproduced_where_the_s
         resume: SHUFFLED.model_copy(update={"study": SHUFFLED.study.model_copy(update={"resume": resume})})
         for resume in ("block", "trial")
     }
-    for resume, expected in (("block", ()), ("trial", (f"trial 2 came after trial {reached}",))):
+    for resume, expected in (("block", ()), ("trial", (f"trial 2 was presented after trial {reached}",))):
         found = reproduce(by[resume], 3, "P001", [*trials[:reached], *trials[1:]], complete=True)
         assert tuple(one.partition(",")[0] for one in found) == expected
     (found,) = reproduce(by["block"], 3, "P001", [*trials[:reached], *trials[2:]], complete=True)
-    assert found.startswith(f"trial 3 came after trial {reached}, but")
+    assert found.startswith(f"trial 3 was presented after trial {reached}, but")
 
 
 def journal(trials: tuple[Trial, ...]) -> Iterator[dict[str, Any]]:

@@ -50,7 +50,7 @@ def test_a_disk_that_takes_nothing_stops_the_force_and_keeps_what_is_left_from_e
 
 
 def test_a_language_that_the_study_is_not_written_in_is_refused(protocol: Protocol) -> None:
-    with pytest.raises(SessionError, match="available in en"):
+    with pytest.raises(SessionError, match="available only in en"):
         initial_state(protocol, build_schedule(protocol, "P001", 1), {}, "nl")
 
 
