@@ -54,27 +54,28 @@ RATIOS: Final = ("threshold", "pse")
 """Measures that are compared as ratios where the levels of all blocks are spaced by ratios."""
 
 LEFT_OUT: Final = (
-    "Every participant with both numbers is included, also if a threshold lies beyond the levels; the report "
-    "lists excluded participants with the reason."
+    "Every participant with both values is included, even if a threshold lies outside the levels; the report "
+    "lists excluded participants and the reasons."
 )
 """Who is compared, in power, preregistration and report."""
 _WEIGHTED: Final = (
-    "Thresholds are weighted as in the group mean. Thresholds of two blocks with the same levels and design "
+    "Thresholds are weighted as in the group mean. If two blocks have the same levels and design, their thresholds "
     "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio "
     "in the tables. "
 )
 _SIZES: Final = (
-    "Standardised effects weight participants equally: d_z is the mean difference within participants divided by its "
-    "standard deviation, g is Hedges' g of two groups; their 95 % intervals invert the noncentral t distribution. "
-    "Bayes factors are two-sided JZS factors (Rouder et al., 2009) for a difference against no difference, with a "
-    "Cauchy prior of scale "
-    f"{number(PRIOR_SCALE, 3)}. Cliff's delta is the probability of a larger answer minus the probability of a smaller "
-    "one; within participants it is the proportion with a larger answer minus the proportion with a smaller one."
+    "Standardised effects give all participants equal weight: d_z is the mean within-participant difference divided by "
+    "the standard deviation of the differences, and g is Hedges' g for two groups. Their 95 % confidence intervals are "
+    "calculated from the noncentral t distribution. Bayes factors are two-sided JZS Bayes factors (Rouder et al., "
+    f"2009) that compare a difference with no difference, using a Cauchy prior with scale {number(PRIOR_SCALE, 3)}. "
+    "Cliff's delta is the probability that an answer in the first group is larger than one in the second, minus the "
+    "probability that it is smaller; within participants, it is the proportion of participants whose first answer is "
+    "larger minus the proportion whose first answer is smaller."
 )
 _MOST_NAMED: Final = 20
 
-_TOO_FEW: Final = "fewer than two participants have both numbers"
-_ALIKE: Final = "the numbers do not vary between participants, so a t test is not possible"
+_TOO_FEW: Final = "fewer than two participants have both values"
+_ALIKE: Final = "the values do not vary between participants, so a t test is not possible"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -344,14 +345,13 @@ def _tested(
             low, high = (math.exp(end) if ratio else end for end in (low, high))
             ends = Interval(low=low, high=high, level=0.95, method=f"t({means.freedom})")
             sides = "two-sided" if contrast.expected is None else f"one-sided ({contrast.expected})"
-            method = (
-                f"t({means.freedom}), {sides}; bootstrap {p_equals(p_bootstrap)}; for skewness {p_equals(p_skewed)}"
-            )
+            by_bootstrap, for_skewness = p_equals(p_bootstrap), p_equals(p_skewed)
+            method = f"t({means.freedom}), {sides}; bootstrap {by_bootstrap}; skewness-corrected t {for_skewness}"
     return ContrastResult(
         test=(
-            "contrast, t of two groups' differences"
+            "contrast, two-sample t of differences"
             if contrast.is_interaction
-            else "contrast, t of two groups"
+            else "contrast, two-sample t"
             if contrast.groups
             else "contrast, paired t"
         ),
@@ -423,16 +423,20 @@ def answer(contrast: ContrastResult) -> str:
     """Return the result as sentences."""
     sentences = [f"Not tested: {contrast.note}." if contrast.p_adjusted is None else _difference_words(contrast)]
     if contrast.contrast.bound is not None and _lies_beyond(contrast, contrast.contrast.bound):
-        what = "All differences lie" if contrast.interval is None else "The whole interval lies"
-        sentences.append(f"{what} beyond the bound (not equivalent).")
+        what = "All differences lie" if contrast.interval is None else "The whole confidence interval lies"
+        sentences.append(f"{what} outside the equivalence bounds (not equivalent).")
     elif contrast.equivalent:
-        people = "of people differ by more" if contrast.contrast.groups is None else "of a group are not in the sample"
+        people = (
+            "of people differ by more than the bound"
+            if contrast.contrast.groups is None
+            else "of a group are not represented in the sample"
+        )
         sentences.append(
-            "The mean lies within the bound (equivalent); the data do not exclude that up to "
+            "The mean lies within the equivalence bounds (equivalent), but the data do not rule out that up to "
             f"{100 * (contrast.not_excluded or 0.0):.0f} % {people}."
         )
     elif contrast.equivalent is not None:
-        sentences.append("The mean is not shown to lie within the bound.")
+        sentences.append("The mean was not shown to lie within the equivalence bounds.")
     if contrast.left_out:
         sentences.append(f"Excluded: {_left_out_words(contrast)}.")
     return " ".join(sentences)
@@ -467,7 +471,7 @@ def _difference_words(contrast: ContrastResult) -> str:
     effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect)}"
     size = "" if contrast.standardised is None else f", {_size_words(contrast.standardised)}"
     return (
-        f"{said} (means {means}; {effect}, 95 % interval {interval(contrast.interval)}{size}, "
+        f"{said} (means {means}; {effect}, 95 % confidence interval {interval(contrast.interval)}{size}, "
         f"{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n}).{higher}{_bayes_words(contrast)}"
     )
 
@@ -479,11 +483,11 @@ def _size_words(size: EffectSize | None) -> str:
 def _bayes_words(contrast: ContrastResult) -> str:
     if contrast.bayes_factor is None or contrast.verdict in FOUND:
         return ""
-    more, less = ("with", "without") if contrast.bayes_factor > 1 else ("without", "with")
+    more, less = ("a", "none") if contrast.bayes_factor > 1 else ("no", "one")
     factor = significant(max(contrast.bayes_factor, 1 / contrast.bayes_factor))
     return (
-        f" The data are {factor} times as likely {more} a difference as {less} one (JZS Bayes factor, Cauchy prior "
-        f"with scale {number(PRIOR_SCALE, 3)})."
+        f" The data are {factor} times as likely if there is {more} difference as if there is {less} (JZS Bayes "
+        f"factor, Cauchy prior with scale {number(PRIOR_SCALE, 3)})."
     )
 
 
@@ -493,20 +497,20 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if not contrasts:
         return
     for place, contrast in enumerate(contrasts, start=1):
-        of = " of logarithms" if contrast.ratio else ""
-        differences = " of differences within participants between" if contrast.contrast.is_interaction else " of"
-        groups = f"a t test{of}{differences} two groups with unequal variances"
-        test = groups if contrast.contrast.groups else f"a paired t test{of}"
+        logarithms = " on logarithms" if contrast.ratio else ""
+        differences = " on within-participant differences" if contrast.contrast.is_interaction else ""
+        groups = f"two-sample t test with unequal variances{differences}{logarithms}"
+        test = groups if contrast.contrast.groups else f"paired t test{logarithms}"
         sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
         label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
-        yield f"{label} ({contrast.contrast.described(contrast.compared)}) was tested by {test}, {sides}."
+        yield f"{label} ({contrast.contrast.described(contrast.compared)}) was tested with a {sides} {test}."
     if any(contrast.contrast.groups for contrast in contrasts):
-        yield "Between groups, t has the degrees of freedom of the smaller group (Hsu 1938)."
+        yield "Comparisons between groups use the smaller group's degrees of freedom for t (Hsu 1938)."
     holm_words = f", Holm-adjusted across {len(contrasts)} hypotheses"
     yield (
-        "Each participant had one number in each comparison. A bootstrap that adds a participant like the most extreme "
-        "one (Gaffke 2005) and t corrected for skewness (Hall 1992) had to agree: p is the largest of the three"
-        f"{holm_words * (len(contrasts) > 1)}."
+        "Each participant contributed one value to each comparison. A bootstrap that adds a participant as extreme as "
+        "the most extreme one (Gaffke 2005) and a t test corrected for skewness (Hall 1992) had to agree with the t "
+        f"test: the p value is the largest of the three{holm_words * (len(contrasts) > 1)}."
     )
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
@@ -515,14 +519,14 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if bounds := [contrast for contrast in contrasts if contrast.contrast.bound is not None]:
         adjusted = f", Holm-adjusted across {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
-            "Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree"
-            f"{adjusted}, and requires that the sample is large enough to contain a member of a minority that shifts "
-            "the mean by the bound."
+            "Equivalence was tested with two one-sided t tests and the same bootstrap, which had to agree"
+            f"{adjusted}. It also requires a sample that is large enough to include somebody from a minority that "
+            "could shift the mean by the bound."
         )
     if gone := {
         f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out
     }:
-        yield f"Some participants were excluded from a hypothesis because a number is missing ({'; '.join(gone)})."
+        yield f"Some participants were excluded from a test because a value was missing ({'; '.join(gone)})."
 
 
 def _left_out_words(contrast: ContrastResult) -> str:
@@ -561,20 +565,21 @@ def contrast_section(results: Results) -> Iterator[str]:
     )
     weighted = any(contrast.contrast.measure == "threshold" for contrast in results.contrasts)
     yield paragraph(
-        "The study file states these hypotheses. Each was tested on one number per participant by a t test, a "
-        "bootstrap that adds a participant like the most extreme one, and t corrected for skewness; adjusted p is the "
-        f"largest p, Holm-adjusted across {number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means "
-        "that t and the bootstrap show, with enough participants, that the mean lies within the stated bound, "
-        "Holm-adjusted across the bounds. "
+        "The study file states these hypotheses. Each was tested on one value per participant with a t test, a "
+        "bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
+        "The adjusted p value is the largest of the three, Holm-adjusted across "
+        f"{number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that the t tests and the bootstrap "
+        "show, with enough participants, that the mean lies within the stated bounds (Holm-adjusted across the "
+        "bounds). "
         f"{_WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
     yield paragraph(
-        f"{_SIZES} SD: standard deviation between participants, of the two compared values and of their difference.",
+        f"{_SIZES} SD is the between-participant standard deviation of each compared value and of their difference.",
         "soft",
     )
     if rows := [contrast for contrast in results.contrasts if contrast.left_out]:
-        yield bullets([f"{question(row)}: left out {_left_out_words(row)}." for row in rows])
+        yield bullets([f"{question(row)}: excluded {_left_out_words(row)}." for row in rows])
 
 
 def _sd_words(contrast: ContrastResult) -> str:

@@ -50,7 +50,7 @@ def export(
         importlib.import_module("pyreadstat")  # before anything is read
     progress("reading", 0.0)
     study = load_study(folder)
-    progress("making the tables", 0.3)
+    progress("creating the tables", 0.3)
     files, failures = _files(study, extras)
     progress("writing", 0.9)
     written = write_output(study.folder, Path(to), files, warn)

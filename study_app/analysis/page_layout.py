@@ -182,7 +182,10 @@ def study_marks(study: Study) -> list[Mark]:
     marks = (
         (study.simulated, Mark(words="SIMULATED participants", ink=style.WARN, ground=style.WARN_GROUND)),
         (study.pilot, Mark(words="PILOT", ink=style.WARN, ground=style.WARN_GROUND)),
-        (not study.revealed, Mark(words="Blinded: conditions as codes", ink=style.SEALED, ground=style.SEALED_GROUND)),
+        (
+            not study.revealed,
+            Mark(words="Blinded: conditions appear as codes", ink=style.SEALED, ground=style.SEALED_GROUND),
+        ),
     )
     return [mark for applies, mark in marks if applies]
 
@@ -233,7 +236,7 @@ def picture_of(
 
 def sample_words(study: Study, n: int) -> str:
     """Return the last sentence of a caption: who took part."""
-    return f"{'SIMULATED participants, not people; ' if study.simulated else ''}{counted(n, 'participant')}."
+    return f"{counted(n, 'participant')}{' (SIMULATED, not people)' if study.simulated else ''}."
 
 
 @dataclass(frozen=True, slots=True)

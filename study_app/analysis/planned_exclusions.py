@@ -111,8 +111,8 @@ def _below_chance(study: Study) -> _Rows:
         for one in below_chance(tracks(replace(study, with_below_chance=True)), study.levels):
             yield (
                 (one.participant, one.session),
-                f"{one.right} of {one.n} answers in {one.block} are correct, fewer than expected by chance "
-                f"({p_equals(one.p)}): the answer keys may have been swapped",
+                f"{one.right} of {one.n} answers in {one.block} are correct, which is fewer than expected by chance "
+                f"({p_equals(one.p)}); the answer keys may have been swapped",
             )
 
 
@@ -130,7 +130,7 @@ def _constant(study: Study, limit: float | None) -> _Rows:
     for session, rows in answers.groupby(SESSION):
         share = rows["response"].value_counts(normalize=True).max()
         if limit is not None and len(rows) > 1 and 100 * share > limit:
-            yield session, f"{percent(share)} of {len(rows)} answers to statements are equal"
+            yield session, f"{percent(share)} of {len(rows)} answers to statements are identical"
 
 
 def _fast(study: Study, limit: float | None) -> _Rows:
@@ -139,7 +139,7 @@ def _fast(study: Study, limit: float | None) -> _Rows:
     for session, some in times.dropna().groupby([answers[name] for name in SESSION]):
         median = float(some.median())
         if limit is not None and median < limit:
-            yield session, f"half of {len(some)} answers were chosen within {number(median)} s"
+            yield session, f"half of the {len(some)} answers were chosen within {number(median)} s"
 
 
 def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:

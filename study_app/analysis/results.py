@@ -72,7 +72,7 @@ class Failure:
         """The text that replaces the part in a report."""
         if not self.where:
             return f"its computation failed: {self.error}"
-        return f"its computation failed ({self.error}; {self.where}); this is a fault of the program, please report it"
+        return f"its computation failed ({self.error}; {self.where}); this is a fault in the program: please report it"
 
     def __str__(self) -> str:
         return f"{self.what}{f' of block {self.block}' if self.block else ''}: {self.why}"
@@ -326,15 +326,16 @@ class Results:
     contrasts: tuple[ContrastResult, ...] = ()
 
 
-SEALED: Final = "computed after unblinding, because it needs to know which condition each code stands for"
+SEALED: Final = "computed after unblinding, because this requires knowing which condition each code stands for"
 """The reason for results that are missing because the key is sealed."""
 
 VERDICTS_MEAN: Final = (
-    "Shown: the adjusted p is at most {alpha}. Suggested: the same in a statement that was not stated as primary "
-    "before the study; this is a lead, not a finding. Not shown: the adjusted p is above {alpha}, which is not "
-    "evidence that the answers are the same. Out of reach: no rearrangement of these answers within participants could "
-    "have made the adjusted p significant, given the other p values in the family. No adjusted p of a statement is "
-    "below the p of the test over all statements, Holm-adjusted across the blocks of the study."
+    "Shown: the adjusted p value is at most {alpha}. Suggested: the adjusted p value is at most {alpha}, but the "
+    "statement was not declared primary before the study; this is a lead, not a finding. Not shown: the adjusted p "
+    "value is above {alpha}, which is not evidence that the answers are the same. Out of reach: no rearrangement of "
+    "these answers within participants could have made the adjusted p value significant, given the other p values in "
+    "the family. A statement's adjusted p value is never below the p value of the test over all statements, which is "
+    "Holm-adjusted across the blocks of the study."
 )
 
 
@@ -393,8 +394,8 @@ def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
         )
     if len(result.sessions) > 1:
         lines.append(
-            f"The answers of sessions {listed(list(map(str, result.sessions)))} are compared with each other, and "
-            "pooled in all other tests."
+            f"The answers from sessions {listed(list(map(str, result.sessions)))} are compared with each other, and "
+            "are pooled in all other tests."
         )
     return tuple(lines)
 
@@ -410,7 +411,7 @@ def min_sample_reason(alpha: float, bound: float) -> str:
     return (
         f"{min_sample(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
         f"nobody from a minority ({percent(share)} of all people) whose answers differ by "
-        f"{significant(bound / share)} points, enough to shift the mean by the bound"
+        f"{significant(bound / share)} points, which is enough to shift the mean by the bound"
     )
 
 
@@ -419,8 +420,8 @@ def test_name(outcome: Outcome) -> str:
     return {
         "Friedman": "Friedman's test",
         "Wilcoxon signed ranks": "Wilcoxon's signed-rank test",
-        "trend over participants": "the test of a trend over participants",
-        "t test of slopes": "Student's t test of the participants' own slopes",
+        "trend over participants": "trend test across participants",
+        "t test of slopes": "Student's t test on the participants' slopes",
     }.get(outcome.test, outcome.test)
 
 
@@ -435,7 +436,10 @@ def incomplete_words(result: BlockResult) -> str:
         f"{person} ({'all statements' if len(items) == every else listed(items)})"
         for person, items in sorted(statements.items())
     ]
-    return f"Excluded from tests over all {settings_noun(result)}s, because an answer is missing: {listed(who)}."
+    return (
+        f"Participants excluded from tests over all {settings_noun(result)}s because an answer is missing: "
+        f"{listed(who)}."
+    )
 
 
 def missing_sentences(result: BlockResult) -> tuple[str, ...]:
@@ -444,7 +448,7 @@ def missing_sentences(result: BlockResult) -> tuple[str, ...]:
     for not_tested in result.absent:
         reasons.setdefault(not_tested.why, []).append(not_tested.what)
     return tuple(
-        f"{listed([f'the {one}' for one in what])} {'was' if len(what) == 1 else 'were'} not computed: {why}."
+        f"{listed([f'the {one}' for one in what])} {'was' if len(what) == 1 else 'were'} not computed because {why}."
         if why != SEALED
         else f"{listed([f'the {one}' for one in what])} {'is' if len(what) == 1 else 'are'} {why}."
         for why, what in reasons.items()

@@ -113,7 +113,7 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
     for number, block in enumerate(study.blocks):
         send(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
-        words, name = "No completed session has answers here yet.", block_name(study, block)
+        words, name = "No completed session has answers in this block yet.", block_name(study, block)
         if len(study.answers(block)):
             send(_figure(answer_figures.answers_picture(study, block, name, ("svg",))))
         else:
@@ -242,4 +242,4 @@ def _going(send: Send, stop: Callable[[], bool], what: str, share: float) -> Non
 
 def _go_on(stop: Callable[[], bool]) -> None:
     if stop():
-        raise Stopped("stopped; nothing was written")
+        raise Stopped("stopped before anything was written")

@@ -137,7 +137,7 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     (found,) = (results := evaluate(replace(study, trials=gone))).contrasts
     assert (found.n, found.dropped, found.left_out) == (7, 1, {"P003": "no threshold in late"})
     assert "Excluded: P003 (no threshold in late)." in first_page(results, ())
-    words = "Every participant with both numbers is included, also if a threshold lies beyond the levels"
+    words = "Every participant with both values is included, even if a threshold lies outside the levels"
     assert words in preregistration(parse(text.encode(), "delayed.toml"), "0" * 64)
 
 
@@ -151,7 +151,7 @@ def test_equality_is_corrected_over_the_hypotheses_that_state_a_bound() -> None:
     assert alone[0].p_equivalent == pytest.approx((5 / 6) ** 20)
     assert both[0].p_equivalent == pytest.approx(2 * (5 / 6) ** 20)
     assert (alone[0].equivalent, both[0].equivalent, both[2].equivalent) == (True, False, None)
-    assert "the data do not exclude that up to" in answer(alone[0])
+    assert "the data do not rule out that up to" in answer(alone[0])
 
 
 def statements(contrast: Contrast, shift: float = 0.0) -> Study:
@@ -172,11 +172,11 @@ def test_two_conditions_of_a_statement_are_compared_and_can_be_equivalent() -> N
     assert (same.verdict, same.equivalent) == ("equivalent", True)
     (narrow,) = evaluate(statements(contrast.model_copy(update={"bound": 0.01}))).contrasts
     assert (narrow.verdict, narrow.equivalent) == ("not shown", False)
-    assert "The mean is not shown to lie within the bound." in answer(narrow)
+    assert "The mean was not shown to lie within the equivalence bounds." in answer(narrow)
     (beyond,) = evaluate(statements(contrast, 2.0)).contrasts
     assert beyond.interval is not None
     assert beyond.interval.low > 1.0
-    assert "The whole interval lies beyond the bound (not equivalent)." in answer(beyond)
+    assert "The whole confidence interval lies outside the equivalence bounds (not equivalent)." in answer(beyond)
     assert "not shown to lie" not in answer(beyond)
 
 
@@ -185,7 +185,7 @@ def test_a_difference_that_is_the_same_for_all_is_not_called_equivalent() -> Non
     made = study(liquids(3), list(everybody(liquids(3), 12, lambda _p, _s, code, _i: 2 + 2 * (code == "L2"))))
     (found,) = evaluate(replace(made, contrasts=(contrast,))).contrasts
     assert (found.effect, found.equivalent) == (2.0, False)
-    assert "All differences lie beyond the bound (not equivalent)." in answer(found)
+    assert "All differences lie outside the equivalence bounds (not equivalent)." in answer(found)
 
 
 def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
@@ -193,10 +193,10 @@ def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
     other = Contrast(measure=ITEMS[1], blocks=("b",), conditions=("c3", "c1"), expected="higher")
     made = replace(statements(contrast), contrasts=(contrast, other))
     told = methods(made, evaluate(made))
-    assert f"Hypothesis 1 ({contrast.described()}) was tested by a paired t test, two-sided." in told
-    assert f"Hypothesis 2 ({other.described()}) was tested by a paired t test, one-sided." in told
-    assert "p is the largest of the three, Holm-adjusted across 2 hypotheses." in told
-    assert "Equivalence was tested by two one-sided t tests" in told
+    assert f"Hypothesis 1 ({contrast.described()}) was tested with a two-sided paired t test." in told
+    assert f"Hypothesis 2 ({other.described()}) was tested with a one-sided paired t test." in told
+    assert "the p value is the largest of the three, Holm-adjusted across 2 hypotheses." in told
+    assert "Equivalence was tested with two one-sided t tests" in told
     assert "Means were tested in the hypotheses" in told
     assert "never means" not in told
     rows = write_report.tests_csv(evaluate(statements(contrast))).decode().splitlines()
@@ -353,7 +353,7 @@ def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> 
     assert first.p is not None
     assert first.p_adjusted == pytest.approx(2 * max(first.p, first.p_bootstrap))
     assert (second.verdict, second.p) == ("not tested", None)
-    assert second.note.startswith("fewer than two participants have both numbers")
+    assert second.note.startswith("fewer than two participants have both values")
     assert pd.isna(second.statistic) or second.statistic is None
 
 
@@ -448,9 +448,9 @@ def test_power_plans_differences_and_equality_within_people(
     )
     half, least = (spread * end for end in detectable(40, tail=0.05))
     ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
-    assert ("SD, relative to a mean d′ of 1; one" if edits else "SD; one") in told
-    assert "Equivalence requires at least 14 participants, at α = 0.05. Every participant with both numbers" in told
-    assert "| smallest difference | shown within the bound if truly equal |" in told
+    assert ("(a factor of 1.2), relative to a mean d′ of 1." if edits else "(a factor of 1.2).") in told
+    assert "Equivalence requires at least 14 participants, at α = 0.05. Every participant with both values" in told
+    assert "| smallest difference | shown to be equivalent if there is no difference |" in told
     assert told.strip().endswith(f"| {spread:.0%} | {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
 
 
@@ -469,5 +469,5 @@ def test_power_counts_studies_of_statements_that_show_equality() -> None:
     away = answers[..., 1] - answers[..., 0]
     shown = sum(tost(one, 1.0).verdict == "equivalent" for one in away - away.mean())
     assert 0 < shown < 20
-    row = f"| *{planned.contrasts[0].described()}, if truly equal* | 0% | {shown / 20:.0%} ("
+    row = f"| *{planned.contrasts[0].described()}, if there is no difference* | 0% | {shown / 20:.0%} ("
     assert row in power_markdown(powers(planned, (12, 24), 20, 20, 1, counts))

@@ -77,7 +77,7 @@ def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(sp
         spending=spending,
     )
     rate = f"{100 * error_of_every_report(looks, 0.05, spending):.1f} %"
-    assert f"makes a false claim in {rate} of cases instead of 5 %" in made.at(13).look_words(13)
+    assert f"would make a false claim in {rate} of cases instead of 5 %" in made.at(13).look_words(13)
 
 
 @pytest.mark.parametrize(
@@ -124,7 +124,7 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
     assert counts[contrast.described(), "contrast"][0, FULL] == shown > 0
     text = preregistration(protocol, "0" * 64)
     assert "everything is tested when 6 and 12 valid sessions are complete" in text
-    assert f"up to {first:.3g} and {last:.3g} are significant at these looks (O'Brien–Fleming spending" in text
+    assert f"up to {first:.3g} and {last:.3g} are significant at these looks (O'Brien–Fleming alpha spending" in text
 
 
 @pytest.mark.slow
@@ -141,7 +141,7 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
         ]
         shown += (holm(ps)[0] or 1.0) <= 0.05
     assert counts[0, FULL, 0] == shown > 0
-    told = "Student's t test on the slopes of each participant's own regression of answers on delays"
+    told = "Student's t test on the slopes from each participant's regression of answers on delays"
     assert told in preregistration(protocol, "0" * 64)
     assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count_findings(planned, (10,), 1, 0, 10)))
     settings = delays((0, 50, 100))
@@ -150,7 +150,7 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     (found,) = (results := evaluate(made)).blocks
     assert {one.outcome.test for one in DelayTrend.of(found)} == {"t test of slopes"}
     assert not MeanTests.of(found), "each statement is tested once"
-    assert f"Trends over the delay were tested by {told}, one-sided" in methods(made, results)
+    assert f"Trends over the delay were tested with {told} (one-sided" in methods(made, results)
 
 
 @pytest.mark.parametrize(

@@ -400,7 +400,7 @@ class Decided:
         """Return the planned alpha and the alpha that applies at the current look."""
         if self.planned_alpha is None:
             return f"{self.alpha:g}"
-        return f"{self.planned_alpha:g} over all looks, {significant(self.alpha)} at this one"
+        return f"{self.planned_alpha:g} across all looks, {significant(self.alpha)} at this look"
 
     def look_words(self, n: int) -> str:
         """Return sentences on the planned look at ``n`` participants; empty if no looks are planned.
@@ -411,21 +411,21 @@ class Decided:
             return ""
         planned = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
         if self.look == 0:
-            return f"Looks are planned at {planned}; none has been reached, so all results are exploratory."
+            return f"Looks are planned at {planned}; none has been reached yet, so all results are exploratory."
         if n not in self.looks:
             from study_app.analysis.statistics.outcome import error_of_every_report  # noqa: PLC0415 - loads scipy
 
             alpha = self.planned_alpha or self.alpha
             return (
-                f"This look at {n} participants is unplanned: looks are planned at {planned}. An adjusted p ≤ "
-                f"{significant(self.alpha)} is significant, as at the last planned look. A study without an effect "
-                "that is tested at every number of participants in this way makes a false claim in "
-                f"{100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % of cases instead of "
+                f"This look at {n} participants is unplanned: looks are planned at {planned}. An adjusted p value is "
+                f"significant if it is at most {significant(self.alpha)}, as at the last planned look. If there were "
+                "no effect and the study were tested in this way after every participant, it would make a false claim "
+                f"in {100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % of cases instead of "
                 f"{100 * alpha:g} %."
             )
         return (
-            f"This is look {self.look} of {len(self.looks)}, planned at {planned}. An adjusted p ≤ "
-            f"{significant(self.alpha)} is significant (alpha is shared by {SPENDINGS[self.spending]} spending)."
+            f"This is look {self.look} of {len(self.looks)}, planned at {planned}. An adjusted p value is significant "
+            f"if it is at most {significant(self.alpha)} ({SPENDINGS[self.spending]} alpha spending)."
         )
 
     def is_primary(self, item: str) -> bool:
@@ -438,8 +438,8 @@ class Decided:
 
 
 TRENDS: Final = {
-    "ranks": "a sign-flip permutation test on the participants' rank correlations of answers and delays",
-    "slopes": "Student's t test on the slopes of each participant's own regression of answers on delays",
+    "ranks": "a sign-flip permutation test on the participants' rank correlations between answers and delays",
+    "slopes": "Student's t test on the slopes from each participant's regression of answers on delays",
 }
 """How a trend over the delay is tested, in words."""
 
@@ -486,8 +486,8 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise AnalysisError(
-            f"a receipt does not contain the decisions about the analysis ({type(error).__name__}, {error}): it "
-            "was changed, or written by another version of the program; restore it from a copy"
+            f"a receipt does not contain the decisions about the analysis ({type(error).__name__}, {error}): it has "
+            "been changed, or was written by a different version of the program; restore it from a copy"
         ) from error
 
 
@@ -616,6 +616,6 @@ def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:
         return question_of(table)
     except (KeyError, ValueError) as error:
         raise AnalysisError(
-            f"question {table.get('id')!r} of {where.id!r} has a kind that this version does not know "
-            f"({table.get('kind')}): use the version that ran the study"
+            f"question {table.get('id')!r} in {where.id!r} is of a kind that this version does not support "
+            f"({table.get('kind')}): use the version with which the study was run"
         ) from error

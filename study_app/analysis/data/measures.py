@@ -18,7 +18,7 @@ Array: TypeAlias = NDArray[np.float64]
 LEVELS: Final = (1, 2, 3, 4, 5, 6, 7)
 NEUTRAL: Final = 4
 AGREEMENT: Final = (5, 6, 7)
-QUARTILES: Final = "linear (Hyndman & Fan type 7)"
+QUARTILES: Final = "linear interpolation (Hyndman & Fan type 7)"
 COUNT_COLUMNS: Final = tuple(f"count_{level}" for level in LEVELS)
 COLUMNS: Final = (
     "code", "item", "participants", "presented", "presented_excluded", "n", "cannot_judge", "missing",

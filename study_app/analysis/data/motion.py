@@ -33,12 +33,14 @@ _SHORTEST: Final = 32
 """So many samples are needed to be filtered; a shorter reach is one submovement."""
 
 REACH_DEFINITIONS: Final = {
-    "movement_time_s": "from the lighting of a target to the final entry, excluding the dwell time",
-    "path_mm": "length of the hand's path in that time",
+    "movement_time_s": "from when a target lights up until the hand enters it for the last time, excluding the dwell "
+    "time",
+    "path_mm": "length of the hand's path during the movement time",
     "overshoot_mm": "largest distance beyond the far edge of the target, along the line between the targets; "
-    "0: no overshoot",
-    "submovements": "peaks of the hand's speed until the target was reached "
-    f"(low-pass {_CUTOFF_HZ:g} Hz) that stand out by {100 * _PROMINENCE:g} % of the highest; 1 is one smooth movement",
+    "0 if there was no overshoot",
+    "submovements": "number of peaks in the hand's speed before the target was reached "
+    f"(low-pass filtered at {_CUTOFF_HZ:g} Hz) with a prominence of at least {100 * _PROMINENCE:g} % of the highest "
+    "peak; 1 for a single smooth movement",
 }
 
 
@@ -147,10 +149,10 @@ OF_TRIALS: Final = ("duration_s", "path_m", "force_mean_n", "force_peak_n", "at_
 OF_REACHES: Final = ("movement_time_s", "path_mm", "overshoot_mm", "submovements")
 TRIAL_DEFINITIONS: Final = {
     "duration_s": "from the start of the trial to its end",
-    "path_m": "length of the hand's path in the trial",
-    "force_mean_n": "mean force on the hand in the trial",
-    "force_peak_n": "largest force on the hand in the trial",
-    "at_limit_percent": "proportion of the trial's ticks in which the force was cut to the force limit",
+    "path_m": "length of the hand's path during the trial",
+    "force_mean_n": "mean force on the hand during the trial",
+    "force_peak_n": "largest force on the hand during the trial",
+    "at_limit_percent": "proportion of the trial's ticks in which the force was reduced to the force limit",
 }
 
 
@@ -268,9 +270,9 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
     try:
         samples = read_samples(_file(folder, row))
     except SealedRecording:
-        return "recording is sealed (liquid-study unblind opens it)"
+        return "the recording is sealed (liquid-study unblind opens it)"
     except StoreError:
-        return "recording is damaged (liquid-study verify says which)"
+        return "the recording is damaged (liquid-study verify shows which one)"
     if len(samples):
         samples = samples[(samples["scene"] == samples["scene"][-1]) & (samples["limiters"] & LIMITER_GLITCH == 0)]
     if len(samples):
@@ -289,10 +291,10 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
 
 def _why_not(folder: Path, row: Mapping[Any, Any]) -> str:
     if pd.isna(row["recording"]):
-        return "a recording was not stored"
+        return "no recording was stored"
     if pd.isna(row["duration_s"]):
-        return "the trial does not have a recorded duration"
-    return "" if _file(folder, row).is_file() else "recording is not in the folder"
+        return "the trial's duration was not recorded"
+    return "" if _file(folder, row).is_file() else "the recording is not in the folder"
 
 
 def _file(folder: Path, row: Mapping[Any, Any]) -> Path:

@@ -70,12 +70,12 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
     except OSError as error:
         raise unreadable_error(path, error, _again(path)) from error
     except ValueError as error:
-        raise AnalysisError(f"{path} {error}: it was cut off or changed; {_again(path)}") from error
+        raise AnalysisError(f"{path} {error}: it has been cut off or changed; {_again(path)}") from error
     held = tuple(column for column in columns if column.name in names or not column.sealed)
     if tuple(names) != header(held):
         raise AnalysisError(
-            f"{path} does not begin with the columns of this table: it was changed, or written by another version of "
-            f"the program (expected {', '.join(header(held)[:4])} …, {len(held)} columns); {_again(path)}"
+            f"{path} does not begin with the columns of this table: it has been changed, or was written by a different "
+            f"version of the program (expected {len(held)} columns: {', '.join(header(held)[:4])} …); {_again(path)}"
         )
     return (dict(zip(names, zip(*rows, strict=True), strict=True)) if rows else {}), len(rows)
 
@@ -93,7 +93,7 @@ def _values(column: Column, texts: Sequence[str], known: dict[str, Any], path: P
 
 
 def _again(path: Path) -> str:
-    return f"create it again from the journal: liquid-study rebuild {path.parent}"
+    return f"create it again from the journal with liquid-study rebuild {path.parent}"
 
 
 def document(path: Path) -> dict[str, Any]:
@@ -189,8 +189,8 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
         levels = like.levels if like is not None and alike else level_blocks(protocol, key)
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise AnalysisError(
-            f"{folder.receipt} does not describe the session ({type(error).__name__}, {error}): it was changed, or "
-            "written by another version of the program; restore it from a copy"
+            f"{folder.receipt} does not describe the session ({type(error).__name__}, {error}): it has been changed, "
+            "or was written by a different version of the program; restore it from a copy"
         ) from error
     return Session(
         folder=folder,
@@ -280,7 +280,7 @@ def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.Dat
             which, row = _place(lengths, int(foreign[0]))
             raise AnalysisError(
                 f"{paths[which]}, row {row}, column {column}: {str(found[foreign[0]])!r} instead of "
-                f"{str(values[which])!r}: the file belongs to another session; restore this session's file from "
+                f"{str(values[which])!r}; the file belongs to a different session. Restore this session's file from "
                 "a copy"
             )
 
@@ -300,9 +300,9 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
         if (block, code, item) not in asked:
             which, row = _place(lengths, int(index))
             raise AnalysisError(
-                f"{paths[which]}, row {row}: the receipt does not contain statement {item!r} for code {code!r} in "
-                f"block {block!r}: the file was changed or belongs to another study; create it again from the "
-                f"journal: liquid-study rebuild {sessions[which].folder.path}"
+                f"{paths[which]}, row {row}: the receipt does not contain the statement {item!r} for code {code!r} in "
+                f"block {block!r}. The file has been changed or belongs to a different study: create it again from the "
+                f"journal with liquid-study rebuild {sessions[which].folder.path}"
             )
     twice = np.flatnonzero(
         table.duplicated(["participant", "session", "form", "after_block", "trial", "attempt", "item"])
@@ -312,7 +312,7 @@ def _check_answers(sessions: Sequence[Session], paths: Sequence[Path], table: pd
         answer = table.iloc[int(twice[0])]
         raise AnalysisError(
             f"{paths[which]}, row {row}: the answer to {answer['item']!r} in trial {answer['trial']} occurs "
-            "twice; create the table again from the journal: liquid-study rebuild "
+            "twice; create the table again from the journal with liquid-study rebuild "
             f"{sessions[which].folder.path}"
         )
 

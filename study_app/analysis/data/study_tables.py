@@ -267,7 +267,7 @@ class Study:
         if warn is None:
             return
         for doubt in self.doubts:
-            warn(f"warning: {doubt}; it is used here without correction")
+            warn(f"warning: {doubt}; it has been used without correction")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
         """Return the blocks that compare liquids, delays or views."""
@@ -349,7 +349,9 @@ def _load_sites(merged: Merged, *, planned: bool) -> Study:
     read = partial(_load, sealed=not opened, planned=planned)
     sites = {name: read(place.path) for name, place in places.items() if place.sessions()}
     if not sites:
-        raise AnalysisError(f"{merged.path} does not contain sessions: all participants of its sites withdrew")
+        raise AnalysisError(
+            f"{merged.path} does not contain any sessions, because all participants at its sites withdrew"
+        )
     return pool_sites(merged.path, sites, [it for place in places.values() for it in tombstones(place).values()])
 
 
@@ -500,25 +502,25 @@ def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
 def _no_sessions(path: Path) -> str:
     if not path.is_dir():
         return (
-            f"{path} is not a folder: specify a study's folder, such as results/rek2024, or a name that liquid-study "
-            "studies lists"
+            f"{path} is not a folder: specify a study's folder, such as results/rek2024, or a name listed by "
+            "liquid-study studies"
         )
     inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
     if inside:
         return (
-            f"{path} does not contain sessions itself, but contains studies that do ({', '.join(inside)}): specify "
-            f"{path / inside[0]}"
+            f"{path} is not a study's folder, but contains the folders of studies ({', '.join(inside)}): specify "
+            f"one, such as {path / inside[0]}"
         )
     return (
-        f"{path} does not contain sessions (data/sub-…/ses-…): specify a study's folder, such as results/rek2024, with "
-        "at least one session"
+        f"{path} does not contain any sessions (data/sub-…/ses-…): specify the folder of a study with at least one "
+        "session, such as results/rek2024"
     )
 
 
 def _other_study(other: Session, first: Session) -> str:
     return (
-        f"{other.folder.path} belongs to study {other.study!r}, {first.folder.path} to {first.study!r}: keep "
-        "each study in a separate folder"
+        f"{other.folder.path} belongs to the study {other.study!r}, but {first.folder.path} belongs to "
+        f"{first.study!r}: keep each study in a separate folder"
     )
 
 
@@ -533,8 +535,8 @@ def _check_alike(first: Session, other: Session) -> None:
         )
     if other.questionnaire != first.questionnaire:
         raise AnalysisError(
-            f"{other.folder.path} (version {other.version}) has different statements from {first.folder.path} (version "
-            f"{first.version}): keep the versions of a study in separate folders"
+            f"{other.folder.path} (version {other.version}) and {first.folder.path} (version {first.version}) used "
+            "different statements: keep the versions of a study in separate folders"
         )
 
 

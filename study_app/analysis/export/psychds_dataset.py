@@ -13,6 +13,7 @@ from study_app.analysis.data.blocks import display_language
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, stated_credits
 from study_app.errors import ProtocolError
+from study_app.number_text import counted
 from study_app.protocol.source.files import (
     bundle,
     file_hash,
@@ -110,12 +111,12 @@ def _is_of(study: str, file: Path) -> bool:
 def _why_missing(path: Path | None) -> str:
     """Return why footage is not shared; ``path`` is None if it lies outside the study's folder."""
     if path is None:
-        return "outside the study's folder"
+        return "it is outside the study's folder"
     try:
         with open_regular(path, largest_bytes=math.inf) as file:
             file.read(1)
     except (OSError, ValueError) as error:
-        return f"cannot be read: {system_message(error) if isinstance(error, OSError) else error}"
+        return f"it cannot be read: {system_message(error) if isinstance(error, OSError) else error}"
     return "the file with this name has a different SHA-256"
 
 
@@ -223,7 +224,7 @@ def _json(content: Any) -> bytes:
 def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
     blinded = (
-        "Conditions are identified."
+        "Conditions appear with their names."
         if study.revealed
         else ("Conditions appear as codes, because the study is blinded.")
     )
@@ -231,12 +232,13 @@ def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, byte
     lines = [
         f"# {study.title}",
         "",
-        f"{simulated}{study.n} participants. {blinded} A Psych-DS dataset; `n/a` is a missing cell. Statements, levels "
-        "and exclusions are in `documentation/codebook.json`, the study's texts in `materials`.",
+        f"{simulated}This Psych-DS dataset contains the data of {counted(study.n, 'participant')}. {blinded} Missing "
+        "values are marked `n/a`. Statements, levels and exclusions are in `documentation/codebook.json`; the study's "
+        "texts are in `materials`.",
         "",
         *(f"- `data/{name}`" for name in tables),
         *([f"- `results/report.html`: the report{script}"] if "report.html" in report else []),
-        *(["", f"Missing in `materials`: {', '.join(missing)}. Add them."] if missing else []),
+        *(["", f"Add the files that are missing in `materials`: {', '.join(missing)}."] if missing else []),
         "",
         *credit_lines(study),
     ]

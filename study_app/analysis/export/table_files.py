@@ -62,8 +62,8 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "study": study_head(study),
         "program": f"liquid-study {__version__}",
-        "format": f"CSV: UTF-8, comma, decimal point, RFC 4180 quoting; a text that begins with {COMPUTED} is preceded "
-        "by an apostrophe",
+        "format": "CSV in UTF-8, with commas as separators, decimal points, and quotes as in RFC 4180; a text that "
+        f"begins with {COMPUTED} is preceded by an apostrophe",
         "missing": MISSING,
         "blinded": not study.revealed,
         "sealed_columns": [] if study.revealed else sorted(SEALED | names_of_sealed(study)),
@@ -99,10 +99,11 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
         **({"scores": _scores(study)} if study.others.scores else {}),
         "measures": {
             "quartiles": QUARTILES,
-            "agree_percent": f"levels {AGREEMENT[0]} to {AGREEMENT[-1]}, of the valid answers",
-            "repeated": "the median of a participant's repeated answers; the detection threshold and the "
-            "counts of levels use single answers",
-            "counted": "main trials of completed sessions that are not excluded; the last attempt of a repeated trial",
+            "agree_percent": f"percentage of valid answers at levels {AGREEMENT[0]} to {AGREEMENT[-1]}",
+            "repeated": "the median of a participant's repeated answers is used; the detection threshold and the "
+            "counts for each level use single answers",
+            "counted": "main trials in completed sessions that are not excluded; the last attempt if a trial was "
+            "repeated",
         },
         "files": files,
     }

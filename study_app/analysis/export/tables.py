@@ -33,7 +33,7 @@ class Delivered:
     frame: pd.DataFrame
 
 
-SITE: Final = Column("site", "text", "The participant's site: the part of the ID before the dash.")
+SITE: Final = Column("site", "text", "The participant's site, which is the part of the ID before the dash.")
 
 
 def _with_site(study: Study, table: Delivered) -> Delivered:
@@ -111,29 +111,34 @@ _OF_A_FORM: Final = Setting(code="")
 
 _BY_NAME: Final = {column.name: column for column in TRIALS}
 
-_QUARTILE: Final = f"quartiles {QUARTILES}"
+
 _MEASURED: Final = (
     Column("item", "text", "ID of the statement; its text is in the codebook."),
     Column("short", "text", "Short label of the statement."),
     Column("participants", "integer", "Number of participants with a valid answer.", minimum=0),
-    Column("presented", "integer", "Number of presentations after which the statement was asked.", minimum=0),
+    Column(
+        "presented",
+        "integer",
+        "Number of presentations after which participants were asked to rate the statement.",
+        minimum=0,
+    ),
     Column(
         "presented_excluded",
         "integer",
-        "Number of other presentations that exclusions.csv excludes one by one, together with their answers.",
+        "Number of further presentations that exclusions.csv excludes individually, together with their answers.",
         minimum=0,
     ),
-    Column("n", "integer", "Valid answers.", minimum=0),
+    Column("n", "integer", "Number of valid answers.", minimum=0),
     Column("cannot_judge", "integer", "Number of “cannot judge” answers.", minimum=0),
     Column("missing", "integer", "Number of presentations without an answer.", minimum=0),
     *(Column(f"count_{level}", "integer", f"Number of answers at level {level}.", minimum=0) for level in LEVELS),
     optional("median", "number", "Median of the valid answers.", minimum=1, maximum=7),
-    optional("q1", "number", f"Lower quartile; {_QUARTILE}.", minimum=1, maximum=7),
-    optional("q3", "number", f"Upper quartile; {_QUARTILE}.", minimum=1, maximum=7),
+    optional("q1", "number", f"Lower quartile, by {QUARTILES}.", minimum=1, maximum=7),
+    optional("q3", "number", f"Upper quartile, by {QUARTILES}.", minimum=1, maximum=7),
     optional(
         "agree_percent",
         "number",
-        f"Proportion of the valid answers that agree (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
+        f"Percentage of valid answers that express agreement (levels {AGREEMENT[0]} to {AGREEMENT[-1]}).",
         unit="%",
         minimum=0,
         maximum=100,

@@ -147,7 +147,7 @@ def line_words(participants: int) -> str:
     """Return the caption's description of the thin lines."""
     if participants <= MOST_LINES:
         return "participants"
-    return f"{MOST_LINES} of the {participants} participants, evenly chosen in the order of their IDs"
+    return f"{MOST_LINES} of the {participants} participants, chosen at even intervals from the sorted IDs"
 
 
 def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
@@ -236,9 +236,10 @@ def draw_threshold(
     shares = np.array(threshold.yes)[there] / asked[there]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
-    sheet.text(MARGIN_PT, 28, "Answers that agree", size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, "Proportion of answers that agree", size=SMALL, colour=style.TEXT_SOFT)
     below = (
-        "Added delay, ms.   Small points: participants; circles: all participants; diamond: threshold, 95 % interval."
+        "Added delay in ms.   Small points: single participants; circles: all participants; diamond: threshold "
+        "with 95 % interval."
     )
     sheet.text(MARGIN_PT, sheet.height_pt - 5, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
@@ -251,7 +252,7 @@ _FILES: Final = 3
 def title(block: Block) -> str:
     """Return the title of a block's figure."""
     if block.kind == "delays":
-        return "Answers against added delay" if block.revealed else "Answers by delay setting"
+        return "Answers as a function of added delay" if block.revealed else "Answers for each delay setting"
     return f"Agreement for each {_noun(block)}"
 
 
@@ -264,7 +265,7 @@ def counts(study: Study, block: Block) -> list[str]:
     lacking = asked - int(table["n"].sum())
     words = f"n = {counted(n, 'participant')}"
     if people != {n}:
-        words = f"n = {_listed(people)} of {n} participants in a {_noun(block)}"
+        words = f"n = {_listed(people)} of {n} participants per {_noun(block)}"
     missing = f", {lacking} of {asked} ratings missing" if lacking else ""
     return [f"{words}{missing}", f"n = {_listed(people)}{missing}"]
 
@@ -287,7 +288,7 @@ def _caption(study: Study, block: Block) -> str:
 def _sentences(study: Study, block: Block) -> Iterator[str]:
     simulated = "simulated participants, not people; " if study.simulated else ""
     yield (
-        f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} on "
+        f"{'Pilot. ' if study.pilot else ''}Agreement with {counted(len(block.items), 'statement')} about "
         f"{counted(len(block.settings), _noun(block))} ({simulated}{counts(study, block)[0]})."
     )
     over_delay = block.kind == "delays" and block.revealed
@@ -299,41 +300,43 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
     if block.kind == "delays" and block.revealed and len(errors):
         yield (
             f"The axis shows the requested delay; the achieved delay differed from it by {errors.mean():+.1f} "
-            f"ms on average (trials: {errors.min():+.1f} to {errors.max():+.1f} ms)."
+            f"ms on average (range across trials: {errors.min():+.1f} to {errors.max():+.1f} ms)."
         ).replace("-", "−")
     table = study.aggregate(block)
-    yield f"Cannot judge: {table['cannot_judge'].sum()}; not answered: {table['missing'].sum()}."
+    yield f"“Cannot judge” answers: {table['cannot_judge'].sum()}; missing answers: {table['missing'].sum()}."
     if study.left_out:
-        yield f"{counted(study.left_out, 'session is', 'sessions are')} excluded because it was not completed."
+        was = "it was" if study.left_out == 1 else "they were"
+        yield f"{counted(study.left_out, 'session is', 'sessions are')} excluded because {was} not completed."
     if len(rows := study.excluded_sessions):
         yield f"{counted(len(rows), 'session is', 'sessions are')} excluded."
     if len(rows := study.excluded_trials(block)):
-        which = counted(len(rows), "trial is excluded, its answers", "trials are excluded, their answers")
-        yield f"{which} missing here."
+        which = counted(len(rows), "trial is", "trials are")
+        yield f"{which} excluded, so {'its' if len(rows) == 1 else 'their'} answers are missing here."
     if invalid := int((~trials["valid"].fillna(value=True)).sum()):
         yield f"{invalid} of {len(trials)} trials exceeded the protocol's timing limits and are included."
     if study.doubts:
         names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
         more = f" and {len(names) - _FILES} more" if len(names) > _FILES else ""
         files = counted(len(names), "file is", "files are")
-        yield f"{files} used although changed since recording: {', '.join(names[:_FILES])}{more}."
+        changed = "it has" if len(names) == 1 else "they have"
+        yield f"{files} used although {changed} changed since recording: {', '.join(names[:_FILES])}{more}."
 
 
 def _marks_of_bars(block: Block) -> Iterator[str]:
     yield (
-        "Bars show the number of answers, disagreement to the left and agreement to the right of the line; "
-        "neutral answers are shown separately in grey, on the same scale. Narrow segments are unlabelled (the "
-        "exported aggregate table contains all counts). n next to a bar is the number of valid answers if some "
-        f"are missing. Levels, from 1 to 7: {', '.join(block.labels)}."
+        "Bars show the number of answers, with disagreement to the left of the line and agreement to the right; "
+        "neutral answers are shown separately in grey, on the same scale. Narrow segments are not labelled (the "
+        "exported aggregate table contains all counts). If answers are missing, n next to the bar is the number of "
+        f"valid answers. The levels from 1 to 7 are: {', '.join(block.labels)}."
     )
 
 
 def _marks_of_delays(study: Study, block: Block) -> Iterator[str]:
     yield (
-        f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, slightly shifted if they "
-        f"coincide; thick line: median; band: interquartile range; quartiles {QUARTILES}."
+        f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, shifted slightly where they "
+        f"coincide; thick line: median; band: interquartile range, by {QUARTILES}."
     )
-    yield f"Answers from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
+    yield f"Answers range from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
 
 
 def _counted_trials(study: Study, block: Block) -> pd.DataFrame:
@@ -383,7 +386,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
         if column == 0:
             for number, lines in enumerate(wrapped):
                 sheet.lines(MARGIN_PT, top + (number + 0.5) * _ROW_PT + 2.7, lines, 8.4, size=_LABEL_SIZE)
-            sheet.text(MARGIN_PT, top + plot_pt + 10, "counts of answers", size=SMALL, colour=style.TEXT_SOFT)
+            sheet.text(MARGIN_PT, top + plot_pt + 10, "number of answers", size=SMALL, colour=style.TEXT_SOFT)
         else:
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
         x += (panel_pt - widths.total) / 2
@@ -530,14 +533,14 @@ def answers_picture(
             for participant, session, status, excluded in study.participants[columns].head(5).itertuples(index=False)
         )
         raise AnalysisError(
-            f"{study.folder}: no completed session with answers in {block.id!r} yet ({states}): figures need "
+            f"{study.folder}: no completed session has answers in {block.id!r} yet ({states}). Figures need "
             "completed sessions; export writes all available data"
         )
     words = _caption(study, block)
     if lowest:
         words += (
-            " Dashed: lowest delay with a trend (step-down test, error rate controlled over all statements), "
-            "an upper bound of the noticeable delay."
+            " Dashed line: lowest delay with a trend (step-down test, error rate controlled across all statements), "
+            "which is an upper bound for the noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)
     numbers = study.aggregate(block).to_csv(sep="\t", index=False)
@@ -552,7 +555,7 @@ def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Lo
     people = sorted(answers["participant"].unique())
     plots = [(item.short, by_participant(answers, people, block.columns, item.id)) for item in block.items]
     marked = [lowest.get(item.id) for item in block.items]
-    foot = f"Added delay, ms.   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
+    foot = f"Added delay in ms.   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
     return draw_answers(plots, block.delays_ms, marked, foot, look)
 
 
@@ -599,7 +602,7 @@ def draw_recognition(
             _cell(sheet, axes, row, counts[place], sum(counts), right=right[row] == place)
     for number, name in enumerate(settings):
         sheet.text(left - 6, top + height * (number + 0.5) + 2.6, name, size=7.5, ha="right")
-    foot = "Counts, with the percentage of the row. Framed: the correct name."
+    foot = "Counts, with row percentages. Outlined: the correct name."
     sheet.text(MARGIN_PT, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 

@@ -145,8 +145,9 @@ def _level_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
     """Draw the answers of a block against level."""
     bands = _bands(study, result, tracked)
     own = len(people(result)) - _MOST_PEOPLE
-    left_out = f" {counted(own, 'more participant')} only in the table." if own > 0 else ""
-    chance = "" if result.guess_rate is None else f" Dashed: chance ({100 * result.guess_rate:.0f} %)."
+    more = counted(own, "further participant is", "further participants are")
+    left_out = f" {more} shown only in the table." if own > 0 else ""
+    chance = "" if result.guess_rate is None else f" Dashed line: chance ({100 * result.guess_rate:.0f} %)."
     caption = (
         f"{result.title}: {summary_words(result)} at each level. {_panels(result, bool(bands))}{chance}{left_out} "
         f"{sample_words(study, len(people(result)))}"
@@ -163,18 +164,19 @@ def _bands(study: Study, result: LevelsResult, tracked: _Tracked) -> Mapping[str
 
 
 def _panels(result: LevelsResult, banded: bool) -> str:
-    band = ", with the 95 % band" if banded else ""
+    band = " with 95 % bands" if banded else ""
     crosses = "; crosses: catch trials" if any(answer.catch for answer in Answers.of(result)) else ""
     if Thresholds.own(result):
         return (
-            f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals of the "
-            "thresholds, stacked for several standards; circles: answers at each level, area proportional to "
-            f"their number{crosses}. First panel: all participants."
+            f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals for the "
+            "thresholds (stacked if there are several standards); circles: answers at each level, with an area "
+            f"proportional to their number{crosses}. First panel: all participants."
         )
-    units = ", without each participant's unit" if result.own_units else ""
+    units = " after removing the individual unit" if result.own_units else ""
     return (
-        f"First panel: {mean_words(result)} over the participants with its 95 % interval (Student's t); thin lines "
-        f"show participants{units}. Other panels: each participant with the 95 % interval of the answers{crosses}."
+        f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); thin lines "
+        f"show single participants{units}. Other panels: one participant each, with 95 % intervals for the "
+        f"answers{crosses}."
     )
 
 
@@ -373,16 +375,15 @@ def _track_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
     block = next(block for block in study.levels if block.id == result.block)
     shown = list(courses(block, tracked(), _MOST_PANELS))
     rest = len(Thresholds.own(result)) - len(shown)
-    left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
+    left_out = f" {counted(rest, 'further panel is', 'further panels are')} not shown." if rest > 0 else ""
     success = "correct" if result.counts == "correct" else f"“{result.counts}”"
     marks = " Colours: tracks." if any(course.tracks.max() > 1 for course in shown) else ""
     marks += " Rings: reversals." if any(course.reversals.any() for course in shown) else ""
-    marks += (
-        " ×: catch trials answered correctly; +: incorrectly." if any(course.catches.any() for course in shown) else ""
-    )
+    if any(course.catches.any() for course in shown):
+        marks += " ×: catch trial answered correctly; +: catch trial answered incorrectly."
     caption = (
-        f"{result.title}: the level of each trial. Filled: {success}; hollow: otherwise.{marks} Band: 95 % "
-        f"interval of the threshold from the answers so far.{left_out} "
+        f"{result.title}: the level of each trial. Filled: answered {success}; hollow: not.{marks} Band: 95 % "
+        f"interval for the threshold, given the answers up to that trial.{left_out} "
         f"{sample_words(study, len(people(result)))}"
     )
     return picture_of(
@@ -408,7 +409,7 @@ def _draw_tracks(result: LevelsResult, shown: Sequence[TrackCourse], look: Look)
         _over_trials(axes, result, n, ends, first=first)
         _track_panel(axes, shown[place])
 
-    below = "Trial at the standard" if standards else "Trial"
+    below = "Number of the trial at this standard" if standards else "Trial number"
     return panels(look, level_words(result), names, draw, below)
 
 
@@ -449,11 +450,11 @@ def _settings_picture(
 ) -> Picture:
     """Draw the settings of an adjustment block, once the key is open."""
     rest = len(Settings.own(result)) - _MOST_PANELS
-    left_out = f" {counted(rest, 'more panel')} not shown." if rest > 0 else ""
+    left_out = f" {counted(rest, 'further panel is', 'further panels are')} not shown." if rest > 0 else ""
     compared = any(setting.constant_error is not None for setting in Settings.own(result))
-    standard = " Dashed: standard." if compared else ""
+    standard = " Dashed line: standard." if compared else ""
     caption = (
-        f"{result.title}: the levels set by participants, in order. Filled: started high; hollow: started low. "
+        f"{result.title}: the levels set by participants, in trial order. Filled: started high; hollow: started low. "
         f"Line and band: point of subjective equality with its 95 % interval (Student's t).{standard}{left_out} "
         f"{sample_words(study, len(people(result)))}"
     )
@@ -554,10 +555,10 @@ def _percentage_phrase(result: LevelsResult) -> str:
 def _weber_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, _tracked: _Tracked) -> Picture:
     """Draw the Weber fractions of a block with thresholds at two or more standards."""
     listed = "; ".join(published_words(published) for published in result.published)
-    published = f" Open circles and dotted lines: published values, {listed}." if _published_fractions(result) else ""
+    published = f" Open circles and dotted lines: published values ({listed})." if _published_fractions(result) else ""
     caption = (
-        f"{result.title}: Weber fraction of {result.quantity}{_percentage_phrase(result)}, against the standard. Thin: "
-        f"participants; thick: random-effects mean with its 95 % interval.{published} "
+        f"{result.title}: Weber fraction for {result.quantity}{_percentage_phrase(result)}, as a function of the "
+        f"standard. Thin lines: participants; thick line: random-effects mean with its 95 % interval.{published} "
         f"{sample_words(study, len(people(result)))}"
     )
     return picture_of(
@@ -599,7 +600,7 @@ def _draw_fractions(result: LevelsResult, look: Look) -> Sheet:
             axes.plot([x, x], [low, high], color=style.ACCENT, linewidth=1.2, zorder=3)
     for label in (*axes.get_xticklabels(), *axes.get_yticklabels()):
         label.set_fontproperties(sheet.font(SMALL))
-    below = f"Standard of {result.quantity}" + (f" [{result.unit}]" if result.unit else "")
+    below = f"Standard for {result.quantity}" + (f" [{result.unit}]" if result.unit else "")
     sheet.text(_WEBER_LEFT_PT, sheet.height_pt - 8, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 

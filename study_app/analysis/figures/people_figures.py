@@ -114,7 +114,9 @@ def numbers_of_panels(panels: Sequence[Panel]) -> str:
     rows = [["participant", *(name for name, _ in columns)]]
     rows += [[person, *(_cell(column.values.get(person)) for _, column in columns)] for person in people]
     for field in ("value", "low", "high"):
-        label = {"value": "mean", "low": "95 % interval, lower end", "high": "95 % interval, upper end"}[field]
+        label = {"value": "mean", "low": "lower end of the 95 % interval", "high": "upper end of the 95 % interval"}[
+            field
+        ]
         rows.append([label, *(_cell(getattr(column.mean, field, None)) for _, column in columns)])
     return "".join("\t".join(row) + "\n" for row in rows)
 

@@ -105,7 +105,9 @@ def draw_distribution(asked: PlacedQuestion, result: QuestionResult, look: Look)
 
 
 _DISTRIBUTION: Final = _QuestionFigure(
-    "distribution", draw_distribution, "Each dot is an answer; line: median; band: interquartile range."
+    "distribution",
+    draw_distribution,
+    "Each dot is one answer; the line shows the median and the band the interquartile range.",
 )
 
 
@@ -132,7 +134,7 @@ def draw_options(asked: PlacedQuestion, result: QuestionResult, look: Look) -> S
 
 
 _OPTIONS: Final = _QuestionFigure(
-    "counts", draw_options, "Number of participants who chose each option; grey: all who answered."
+    "counts", draw_options, "Number of participants who chose each option; grey bars show how many answered."
 )
 
 
@@ -186,7 +188,9 @@ def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
 
 
 _RATINGS: Final = _QuestionFigure(
-    "rating", draw_ratings, "Each bar shows the proportions of answers at each point, labelled with counts."
+    "rating",
+    draw_ratings,
+    "Each bar shows the proportion of answers at each point of the scale, labelled with the number of answers.",
 )
 
 

@@ -60,7 +60,9 @@ def estimates_of(result: LevelsResult) -> Estimates | None:
             return Estimates([row for row in rows if row.participant is None], own, attribute, words)
     answers = [answer for answer in Answers.of(result) if not answer.catch]
     own = [answer for answer in answers if answer.participant is not None]
-    words = f"share of answers “{result.counts}”" if result.summary == "share" else f"{result.summary} of the answers"
+    words = (
+        f"proportion of “{result.counts}” answers" if result.summary == "share" else f"{result.summary} of the answers"
+    )
     return Estimates([answer for answer in answers if answer.participant is None], own, "value", words) if own else None
 
 
@@ -126,12 +128,12 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
             log=log,
         )
     )
-    band = " Band: the equivalence bound." if bound is not None else ""
+    band = " Band: equivalence bounds." if bound is not None else ""
     weighted = " Means are weighted as in the test." if contrast.contrast.measure == "threshold" else ""
-    lines = "Lines join the numbers of a participant. " if within else ""
+    lines = "Each line joins a participant's two values. " if within else ""
     caption = (
         f"{capitalised(contrast.contrast.described(contrast.compared))}. {lines}Right: {_effect_name(contrast)}"
-        f"{', of each participant and on average' if within else ''}; dashed: no difference.{band}{weighted} "
+        f"{', for each participant and on average' if within else ''}; dashed line: no difference.{band}{weighted} "
         f"{sample_words(study, contrast.n)}"
     )
     result = next((level for level in results.levels if level.block == contrast.contrast.blocks[0]), None)
@@ -164,7 +166,7 @@ def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
         return f"{'Ratio' if contrast.ratio else 'Difference'}, {contrast.contrast.measure_words}"
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:
         return level_words(result)
-    return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points of the scale")
+    return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points on the scale")
 
 
 def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: str) -> Picture | None:
@@ -189,9 +191,9 @@ def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: s
 
     panel = Panel(columns=tuple(map(column, places)), log=log)
     people = len({one.participant for one in estimates.own})
-    of_each = " Thin lines: the 95 % interval of each participant, in the order of the numbers." if alone else ""
+    of_each = " Thin lines: each participant's 95 % interval, sorted by value." if alone else ""
     caption = (
-        f"{result.title}: {estimates.words} of each participant, and the mean with its 95 % interval.{of_each} "
+        f"{result.title}: {estimates.words} for each participant, and the mean with its 95 % interval.{of_each} "
         f"{sample_words(study, people)}"
     )
     words = estimates.words if estimates.words == "d′" else capitalised(estimates.words)
@@ -268,7 +270,7 @@ def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence
     people = len({who for panel in panels for column in panel.columns for who in column.values})
     title = next(question.where.title for question in study.others.questions if question.where.id == where)
     caption = (
-        f"{title}: the value of each participant, and the mean with Student's 95 % interval. "
+        f"{title}: the value for each participant, and the mean with its 95 % confidence interval (Student's t). "
         f"{sample_words(study, people)}"
     )
     draw, numbers = partial(draw_people, panels, above="", members=group_members(study)), numbers_of_panels(panels)

@@ -78,18 +78,18 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     """Yield sentences on how the comparisons with the shortest delay were made, and on their limits."""
     first = against[0].found
     yield (
-        f"Two one-sided t tests with an equivalence bound of {_points(first.bound)}, and "
-        f"{percent(1 - 2 * first.alpha)} intervals. Equivalent: both the t tests and the bootstrap show that the mean "
-        f"difference lies within the bound, with {min_sample_reason(first.alpha, first.bound)}. "
-        "Not equivalent: the whole interval lies beyond the bound; this is not corrected for the number of "
-        "comparisons. Inconclusive: neither, "
-        "which does not show a difference. Out of reach: too few participants to show equivalence with any answers."
+        f"Each comparison uses two one-sided t tests with equivalence bounds of {_points(first.bound)}, and a "
+        f"{percent(1 - 2 * first.alpha)} confidence interval. Equivalent: both the t tests and the bootstrap show that "
+        f"the mean difference lies within the bounds, with {min_sample_reason(first.alpha, first.bound)}. "
+        "Not equivalent: the whole confidence interval lies outside the bounds; this verdict is not corrected for the "
+        "number of comparisons. Inconclusive: neither was shown, which is not evidence of a difference. Out of reach: "
+        "with so few participants, no answers could have shown equivalence."
     )
     disagree = sum(tested.found.checks_agree is False for tested in against)
     if disagree:
         yield (
-            f"* The t tests and the bootstrap disagree ({disagree} of {len(against)} comparisons). A comparison counts "
-            "as equivalent only if both agree."
+            f"* The t tests and the bootstrap disagree in {disagree} of {len(against)} comparisons. A comparison "
+            "counts as equivalent only if both agree."
         )
 
 
@@ -112,7 +112,7 @@ def by_delay(result: BlockResult) -> list[list[str]]:
 def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
     if all(tested.verdict == "equivalent" for tested in here):
         not_excluded = _not_excluded([tested.found for tested in here])
-        return f"Mean answers to these statements stay within the bound; {not_excluded}."
+        return f"Mean answers to these statements stay within the bounds, but {not_excluded}."
     claim = f"“delays up to {ms(delay_ms)} do not matter”"
     if reasons := _evidence_up_to(result, delay_ms):
         return f"These data speak against {claim}: {'; '.join(reasons)}."
@@ -137,7 +137,7 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
         if tested.verdict == "not equivalent" and tested.delay_ms <= delay_ms:
             beyond.setdefault(tested.delay_ms, []).append(f"“{short_text(result, tested.item)}”")
     differing = (
-        f"at {ms(at)} {listed(items)} differ{'s' * (len(items) == 1)} by more than the bound"
+        f"at {ms(at)}, {listed(items)} differ{'s' * (len(items) == 1)} by more than the bound"
         for at, items in beyond.items()
     )
     return (*trends, *differing)
@@ -168,7 +168,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
         if bound is None:
-            why = "the protocol states no equivalence bound, and one chosen now would depend on the answers"
+            why = "the protocol does not state an equivalence bound, and a bound chosen now would depend on the answers"
             return (), (NotTested(cls.what, why),)
         compared = []
         for item in answers.block.items:
@@ -204,7 +204,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if not self.value:
             return
         control = ms(self.value[0].control_ms)
-        yield heading(3, f"Each delay against {control}")
+        yield heading(3, f"Comparison of each delay with {control}")
         yield table_of(
             self.value,
             ("Statement", lambda tested: short_text(self.found, tested.item)),
@@ -212,15 +212,15 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             ("n", lambda tested: str(tested.found.n)),
             ("difference", lambda tested: number(tested.found.effect)),
             ("interval", lambda tested: interval(tested.found.interval)),
-            ("people beyond the bound", lambda tested: beyond_phrase(tested.found)),
-            ("p equivalent", lambda tested: p_value(tested.found.p)),
-            ("p, bootstrap", lambda tested: p_value(tested.found.p_bootstrap)),
+            ("participants outside the bounds", lambda tested: beyond_phrase(tested.found)),
+            ("p (t tests)", lambda tested: p_value(tested.found.p)),
+            ("p (bootstrap)", lambda tested: p_value(tested.found.p_bootstrap)),
             ("Verdict", lambda tested: tested.verdict + (" *" if tested.found.checks_agree is False else "")),
             words=2,
             last=1,
         )
         yield paragraph(" ".join(_about_against(self.value)), "soft")
-        head = ("Delay", *(f"{verdict} in" for verdict in _VERDICTS), "what can be said")
+        head = ("Delay", *(f"{verdict} in" for verdict in _VERDICTS), "Conclusion")
         yield table(head, by_delay(self.found), words=len(head), folded=True)
 
     def limits(self) -> Iterator[str]:
@@ -230,24 +230,25 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
                 f"{lead_phrase(result)}: a comparison can count as equivalent only with "
                 f"{min_sample_reason(first.alpha, first.bound)}. This study has {result.n}."
             )
-        undecided = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
-        if undecided:
+        open_ones = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
+        if open_ones:
             yield (
-                f"{lead_phrase(result)}: {len(undecided)} of {number_text.counted(len(against), 'comparison')} with "
-                f"{ms(undecided[0].control_ms)} {'is' if len(undecided) == 1 else 'are'} undecided: the mean "
-                "difference is not shown to lie within the equivalence bound, nor beyond it."
+                f"{lead_phrase(result)}: {len(open_ones)} of {number_text.counted(len(against), 'comparison')} with "
+                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} inconclusive, because the "
+                "mean difference was not shown to lie either within the equivalence bounds or outside them."
             )
 
     def methods(self) -> Iterator[str]:
         if self.value:
             first = self.value[0].found
-            beforehand = ", stated before the first session" if self.results.decided.binding else ""
+            beforehand = " (stated before the first session)" if self.results.decided.binding else ""
             yield (
-                f"Each delay was compared with {ms(self.value[0].control_ms)} by two one-sided t tests on paired "
-                f"differences, with an equivalence bound of {_points(first.bound)}{beforehand}, and "
-                f"{percent(1 - 2 * first.alpha)} intervals. A delay was called equivalent only if a bootstrap that "
-                "adds a participant like the most extreme one (Gaffke 2005) agreed, and only with "
-                f"{min_sample(first.alpha, first.bound)}; not equivalent if its whole interval was beyond the bound."
+                f"Each delay was compared with {ms(self.value[0].control_ms)} using two one-sided t tests on paired "
+                f"differences, with equivalence bounds of {_points(first.bound)}{beforehand} and "
+                f"{percent(1 - 2 * first.alpha)} confidence intervals. A delay was called equivalent only if a "
+                "bootstrap that adds a participant as extreme as the most extreme one (Gaffke 2005) agreed, and only "
+                f"with {min_sample(first.alpha, first.bound)}. It was called not equivalent if the whole confidence "
+                "interval was outside the bounds."
             )
 
 
@@ -295,7 +296,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             steps = step_down(answers.values[test.item], answers.block.delays_ms, direction, alpha=alpha)
             lowest.append(Lowest(test.item, steps, test.members))
         if trends and not showing:
-            why = "no statement shows a trend over all delays, which does not show that delays go unnoticed"
+            why = "no statement shows a trend over all delays, although this does not mean that delays go unnoticed"
             return (), (NotTested(cls.what, why),)
         return tuple(lowest), ()
 
@@ -306,7 +307,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
                 row |= rows_alone(self.found, f"stepping down within {lowest.item}") | {
                     "members": len(lowest.steps.steps)
                 }
-                row |= {"correction": "none: fixed order, ends at the first test that is not significant"}
+                row |= {"correction": "none: tests in a fixed order that end at the first non-significant one"}
                 yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
 
     def section(self) -> Iterator[str]:
@@ -320,7 +321,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             ("lowest", lambda row: "–" if row.over_all_ms is None else f"≤ {ms(row.over_all_ms)}"),
             ("uncorrected", lambda row: "–" if row.steps.lowest_ms is None else f"≤ {ms(row.steps.lowest_ms)}"),
             (
-                "steps down: longest delay, p",
+                "longest delay and p at each step",
                 lambda lowest: "; ".join(
                     f"{ms(step.longest_ms)} {p_value(step.trend.p)}" for step in lowest.steps.steps
                 ),
@@ -331,9 +332,9 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         yield paragraph(
             "If there is a trend, the longest delay is dropped and the trend is tested again; this is repeated until "
             f"no trend remains. “Lowest” requires p ≤ alpha / {members} at every step, which controls the error rate "
-            f"over {all_of(members, 'statement')}; “uncorrected” requires p ≤ alpha, which controls it only within one "
-            "statement. The lowest delay is an upper bound, and is too long rather than too short: with few "
-            "participants only long delays show a trend.",
+            f"across {all_of(members, 'statement')}; “uncorrected” requires p ≤ alpha, which controls it only within a "
+            "single statement. The lowest delay is an upper bound: it tends to be too long rather than too short, "
+            "because with few participants only long delays show a trend.",
             "soft",
         )
 
@@ -348,7 +349,7 @@ class DetectionThreshold(Finding[Threshold | None]):
     kinds = ("delays",)
     waits = ("delays",)
     figure_name = "threshold"
-    figure_title = "Agreement against delay"
+    figure_title = "Agreement as a function of delay"
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[Threshold | None, Absent]:
@@ -359,7 +360,7 @@ class DetectionThreshold(Finding[Threshold | None]):
             test.item for test in DelayTrend.of(result) if test.verdict in FOUND and (test.outcome.effect or 0.0) > 0
         ]
         if item not in rising:
-            return None, (NotTested(cls.what, "agreement is not shown to increase with the delay"),)
+            return None, (NotTested(cls.what, "agreement was not shown to increase with the delay"),)
         return noticed(answers.single[item], answers.block.delays_ms), ()
 
     def rows(self) -> Iterator[Row]:
@@ -372,20 +373,20 @@ class DetectionThreshold(Finding[Threshold | None]):
         threshold = self.value
         if threshold is None:
             return
-        yield heading(3, "At which delay do participants notice a difference?")
+        yield heading(3, "At what delay do participants notice a difference?")
         counts = ", ".join(
-            f"{ms(level)} {yes} of {asked}"
+            f"{yes} of {asked} at {ms(level)}"
             for level, yes, asked in zip(threshold.levels, threshold.yes, threshold.asked, strict=True)
         )
         if threshold.effect is None:
-            yield paragraph(f"No threshold: {threshold.note}. Answers that agree (5 to 7): {counts}.")
+            yield paragraph(f"There is no threshold: {threshold.note}. Answers that agree (5 to 7): {counts}.")
             yield from self.drawn()
             return
         yield paragraph(
             f"Detection threshold: {number(threshold.effect, 0)} ms, {_threshold_interval(threshold)}, "
             f"n = {threshold.n}. {_half_way(threshold)} Answers that agree (5 to 7): {counts}. "
-            f"{threshold.note[:1].upper()}{threshold.note[1:]}. Fit: {threshold.method}. Agreement is not a yes/no "
-            "answer: a participant who “somewhat agrees” may have noticed little difference."
+            f"{threshold.note[:1].upper()}{threshold.note[1:]}. Fit: {threshold.method}. Agreement is not the same as "
+            "answering “yes”: a participant who “somewhat agrees” may have noticed little difference."
         )
         yield from self.drawn()
 
@@ -397,16 +398,20 @@ class DetectionThreshold(Finding[Threshold | None]):
             (lowest.over_all_ms for lowest in LowestDelay.of(drawing.found) if lowest.over_all_ms is not None),
             default=None,
         )
-        curve = f"No curve: {threshold.note}."
+        curve = f"There is no curve, because {threshold.note}."
         if threshold.effect is not None:
             curve = (
                 f"Curve: {threshold.method}; diamond: the detection threshold, {number(threshold.effect, 0)} ms "
                 f"({_threshold_interval(threshold)}). {_half_way(threshold)}"
             )
-        dashed = "" if lowest is None else f" Dashed: the lowest delay with a trend in a statement, {ms(lowest)}."
+        dashed = (
+            ""
+            if lowest is None
+            else f" Dashed line: the shortest delay at which any statement shows a trend, {ms(lowest)}."
+        )
         caption = (
-            f"Proportion of answers that agree (5 to 7), against the requested delay ({drawing.simulated}n = "
-            f"{threshold.n}). Small points: participants. {curve}{dashed}"
+            f"Proportion of answers that agree (5 to 7), as a function of the requested delay ({drawing.simulated}n = "
+            f"{threshold.n}). Small points: single participants. {curve}{dashed}"
         )
         draw = partial(answer_figures.draw_threshold, threshold, self._shares(drawing), lowest)
         return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",))
@@ -426,8 +431,8 @@ class DetectionThreshold(Finding[Threshold | None]):
                 "The detection threshold is the delay at which a logistic function, fitted to agreement (5 to 7) in "
                 "single answers pooled over participants, lies halfway between the guess rate and one minus the lapse "
                 "rate (posterior median). Its 95 % interval is widened to allow for differences between participants. "
-                "It is reported only if the statement shows a trend and if the threshold lies within the presented "
-                "delays."
+                "The threshold is reported only if the statement shows a trend and the threshold lies within the range "
+                "of presented delays."
             )
 
 
@@ -441,8 +446,8 @@ def _half_way(threshold: Threshold) -> str:
     """Return a sentence that defines a detection threshold and gives the share of agreement there."""
     return (
         "The threshold is the delay at which the fitted function lies halfway between the guess rate "
-        f"({percent(threshold.guess or 0.0)}) and one minus the lapse rate ({percent(threshold.lapse or 0.0)}): "
-        f"{percent(threshold.half_way or 0.0)} of answers agree there."
+        f"({percent(threshold.guess or 0.0)}) and one minus the lapse rate ({percent(threshold.lapse or 0.0)}). "
+        f"At this delay, {percent(threshold.half_way or 0.0)} of the answers agree."
     )
 
 
@@ -452,7 +457,7 @@ class NoticedFrom(Finding[None]):
     key = "noticed from"
     place = 21
     kinds = ("delays",)
-    question = "From which delay do participants notice a difference?"
+    question = "At what delay do participants begin to notice a difference?"
     answer_figures = ("threshold", "delays")
 
     def answer(self) -> Answer:
@@ -463,10 +468,10 @@ class NoticedFrom(Finding[None]):
             text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
             is_fitted = fitted is not None and decided.is_primary(fitted) == primary
             if not text and is_fitted:
-                text = "Agreement increases with the delay, but no single delay is shown to be noticed."
+                text = "Agreement increases with the delay, but no particular delay was shown to be noticed."
             if text:
                 return self.answered(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
-        return self.answered("not shown", f"No delay is shown to be noticed. {NO_EVIDENCE}")
+        return self.answered("not shown", f"No delay was shown to be noticed. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
         """Return a sentence on the shortest delay that changes one of these statements, or ""."""
@@ -477,14 +482,14 @@ class NoticedFrom(Finding[None]):
             return ""
         at = min(one.over_all_ms or 0.0 for one in lowest)
         rated = [
-            f"{'higher' if correlation > 0 else 'lower'} in “{short_text(self.found, one.item)}” "
+            f"{'higher' if correlation > 0 else 'lower'} on “{short_text(self.found, one.item)}” "
             f"(mean rank correlation {number(correlation)})"
             for one in lowest
             if one.over_all_ms == at and (correlation := self._correlation(one, at))
         ]
         return (
-            f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)} participants already tend to rate longer delays "
-            f"{listed(rated)}. Participants may also notice shorter delays. A trend does not imply that mean ratings "
+            f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants already tended to rate longer "
+            f"delays {listed(rated)}. They may also notice shorter delays. A trend does not imply that mean ratings "
             "change."
         )
 
@@ -496,7 +501,8 @@ class NoticedFrom(Finding[None]):
         item = short_text(self.found, self.results.decided.noticed or "")
         return (
             f"The detection threshold is {number(threshold.effect, 0)} ms ({_threshold_interval(threshold)}, "
-            f"n = {threshold.n}), where {percent(threshold.half_way or 0.0)} of answers agree with “{item}”. "
+            f"n = {threshold.n}); at this delay, {percent(threshold.half_way or 0.0)} of the answers agree with "
+            f"“{item}”. "
         )
 
     def _correlation(self, lowest: Lowest, up_to_ms: float) -> float:
@@ -512,7 +518,7 @@ class UnchangedUpTo(Finding[None]):
     key = "unchanged up to"
     place = 22
     kinds = ("delays",)
-    question = "Up to which delay do answers not change by a relevant amount?"
+    question = "Up to what delay do answers not change by a relevant amount?"
     answer_figures = ("effects",)
 
     def answer(self) -> Answer:
@@ -523,7 +529,7 @@ class UnchangedUpTo(Finding[None]):
                 (not_tested.why for not_tested in self.found.absent if "equivalence" in not_tested.what),
                 "there was no comparison",
             )
-            return self.answered("not tested", f"No answer: {why}.")
+            return self.answered("not tested", f"There is no answer, because {why}.")
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
             return self.answered(
@@ -531,7 +537,7 @@ class UnchangedUpTo(Finding[None]):
             )
         statements = all_of(len(equivalent_up_to(against)), "statement")
         share = _not_excluded([tested.found for tested in against if tested.delay_ms <= at])
-        text = f"Up to {ms(at)} mean answers to {statements} stay {within}; {share}."
+        text = f"Up to {ms(at)}, mean answers to {statements} stay {within}, but {share}."
         return self.answered("shown", text)
 
 
@@ -546,8 +552,8 @@ def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) 
     most = max(known, key=lambda one: abs(one.found.effect or 0.0))
     return (
         f"The largest mean difference is {number(most.found.effect)} points (“{short_text(result, most.item)}” at "
-        f"{ms(most.delay_ms)}, {percent(1 - 2 * most.found.alpha)} interval {interval(most.found.interval)}, "
-        f"n = {most.found.n}). "
+        f"{ms(most.delay_ms)}, {percent(1 - 2 * most.found.alpha)} confidence interval "
+        f"{interval(most.found.interval)}, n = {most.found.n}). "
     )
 
 
@@ -555,10 +561,10 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
     """Return a sentence on the number of comparisons that are not equivalent, or on their absence."""
     beyond = sum(tested.verdict == "not equivalent" for tested in against)
     if not beyond:
-        return "This does not show that they change."
+        return "This is not evidence that they change."
     return (
-        f"In {beyond} of {number_text.counted(len(against), 'comparison')} the whole interval lies beyond the bound "
-        "(not equivalent; not corrected for the number of comparisons)."
+        f"In {beyond} of {number_text.counted(len(against), 'comparison')}, the whole confidence interval lies outside "
+        "the equivalence bounds (not equivalent; not corrected for the number of comparisons)."
     )
 
 
@@ -567,7 +573,7 @@ def _not_excluded(tested: Sequence[Equivalence]) -> str:
     most = max(
         (equivalence.beyond.interval.high for equivalence in tested if equivalence.beyond is not None), default=1.0
     )
-    return f"the data do not exclude that up to {100 * most:.0f} % of people differ by more"
+    return f"the data do not rule out that up to {100 * most:.0f} % of people differ by more"
 
 
 def _points(bound: float) -> str:
@@ -587,7 +593,7 @@ def _kept(block: Block, results: Results) -> str:
     here = [delivered for delivered in results.delivered if delivered.block == block.id]
     judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
     if not judged:
-        return "Whether trials met the protocol's timing limits was not measured."
+        return "It was not measured whether trials met the protocol's timing limits."
     return f"{valid} of {judged} trials met the protocol's timing limits; all are included."
 
 
@@ -597,7 +603,7 @@ class Movement(Finding[None]):
     key = "movement"
     place = 11
     figure_name = "movement"
-    figure_title = "Reaching over added delay"
+    figure_title = "Reaching as a function of added delay"
 
     def section(self) -> Iterable[str]:
         return self.drawn()
@@ -613,12 +619,15 @@ class Movement(Finding[None]):
         ]
         people = medians["participant"].nunique()
         n = counted(people, "participant")
-        foot = "Added delay, ms. Each point is a participant's median over the reaches of a trial, excluding the first."
+        foot = (
+            "Added delay in ms. Each point is a participant's median across the reaches of a trial, excluding the "
+            "first."
+        )
         caption = (
-            f"How participants reached, against the requested delay ({drawing.simulated}n = {people} with "
+            f"Reaching movements as a function of the requested delay ({drawing.simulated}n = {people} with "
             f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: "
-            "interquartile range. Movement time is the time from the lighting of a target to the final entry. "
-            f"Scales do not begin at zero. {_kept(block, drawing.results)}"
+            "interquartile range. Movement time runs from when a target lights up until the hand enters it for the "
+            f"last time. The scales do not begin at zero. {_kept(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
         draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=True)

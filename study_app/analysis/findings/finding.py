@@ -247,35 +247,35 @@ def verdict(p: float | None, least: float | None, alpha: float, *, primary: bool
 
 
 TESTS: Final = (
-    Column("block", "text", "Id of the block."),
-    Column("question", "text", "The question."),
+    Column("block", "text", "ID of the block."),
+    Column("question", "text", "Question that the test answers."),
     optional("item", "text", "ID of the statement; n/a if the test covers several statements."),
-    optional("comparison", "text", "The conditions tested, if not all."),
-    Column("test", "text", "The test."),
-    Column("n", "integer", "Participants used.", minimum=0),
+    optional("comparison", "text", "Conditions that are compared; n/a if the test covers all of them."),
+    Column("test", "text", "Name of the test."),
+    Column("n", "integer", "Number of participants included.", minimum=0),
     Column("dropped", "integer", "Number of participants excluded because of missing answers.", minimum=0),
-    Column("statistic_name", "text", "Name of the statistic."),
-    optional("statistic", "number", "The statistic."),
-    optional("p", "number", "p, not corrected.", minimum=0, maximum=1),
-    optional("p_adjusted", "number", "p corrected within the family.", minimum=0, maximum=1),
-    optional("smallest_p", "number", "The smallest p that these data could have given.", minimum=0, maximum=1),
-    optional("family", "text", "Family of tests that are corrected together."),
-    optional("members", "integer", "Tests in the family.", minimum=1),
-    optional("correction", "text", "Correction of p."),
+    Column("statistic_name", "text", "Name of the test statistic."),
+    optional("statistic", "number", "Value of the test statistic."),
+    optional("p", "number", "Uncorrected p value.", minimum=0, maximum=1),
+    optional("p_adjusted", "number", "p value corrected within the family.", minimum=0, maximum=1),
+    optional("smallest_p", "number", "Smallest p value that these data could have given.", minimum=0, maximum=1),
+    optional("family", "text", "Name of the family of tests that are corrected together."),
+    optional("members", "integer", "Number of tests in the family.", minimum=1),
+    optional("correction", "text", "Method used to correct the p value."),
     optional("primary", "flag", "true if the test was planned before the study."),
-    optional("verdict", "text", "Verdict."),
+    optional("verdict", "text", "Verdict on the test."),
     Column("effect_name", "text", "Name of the effect size."),
-    optional("effect", "number", "The effect."),
-    optional("low", "number", "Lower end of the effect's interval."),
-    optional("high", "number", "Upper end of the effect's interval."),
-    optional("level", "number", "Confidence of the interval."),
-    optional("interval", "text", "Method of the interval, or why there is none."),
-    Column("method", "text", "How p was found."),
+    optional("effect", "number", "Value of the effect size."),
+    optional("low", "number", "Lower end of the effect's confidence interval."),
+    optional("high", "number", "Upper end of the effect's confidence interval."),
+    optional("level", "number", "Confidence level of the interval."),
+    optional("interval", "text", "Method used for the interval, or why there is none."),
+    Column("method", "text", "How the p value was calculated."),
     optional("note", "text", "Notes on the result."),
     Column(
         "codes",
         "text",
-        "Codes of the compared conditions in their order, separated by spaces; + joins conditions with the same delay.",
+        "Codes of the compared conditions, in order and separated by spaces; + joins conditions with the same delay.",
     ),
 )
 
@@ -331,7 +331,7 @@ def rows_alone(result: BlockResult, what: str) -> dict[str, Any]:
     return {"family": f"{result.id}: {what}", "members": 1, "correction": ALONE}
 
 
-NO_EVIDENCE: Final = "This does not show that there is no difference."
+NO_EVIDENCE: Final = "This is not evidence that there is no difference."
 FOUND: Final = ("shown", "suggested")
 
 

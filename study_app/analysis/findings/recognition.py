@@ -48,7 +48,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     key = "named"
     place = 4
     row_place = 8
-    what = "test of recognition"
+    what = "recognition test"
     kinds = ("liquids",)
     waits = ("liquids",)
     figure_name = "recognition"
@@ -62,7 +62,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         if not labels or not set(labels) <= answers.values.keys() or not any(right):
             return None, (NotTested(cls.what, "the protocol does not say which statements name these liquids"),)
         if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
-            return None, (NotTested(cls.what, f"it needs 2 to {MOST_NAMED} conditions and two names"),)
+            return None, (NotTested(cls.what, f"the test needs 2 to {MOST_NAMED} conditions and at least two names"),)
         ratings = np.stack([answers.values[label] for label in labels], axis=2)
         truth = [None if label is None else labels.index(label) for label in right]
         tested = recognition(named_labels(ratings), truth, len(labels), seed=answers.intervals)
@@ -87,7 +87,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             ("correct", lambda rate: str(rate.hits)),
             ("of", lambda rate: str(rate.n)),
             ("undecided", lambda rate: str(named.found.table[rate.setting][_UNDECIDED_COLUMN])),
-            ("share", lambda rate: number(rate.rate)),
+            ("proportion", lambda rate: number(rate.rate)),
             ("95 % interval", lambda rate: interval(rate.interval)),
             ("closest other liquid", lambda rate: "–" if rate.rival is None else self.found.names[rate.rival]),
             ("p", lambda rate: p_value(rate.p)),
@@ -100,14 +100,15 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         yield paragraph(
             f"Correct names: {number(outcome.statistic, 0)}; {number(outcome.expected, 1)} expected by chance; "
             f"{p_equals(outcome.p)} ({outcome.method}; smallest attainable {p_equals(outcome.smallest_p or 0.0)}): "
-            f"{named.verdict}. {_kappa_words(outcome)} {_undecided_words(outcome)}This is one test; p is not "
-            "corrected for other tests."
+            f"{named.verdict}. {_kappa_words(outcome)} {_undecided_words(outcome)}This is a single test, so its p "
+            "value is not corrected."
         )
-        how = "" if outcome.interval is None else f" Interval of kappa: {outcome.interval.method}."
+        how = "" if outcome.interval is None else f" Confidence interval for kappa: {outcome.interval.method}."
         yield paragraph(
-            f"Intervals of proportions are Clopper–Pearson intervals.{how} p tests whether the name is used for the "
-            "liquid more often than for each other liquid, within participants (McNemar's exact test, one-sided); the "
-            "liquid with the largest p is the closest other liquid. Adjusted p is Holm-corrected across the liquids.",
+            f"Confidence intervals for proportions are Clopper–Pearson intervals.{how} The p value is from a "
+            "within-participant test of whether the name is used more often for the liquid than for each other liquid "
+            "(McNemar's exact test, one-sided); the other liquid with the largest p value is the closest one. Adjusted "
+            "p values are Holm-corrected across the liquids.",
             "soft",
         )
 
@@ -126,8 +127,8 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             )
         caption = (
             "The name that was rated highest for each liquid "
-            f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and percentages of the "
-            f"row; correct names are framed. Undecided: two or more names were rated equally high.{chance}"
+            f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and row percentages; "
+            f"correct names are outlined. Undecided: two or more names were rated equally high.{chance}"
         )
         return drawing.picture(
             self.figure_title,
@@ -146,10 +147,10 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         if self.value is not None:
             yield (
                 "Participants were taken to have named the liquid whose statement they rated highest; answers with "
-                "equal highest ratings are undecided and count as incorrect. The number of correct names was tested "
+                "tied highest ratings are undecided and count as incorrect. The number of correct names was tested "
                 "by permuting the liquids within participants (exact, one-sided). In addition, a liquid was called "
-                "recognised only if its name was used for it more often than for each other liquid (McNemar's exact "
-                "test within participants, one-sided, with p Holm-adjusted across the liquids)."
+                "recognised only if its name was used more often for it than for each other liquid (McNemar's exact "
+                "test within participants, one-sided, with p values Holm-adjusted across the liquids)."
             )
 
 
@@ -160,10 +161,10 @@ _UNDECIDED_COLUMN: Final = -2
 def _kappa_words(outcome: Recognition) -> str:
     """Return a sentence with kappa, its interval and the number of answers."""
     if outcome.effect is None:
-        return f"Cohen's kappa does not exist ({outcome.no_interval.removeprefix('no interval: ')})."
-    ends = outcome.no_interval if outcome.interval is None else f"95 % interval {interval(outcome.interval)}"
+        return f"Cohen's kappa could not be calculated ({outcome.no_interval.removeprefix('no interval: ')})."
+    ends = outcome.no_interval if outcome.interval is None else f"95 % confidence interval {interval(outcome.interval)}"
     return (
-        f"Cohen's kappa of the {number_text.counted(outcome.decided, 'decided answer')} is {number(outcome.effect)} "
+        f"Cohen's kappa for the {number_text.counted(outcome.decided, 'decided answer')} is {number(outcome.effect)} "
         f"({ends})."
     )
 
@@ -222,7 +223,7 @@ class Distinguished(Finding[None]):
         if apart:
             text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
         elif items:
-            text = f"The {result.kind} were rated differently in {listed(items)}; the tests do not show which ones."
+            text = f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which ones."
         else:
             text = f"No statement showed a difference between any two {result.kind}."
         if named is not None and named.found.p is not None:

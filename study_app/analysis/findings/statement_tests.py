@@ -81,8 +81,8 @@ def table_of_tests(
         last=1,
     )
     yield paragraph(
-        f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}. Effect: "
-        f"{first.outcome.effect_name}{above}." + (f" Intervals: 95 %, {'; '.join(intervals)}." if intervals else ""),
+        f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}. Effect size: {first.outcome.effect_name}"
+        f"{above}." + (f" Confidence intervals (95 %): {'; '.join(intervals)}." if intervals else ""),
         "soft",
     )
     if reasons and not intervals:
@@ -97,7 +97,7 @@ def families(tests: Sequence[Tested]) -> str:
     """Return the description of the families: primary statements, and separately exploratory ones."""
     each = sorted({(not test.primary, test.members, test.correction) for test in tests})
     several = len(each) > 1
-    return "with p adjusted " + listed(
+    return "with p values adjusted " + listed(
         [
             f"by the {correction} method across {counted(members, f'{kind} statement')}"
             for exploratory, members, correction in each
@@ -109,7 +109,7 @@ def families(tests: Sequence[Tested]) -> str:
 def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     """Test for every statement whether the settings receive the same answers."""
     if answers.k < 2:
-        return (), (NotTested("test of settings", "the block has only one setting, so there is nothing to compare"),)
+        return (), (NotTested(SettingsDiffer.what, "the block has only one setting, so there is nothing to compare"),)
     outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
     return corrected_tests(outcomes, answers, f"{answers.block.id}: settings differ"), ()
 
@@ -157,7 +157,7 @@ class SettingsDiffer(StatementTests):
     key = "omnibus"
     place = 2
     row_place = 2
-    what = "test of settings"
+    what = "test of differences between settings"
     kinds = ("liquids", "views")
     sealed = KINDS
     statements = True
@@ -175,7 +175,7 @@ class SettingsDiffer(StatementTests):
         if tests := self.value:
             test = _first_tested(tests)
             yield (
-                f"Each statement was tested by {test_name(test.outcome)} ({test.outcome.method}), {families(tests)}; "
+                f"Each statement was tested with {test_name(test.outcome)} ({test.outcome.method}), {families(tests)}; "
                 f"the effect size is {test.outcome.effect_name}."
             )
 
@@ -190,12 +190,12 @@ class DelayTrend(StatementTests):
     key = "trends"
     place = 5
     row_place = 3
-    what = "test of a trend"
+    what = "trend test"
     kinds = ("delays",)
     waits = ("delays",)
     statements = True
     asks = "answers follow the delay"
-    title = "Do answers show a trend over the delay?"
+    title = "Do answers change with the delay?"
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
@@ -221,11 +221,11 @@ class DelayTrend(StatementTests):
             one_sided = f"one-sided in the direction stated {stated}" if all(sides) else "two-sided"
             if any(sides) and not all(sides):
                 one_sided = f"one-sided if a direction was stated {stated}, otherwise two-sided"
-            yield f"Trends over the delay were tested by {by}, {one_sided}, {families(trends)}."
+            yield f"Trends over the delay were tested with {by} ({one_sided}), {families(trends)}."
             yield (
-                "If a statement showed a trend, the longest delay was dropped and its rank correlations were tested "
-                "again until no trend remained. The shortest delay with a trend requires p ≤ alpha divided by the "
-                "number of statements at every step, and is an upper bound of the delay that participants notice."
+                "If a statement showed a trend, the longest delay was dropped and the rank correlations were tested "
+                "again, until no trend remained. The shortest delay with a trend requires p ≤ alpha divided by the "
+                "number of statements at every step, and is an upper bound for the delay that participants notice."
             )
 
 
@@ -306,7 +306,7 @@ class OverAll(Finding[Outcome | None]):
         if (overall := self.value) is None:
             return
         if overall.p is None:
-            yield paragraph(f"Test over all statements: not possible ({overall.note}).")
+            yield paragraph(f"The test over all statements was not possible ({overall.note}).")
             return
         yield paragraph(
             f"Test over all statements: {statistic(overall)}, {p_equals(overall.p)} ({overall.method}; smallest "
@@ -317,9 +317,9 @@ class OverAll(Finding[Outcome | None]):
     def methods(self) -> Iterator[str]:
         if self.value is not None:
             yield (
-                f"First, the {settings_noun(self.found)}s were compared over "
-                f"{all_of(len(self.found.items), 'statement')} together by permutation within participants; the "
-                "statistic was the sum of the statements' Friedman statistics."
+                f"First, the {settings_noun(self.found)}s were compared across "
+                f"{all_of(len(self.found.items), 'statement')} together with a within-participant permutation test; "
+                "the statistic was the sum of the statements' Friedman statistics."
             )
 
 
@@ -397,19 +397,19 @@ class Effects(Finding[tuple[Effect, ...]]):
                 )
             )
         first = name(result, result.settings[0].code)
-        what = f"Difference of each participant's answers from those at {first}" if over_delay else (
+        what = f"Difference between each participant's answers and those at {first}" if over_delay else (
             f"Each participant's answers about each {settings_noun(result)}"
         )  # fmt: skip
         caption = (
-            f"{what} ({drawing.simulated}n = {result.n}). Diamonds: means with Student's 95 % interval, not corrected "
-            "for the number of intervals. The tests decide what is shown."
-            + (f" Band: the equivalence bound, ±{bound:g}." if bound else "")
+            f"{what} ({drawing.simulated}n = {result.n}). Diamonds: means with 95 % confidence intervals (Student's "
+            "t), not corrected for the number of intervals. Conclusions are based on the tests."
+            + (f" Band: equivalence bounds of ±{bound:g}." if bound else "")
         )
         draw = partial(
             draw_people,
             panels,
-            above=f"Difference from {first}, points" if over_delay else "Points of the scale",
-            below="Added delay, ms" if over_delay else "",
+            above=f"Difference from {first}, in points" if over_delay else "Points on the scale",
+            below="Added delay in ms" if over_delay else "",
             members=group_members(study),
             shared=True,
         )
@@ -443,7 +443,7 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
         why = (
             f"{number_text.counted(n, 'participant')} cannot show a difference between two settings: the smallest "
             f"attainable p is {p_value(_smallest_of_pairs(2, n))}, and {p_value(corrected)} after Holm's correction "
-            f"over {math.comb(k, 2)} pairs, which is above {significant(alpha)}"
+            f"for {math.comb(k, 2)} pairs, which is above {significant(alpha)}"
         )
         return (), (NotTested(Pairs.what, why),)
     opened = [test.item for test in omnibus if test.verdict in ("shown", "suggested")]
@@ -503,21 +503,21 @@ class Pairs(Finding[tuple[Pair, ...]]):
             last=1,
         )
         yield paragraph(
-            "Test: Wilcoxon's signed-rank test, only in statements that show a difference between the "
-            f"{settings_noun(self.found)}s; {pairs[0].tested.outcome.method}; p Holm-adjusted across the "
-            f"{pairs[0].tested.members} pairs of this table. A rank-biserial correlation above 0 means that the first "
-            "of a pair was rated higher. Intervals: 95 %, by Fisher's z; with up to two dozen pairs they cover about "
-            "90 %. There is no interval if all pairs that differ went one way, because −1 and 1 are the ends of the "
-            "scale, or if fewer than six pairs differ.",
+            "Test: Wilcoxon's signed-rank test, only for statements that show a difference between the "
+            f"{settings_noun(self.found)}s ({pairs[0].tested.outcome.method}); p values are Holm-adjusted across the "
+            f"{pairs[0].tested.members} pairs in this table. A rank-biserial correlation above 0 means that the first "
+            f"{settings_noun(self.found)} in the pair was rated higher. Nominal 95 % confidence intervals use Fisher's "
+            "z; with up to two dozen pairs their coverage is about 90 %. There is no interval if all differing pairs "
+            "differ in the same direction (the correlation is then −1 or 1), or if fewer than six pairs differ.",
             "soft",
         )
 
     def methods(self) -> Iterator[str]:
         if self.value:
             yield (
-                "If a statement showed a difference, pairs were compared by Wilcoxon's signed-rank test (exact; equal "
-                "pairs left out), with p Holm-adjusted across all pairs of all such statements; the effect size is the "
-                "matched rank-biserial correlation."
+                "If a statement showed a difference, pairs were compared with Wilcoxon's signed-rank test (exact; "
+                "equal pairs were dropped), with p values Holm-adjusted across all pairs for all such statements; the "
+                "effect size is the matched-pairs rank-biserial correlation."
             )
 
 
@@ -547,7 +547,9 @@ class MeanTests(StatementTests):
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
-            return (), (NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is one setting"),)
+            return (), (
+                NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is only one setting"),
+            )
         if answers.block.kind == "delays" and answers.decided.trends == "slopes":
             return (), ()  # it is the test of trends
         family = f"{answers.block.id}: means"
@@ -570,7 +572,7 @@ class MeanTests(StatementTests):
         if effects:
             what = "Slopes per 100 ms of delay" if self.found.delays_ms else "Differences from the first setting"
             yield paragraph(
-                f"{what}, in points, with 95 % intervals and standard deviations between participants: "
+                f"{what}, in points, with 95 % confidence intervals and between-participant standard deviations: "
                 f"{'; '.join(effects)}.",
                 "soft",
             )
@@ -585,11 +587,11 @@ class MeanTests(StatementTests):
         tests = {test.outcome.test for block in blocks for test in cls.of(block) if test.outcome.p is not None}
         if tests:
             how = {
-                HOTELLING: "differences between the settings were tested by Hotelling's T²",
-                T_TEST: "the participants' own slopes were tested by Student's t",
+                HOTELLING: "differences between the settings were tested with Hotelling's T²",
+                T_TEST: "the participants' slopes were tested with Student's t test",
             }
             words = listed([how[test] for test in how if test in tests])
             yield (
-                f"In an exploratory analysis, the answers were treated as numbers: {words}, in the participants "
+                f"In an exploratory analysis, the answers were treated as numbers: {words}, for the participants "
                 "who answered in all conditions; the false discovery rate was controlled (Benjamini–Hochberg)."
             )

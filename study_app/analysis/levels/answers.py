@@ -140,10 +140,10 @@ class Settings(LevelStatistic[SettingEstimate]):
         in_u = "logarithm of the level" if self.found.spacing == "log" else "level"
         error = " constant error: PSE − standard;" if self._are_compared else ""
         return (
-            f"Settings as levels ({level_words(self.found)}). PSE, the point of subjective equality: mean of "
-            f"the {in_u}, with Student’s 95 % interval; JND, the just-noticeable difference: standard "
+            f"Settings are expressed as levels ({level_words(self.found)}). PSE (point of subjective equality): mean "
+            f"of the {in_u}, with a 95 % confidence interval (Student’s t); JND (just-noticeable difference): standard "
             f"deviation;{error} hysteresis: settings that started high − settings that started low. Group values are "
-            "means over participants; the group PSE has a 95 % interval."
+            "means across participants; the group PSE has a 95 % confidence interval."
         )
 
     def compares(self, measure: str) -> bool:
@@ -154,8 +154,8 @@ class Settings(LevelStatistic[SettingEstimate]):
         if not (own := self.own(self.found)):
             return
         yield (
-            f"{title}: settings depend on how a participant decides that two stimuli are equal, so their "
-            "scatter is not a criterion-free threshold."
+            f"{title}: settings depend on each participant's criterion for calling two stimuli equal, so their "
+            "variability is not a criterion-free threshold."
         )
         if few := [str(estimate.participant) for estimate in own if estimate.hysteresis is None]:
             words = "all settings started near the same end, so hysteresis is unknown"
@@ -166,11 +166,11 @@ class Settings(LevelStatistic[SettingEstimate]):
         if not self.rows or block.stimulus is None:
             return
         against = standards_of(self.found, self.rows)
-        to = against.replace(" of ", " to the standard ", 1) if block.design.intervals > 1 else ""
+        to = against.replace(" for ", " to match ", 1) if block.design.intervals > 1 else ""
         kind, (low, high) = KINDS[block.stimulus.level_kind], block.stimulus.levels
         yield (
-            f"In “{self.found.title}” participants set {self.found.quantity}{to} by {block.design.paper_name}, within "
-            f"{kind} from {low:g} to {high:g}, starting alternately near either end."
+            f"In “{self.found.title}”, participants set {self.found.quantity}{to} by {block.design.paper_name}; "
+            f"{kind} ranged from {low:g} to {high:g}, and settings started alternately near either end."
         )
 
     @classmethod
@@ -178,10 +178,10 @@ class Settings(LevelStatistic[SettingEstimate]):
         if any(map(cls.of, blocks)):
             yield (
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
-                "difference their standard deviation, the constant error the difference between mean and "
-                "standard, and the hysteresis the difference between settings that started high and low; all "
-                "use the logarithm of the level if levels are spaced logarithmically (Gescheider 1997). Group "
-                "values are means over participants with Student’s 95 % interval."
+                "difference is their standard deviation, the constant error is the difference between the mean and "
+                "the standard, and the hysteresis is the difference between settings that started high and settings "
+                "that started low; all use the logarithm of the level if levels are spaced logarithmically (Gescheider "
+                "1997). Group values are means across participants with 95 % confidence intervals (Student’s t)."
             )
 
 
@@ -314,9 +314,9 @@ def people(result: LevelsResult) -> tuple[str, ...]:
 
 
 def summary_words(result: LevelsResult) -> str:
-    """Return the description of a value at a level: "share correct", "mean rating", and so on."""
+    """Return the description of a value at a level: "proportion correct", "mean rating", and so on."""
     if result.summary == "share":
-        return "share correct" if result.counts == "correct" else f"share “{result.counts}”"
+        return "proportion correct" if result.counts == "correct" else f"proportion “{result.counts}”"
     return "mean rating" if result.summary == "mean" else "geometric mean of the numbers"
 
 
@@ -338,13 +338,13 @@ class Answers(LevelStatistic[LevelAnswers]):
         if not result.adaptive:
             yield self._of_group()
             units = (
-                " The interval ignores each participant's choice of unit: it uses ln answers minus the "
+                " To remove each participant's choice of unit, the interval is based on ln answers minus the "
                 "participant's mean."
             )
             yield paragraph(
-                f"{mean_words(result).capitalize()} over the participants, with Student's 95 % interval if at "
-                "least two participants differ. The rows below show each participant with the number of "
-                "answers." + (units if result.own_units else ""),
+                f"The table shows the {mean_words(result)} across participants, with a 95 % confidence interval "
+                "(Student's t) unless all participants have the same value. The rows below show each participant with "
+                "the number of answers." + (units if result.own_units else ""),
                 "soft",
             )
         yield from drawn_figure(self.pictures, f"levels-{result.block}")
@@ -407,11 +407,12 @@ class Answers(LevelStatistic[LevelAnswers]):
         stimulus, title, design = block.stimulus, self.found.title, block.design.paper_name
         if stimulus is None:
             known = [] if block.reference is None else [block.reference, *block.settings]
-            yield f"In “{title}” {listed([*map(_condition_words, known)]) or 'conditions'} were compared by {design}."
+            conditions = listed([*map(_condition_words, known)]) or "conditions"
+            yield f"In “{title}”, {conditions} were compared using {design}."
             return
         kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
         chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
         yield (
-            f"In “{title}” {self.found.quantity} was judged by {design}, at {kind}"
-            f"{standards_of(self.found, self.rows)} from {low:g} to {high:g}{chosen}."
+            f"In “{title}”, {self.found.quantity} was judged using {design}, at {kind} from {low:g} to {high:g}"
+            f"{standards_of(self.found, self.rows)}{chosen}."
         )

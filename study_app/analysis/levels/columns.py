@@ -20,36 +20,36 @@ JUDGED: Final = (
     Column(
         "counted",
         "flag",
-        "true if the row is included in the aggregate and the figures: last attempt of a main trial in a "
-        "completed session that is not excluded, whether valid or not.",
+        "true if the row is included in the aggregate table and the figures, that is, if it is the last attempt of a "
+        "main trial in a completed session and is not excluded, whether valid or not.",
     ),
 )
 
 OPENED: Final = (
     Column("condition", "text", "ID of the condition that the code stands for."),
-    Column("liquid", "text", "ID of the liquid presented."),
-    Column("delay_ms", "number", "Requested visual delay; n/a if a stimulus varies it.", unit="ms", minimum=0),
+    Column("liquid", "text", "ID of the liquid that was presented."),
+    Column("delay_ms", "number", "Requested visual delay; n/a if the stimulus varies the delay.", unit="ms", minimum=0),
 )
 ACHIEVED: Final = optional(
-    "delay_achieved_ms", "number", "Achieved visual delay: the requested delay plus the trial's mean error.", unit="ms"
+    "delay_achieved_ms", "number", "Achieved visual delay (requested delay plus the trial's mean error).", unit="ms"
 )
 
 _INTERVALS: Final = {column.name: column for column in INTERVALS}
-_BLOCK: Final = Column("block", "text", "Id of the block.")
+_BLOCK: Final = Column("block", "text", "ID of the block.")
 _STANDARD: Final = optional(
-    "standard", "number", "The standard, in the unit of the varied number; n/a if there is none."
+    "standard", "number", "The standard, in the unit of the varied parameter; n/a if there is no standard."
 )
 
 OF_TRACKS: Final[tuple[Column, ...]] = (
     Column(
         "analysed",
         "flag",
-        "true if the row is analysed and does not present the modulus of a magnitude estimation. False if the "
-        "session's answers in the block are below chance, until a person decides to keep the session.",
+        "true if the row is analysed and does not present the modulus of a magnitude estimation; false if the "
+        "session's answers in the block are below chance, until somebody decides to keep the session.",
     ),
-    Column("track", "text", "Meaning of the code: standard and number of the track (8/1), or the condition."),
+    Column("track", "text", "Meaning of the code: the standard and the number of the track (8/1), or the condition."),
     Column(
-        "slot", "integer", "Position of the trial among the trials with its code in the session, from 1.", minimum=1
+        "slot", "integer", "Position of the trial among the session's trials with the same code, from 1.", minimum=1
     ),
     _INTERVALS["catch"],
     _INTERVALS["standard"],
@@ -57,31 +57,33 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     optional(
         "level_delivered",
         "number",
-        "The level of the comparison as delivered to the hand, from the delivered values (for a visual delay "
+        "Level of the comparison as delivered to the hand, computed from the delivered values (for a visual delay, "
         "from the mean errors of the frames); n/a if it was not measured.",
     ),
     optional(
         "comparison",
         "number",
-        "The comparison at this level, in the unit of the varied number; n/a if conditions are compared.",
+        "Value of the comparison at this level, in the unit of the varied parameter; n/a if conditions are compared.",
     ),
     optional(
-        "arrangement", "text", "Order of the intervals: S is the standard, C the comparison; n/a if none was presented."
+        "arrangement",
+        "text",
+        "Order of the intervals (S is the standard, C the comparison); n/a if no interval was presented.",
     ),
     optional(
         "comparison_interval",
         "integer",
-        "The only interval with the comparison, from 1; n/a if there is none.",
+        "Number of the interval with the comparison, from 1; n/a unless exactly one interval contains it.",
         minimum=1,
     ),
-    optional("response", "text", "The answer; n/a without an answer."),
-    optional("value", "number", "The answer as a number, if it is a number."),
+    optional("response", "text", "The answer; n/a if there is no answer."),
+    optional("value", "number", "The answer as a number; n/a if it is not a number."),
     optional("right", "flag", "true if the answer was correct; n/a if answers are neither correct nor incorrect."),
     optional("response_s", "number", "Time from the question to the first choice of an answer.", unit="s", minimum=0),
     optional(
         "reversal",
         "flag",
-        "true if the up–down track changed its direction here; n/a if the method does not use steps.",
+        "true if the up–down track changed direction at this trial; n/a if the method does not use steps.",
     ),
     replace(_INTERVALS["setting"], description="The level that the participant set, starting from level_asked."),
 )
@@ -90,15 +92,15 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
 _SETTINGS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
-    Column("n", "integer", "Settings that count.", minimum=0),
+    Column("n", "integer", "Number of settings included in the analysis.", minimum=0),
     Column(
         "pse",
         "number",
-        "Point of subjective equality, a level: the mean of the settings (of their "
-        "logarithms if levels are spaced logarithmically).",
+        "Point of subjective equality, as a level: the mean of the settings (logarithmic if levels are spaced "
+        "logarithmically).",
     ),
-    optional("low", "number", "Lower end of the 95 % interval of the PSE (Student's t)."),
-    optional("high", "number", "Upper end of the 95 % interval of the PSE (Student's t)."),
+    optional("low", "number", "Lower end of the 95 % confidence interval for the PSE (Student's t)."),
+    optional("high", "number", "Upper end of the 95 % confidence interval for the PSE (Student's t)."),
     optional(
         "jnd",
         "number",
@@ -107,12 +109,12 @@ _SETTINGS: Final[tuple[Column, ...]] = (
         minimum=0,
     ),
     optional(
-        "constant_error", "number", "PSE minus standard, in the unit of the JND; n/a if a standard was not presented."
+        "constant_error", "number", "PSE minus the standard, in the unit of the JND; n/a if no standard was presented."
     ),
     optional(
         "hysteresis",
         "number",
-        "Mean of the settings that started high minus mean of the settings that started low, in the unit of the JND.",
+        "Mean of the settings that started high minus the mean of those that started low, in the unit of the JND.",
     ),
 )
 
@@ -122,7 +124,7 @@ _EXPONENTS: Final[tuple[Column, ...]] = (
     Column(
         "exponent",
         "number",
-        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, at delivered levels.",
+        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, for delivered levels.",
     ),
 )
 
@@ -134,59 +136,61 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "threshold",
         "number",
-        "Level halfway between guess rate and one minus lapse rate on the psychometric function (posterior "
-        "median, in the unit of the stimulus' levels); n/a if a psychometric function is not fitted.",
+        "Level at which the psychometric function lies halfway between the guess rate and one minus the lapse rate "
+        "(posterior median, in the unit of the stimulus's levels); n/a if no psychometric function is fitted.",
     ),
-    optional("low", "number", "Lower end of the threshold's equal-tailed 95 % interval."),
-    optional("high", "number", "Upper end of the threshold's equal-tailed 95 % interval."),
+    optional("low", "number", "Lower end of the equal-tailed 95 % interval for the threshold."),
+    optional("high", "number", "Upper end of the equal-tailed 95 % interval for the threshold."),
     optional(
         "open_end",
         "text",
-        "The end of the interval that the answers leave undetermined: the true end lies further out; n/a if both are "
-        "determined.",
-        levels=(("low", "the lower"), ("high", "the upper"), ("both", "both")),
+        "The end of the interval that the answers do not determine, so that the true end lies further out; n/a if both "
+        "ends are determined.",
+        levels=(("low", "the lower end"), ("high", "the upper end"), ("both", "both ends")),
     ),
     optional(
         "beyond",
         "text",
-        "Whether the threshold lies beyond the levels of the stimulus; n/a if it lies within them.",
-        levels=(("above", "above the highest"), ("below", "below the lowest")),
+        "Whether the threshold lies outside the levels of the stimulus; n/a if it lies within them.",
+        levels=(("above", "above the highest level"), ("below", "below the lowest level")),
     ),
     optional(
         "width",
         "number",
-        "Posterior median of the function's width, from 5 to 95 % of its rise, in decades if levels are spaced "
-        "logarithmically, otherwise in the unit of the levels.",
+        "Posterior median of the function's width, from 5 to 95 % of its rise (in decades if levels are spaced "
+        "logarithmically, otherwise in the unit of the levels).",
         minimum=0,
     ),
     optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
     optional(
         "weber_exponent",
         "number",
-        "Slope of ln JND on ln standard over the participant's standards; identical in each of these rows; n/a "
-        "with fewer than two standards.",
+        "Slope of ln JND on ln standard across the participant's standards, with the same value in all of the "
+        "participant's rows; n/a if there are fewer than two standards.",
     ),
     optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
     optional(
         "reversal_mean",
         "number",
-        "Mean of the last reversals of the up–down tracks; n/a for other methods and if there are too few reversals.",
+        "Mean of the last reversals of the up–down tracks; n/a for other methods or if there are too few reversals.",
     ),
     optional(
         "target_percent",
         "number",
-        "Percentage of correct answers to which the rule of the up–down tracks converges.",
+        "Percentage of correct answers to which the up–down rule converges.",
         unit="%",
         minimum=0,
         maximum=100,
     ),
     optional(
-        "d_prime", "number", "Sensitivity over all levels presented; n/a if answers are neither correct nor incorrect."
+        "d_prime",
+        "number",
+        "Sensitivity across all presented levels; n/a if answers are neither correct nor incorrect.",
     ),
     optional(
         "d_prime_model",
         "text",
-        "The model of d_prime, if the design has two models.",
+        "Model used for d_prime; n/a unless the design has two models.",
         levels=(
             ("differencing", "intervals are compared with each other"),
             ("independent", "each interval is compared with known alternatives"),
@@ -196,27 +200,28 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "criterion",
         "number",
-        "c of yes–no and of two-interval forced choice, k of the differencing model of same–different.",
+        "c for yes–no and two-interval forced choice; k of the differencing model for same–different.",
     ),
     optional(
         "share_first",
         "number",
-        "Proportion of the first answer category, such as “first” or “yes”.",
+        "Proportion of answers in the first category, such as “first” or “yes”.",
         minimum=0,
         maximum=1,
     ),
     optional(
         "fit_p",
         "number",
-        "p value of the function's deviance, from simulated sets of answers; below 0.05 the function does not fit.",
+        "p value of the function's deviance, based on simulated sets of answers; below 0.05, the function does not "
+        "fit.",
         minimum=0,
         maximum=1,
     ),
-    optional("drift", "number", "Correlation of trial number and deviance residual.", minimum=-1, maximum=1),
+    optional("drift", "number", "Correlation between trial number and deviance residual.", minimum=-1, maximum=1),
     optional(
         "change",
         "number",
-        "Relative change of the threshold from the first to the last trial; 0 if it is within two standard errors.",
+        "Relative change in the threshold from the first to the last trial; 0 if it is within two standard errors.",
     ),
 )
 
@@ -229,11 +234,14 @@ class Results(NamedTuple):
 
 
 RESULTS: Final = {
-    "thresholds": Results("one row per participant and standard, or condition compared, after unblinding", _THRESHOLDS),
-    "settings": Results(
-        "one row per participant and standard of a block whose levels participants set, after unblinding", _SETTINGS
+    "thresholds": Results(
+        "one row per participant and standard, or per participant and compared condition, after unblinding", _THRESHOLDS
     ),
-    "exponents": Results("one row per participant of a block of magnitude estimation, after unblinding", _EXPONENTS),
+    "settings": Results(
+        "one row per participant and standard in a block in which participants set the level, after unblinding",
+        _SETTINGS,
+    ),
+    "exponents": Results("one row per participant in a block with magnitude estimation, after unblinding", _EXPONENTS),
 }
 """By the names of the tables."""
 
@@ -241,12 +249,12 @@ RESULTS: Final = {
 def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown, with a heading and a table for each."""
     added = (
-        "columns that `export` adds to responses, trials and intervals; `trials_missing` only in studies with trials "
-        "of intervals, and the last four only after unblinding"
+        "columns that `export` adds to the tables of responses, trials and intervals; `trials_missing` is added only "
+        "in studies whose trials consist of intervals, and the last four columns only after unblinding"
     )
     of_tracks = (
-        "one row per trial with a design, after unblinding; it also contains the IDs and the condition of the trial, "
-        "and force_mean_n and mean_speed_mps of each interval (…_1, …_2)"
+        "one row per trial of a block with a design, after unblinding; also contains the trial's IDs and condition, "
+        "and force_mean_n and mean_speed_mps for each interval (…_1, …_2)"
     )
     tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(

@@ -117,9 +117,9 @@ class Delivery(LevelStatistic[_Row]):
             ("trials", lambda row: str(row["trials"])),
             ("repeated attempts", lambda row: str(row["repeated"])),
             ("measured", lambda row: str(row["measured"])),
-            (f"level error{of}, mean", lambda row: number(row["error_mean"], decimals)),
+            (f"mean level error{of}", lambda row: number(row["error_mean"], decimals)),
             ("largest", lambda row: number(row["error_largest"], decimals)),
-            ("hand speed, RMS [m/s]", lambda row: number(row["pace_mps"], 3)),
+            ("RMS hand speed [m/s]", lambda row: number(row["pace_mps"], 3)),
             ("apparent mass [kg]", lambda row: number(row["apparent_mass_kg"], 3)),
         )
 
@@ -129,15 +129,18 @@ class Delivery(LevelStatistic[_Row]):
             f"{name.rpartition('_')[0].replace('_', ' ') or name} in {counted(count, 'interval')}"
             for name, count in reasons.most_common()
         ]
-        with_estimator = f", with the velocity estimator {self.estimator}" if self.estimator else ""
+        with_estimator = f", using the velocity estimator {self.estimator}" if self.estimator else ""
         kept = (
-            f"Limits that intervals exceeded: {listed(named)}." if reasons else "All intervals were within the limits."
+            f"Some intervals exceeded limits: {listed(named)}." if reasons else "All intervals were within the limits."
         )
-        mass = f" Apparent mass: least-squares fit of F = −b v − m a to the force sent{with_estimator}."
+        mass = (
+            " Apparent mass is the m of a least-squares fit of F = −b v − m a to the force that was sent"
+            f"{with_estimator}."
+        )
         mass = mass if any(row["apparent_mass_kg"] is not None for row in self.rows) else ""
         return (
-            "Level error is the delivered minus the requested level, from the recorded samples (for delays "
-            f"from the frames); fits use delivered levels.{mass} {kept}"
+            "Level error is the delivered level minus the requested level, computed from the recorded samples (for "
+            f"delays, from the frames); fits use the delivered levels.{mass} {kept}"
         )
 
 
@@ -161,12 +164,12 @@ class _CatchTrials(LevelStatistic[_Row]):
             ("session", lambda row: str(row["session"])),
             ("n", lambda row: str(row["n"])),
             ("incorrect", lambda row: str(row["wrong"])),
-            ("share", lambda row: f"{100 * row['wrong'] / row['n']:.0f} %"),
+            ("percentage", lambda row: f"{100 * row['wrong'] / row['n']:.0f} %"),
             ("rule", _rule),
         )
 
     def explained(self) -> str:
-        return "Catch trials present the largest level; the fit of the threshold includes them."
+        return "Catch trials present the largest level; the threshold fit includes them."
 
 
 class _Withheld(LevelStatistic[_Row]):
@@ -185,15 +188,15 @@ class _Withheld(LevelStatistic[_Row]):
             (f"Level{unit(self.found)}", _levels),
             ("intervals", lambda row: str(row["n"])),
             ("mean", lambda row: f"{row['mean_percent']:.1f} %"),
-            ("most", lambda row: f"{row['most_percent']:.1f} %"),
+            ("maximum", lambda row: f"{row['most_percent']:.1f} %"),
         )
 
     def explained(self) -> str:
         return (
             f"{' '.join(self._up_to())} The table shows the proportion of the requested force that the limits, the "
             "passivity controller and the device held back in the comparisons, including repeated trials. A delayed "
-            "force pushes the hand, and the passivity controller limits the energy that it returns; the force held "
-            "back is then missing from the stimulus."
+            "force pushes the hand, and the passivity controller limits the energy that this returns to the hand; the "
+            "force held back is then missing from the stimulus."
         )
 
     def _up_to(self) -> Iterator[str]:
@@ -203,5 +206,9 @@ class _Withheld(LevelStatistic[_Row]):
             rows = [row for row in self.rows if row["standard"] == standard]
             kept = list(takewhile(lambda one: one["most_percent"] <= WITHHELD_PERCENT, rows))
             at = "" if standard is None else f" at the standard of {standard:.4g}{of}"
-            until = f"up to {kept[-1]['high']:.3g}{of}" if kept else "not at any level presented"
-            yield f"At most {WITHHELD_PERCENT:g} % was held back in every comparison {until}{at}."
+            yield (
+                f"In every comparison up to {kept[-1]['high']:.3g}{of}{at}, at most {WITHHELD_PERCENT:g} % was held "
+                "back."
+                if kept
+                else f"More than {WITHHELD_PERCENT:g} % was held back in some comparison at the lowest level{at}."
+            )

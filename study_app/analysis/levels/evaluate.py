@@ -25,7 +25,9 @@ READ: Final = (
 )
 """The columns of tracks that statistics read."""
 
-_SEALED: Final = "Standards, levels, contents of each interval and correct answers appear here after unblinding."
+_SEALED: Final = (
+    "The standards, the levels, the contents of each interval and the correct answers appear here after unblinding."
+)
 
 
 def level_results(study: Study, rows: pd.DataFrame | None = None) -> tuple[LevelsResult, ...]:
@@ -98,7 +100,7 @@ def level_section(result: LevelsResult, pictures: Sequence[Picture], estimator: 
     )
     at_each = "Answers at each level" if result.vary is not None or not result.revealed else "Answers"
     if not Settings.of(result):
-        yield heading(3, "Answers against levels" if result.adaptive else at_each)
+        yield heading(3, "Answers as a function of level" if result.adaptive else at_each)
     if not result.revealed:
         yield paragraph(_SEALED)
         return

@@ -33,8 +33,8 @@ from study_app.psychophysics.grid import Z_95
 
 _MODELS: Final = {
     "differencing": " d′ uses the differencing model, because standards vary from trial to trial.",
-    "independent": " d′ uses the model of independent observations; the column d_prime_other of the exported table "
-    "thresholds contains the d′ of the differencing model.",
+    "independent": " d′ uses the model of independent observations; the column d_prime_other in the exported table "
+    "thresholds contains d′ for the differencing model.",
 }
 _FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
 """Designs whose d′ follows from the share of correct answers alone."""
@@ -44,10 +44,10 @@ _BIASES: Final = {
     "samedifferent": " k is the difference above which the answer is “different”.",
     **dict.fromkeys(
         _FROM_SHARE_CORRECT,
-        " d′ is computed from the proportion correct and assumes that participants do not prefer an answer; a "
-        "preference, visible in unequal proportions of the answers, makes d′ too small. Participants' "
-        "intervals are d′ at the ends of the Clopper–Pearson interval for the proportion correct; there is "
-        "none if all answers are correct.",
+        " d′ is calculated from the proportion correct, assuming that participants do not prefer any answer; a "
+        "preference, visible as unequal proportions of the answers, makes d′ too small. The participants' "
+        "confidence intervals for d′ are calculated from the Clopper–Pearson interval for the proportion correct; "
+        "there is no interval if all answers are correct.",
     ),
 }
 
@@ -253,26 +253,27 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
             people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
                 f"{self.found.title}: {people} preferred one interval (the criterion c is beyond ±{_BIASED:g} and "
-                f"twice its standard error). The fits of their thresholds allow for this."
+                f"more than twice its standard error from 0). Their threshold fits allow for this."
             )
 
     def explained(self) -> str:
-        shares = "Percentages refer to the answers." if self.rows[0].shares else ""
+        shares = "Percentages show how often each answer was given." if self.rows[0].shares else ""
         if all(row.d_prime is None for row in self.rows):
             return shares
-        over = "over all levels presented" if self.found.vary is not None else "for each comparison"
+        over = "across all presented levels" if self.found.vary is not None else "for each comparison"
         if self.found.summary == "mean":
-            over = "of each level against the lowest, as d_a from the area under the ROC curve"
+            over = "for each level relative to the lowest (d_a from the area under the ROC curve)"
         bias, model = _BIASES.get(self.found.design, ""), _MODELS.get(self.rows[0].model or "", "")
         return (
-            f"d′ {over}, from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman 2005); "
-            f"the group value is the mean over participants with Student’s interval.{model}{bias} {shares}"
+            f"d′ {over}, calculated from rates with the log-linear correction (Hautus 1995; Macmillan & Creelman "
+            f"2005); the group value is the mean across participants with a t-based confidence interval.{model}{bias} "
+            f"{shares}"
         ).rstrip()
 
     @classmethod
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(estimate.d_prime is not None for block in blocks for estimate in cls.of(block)):
             yield (
-                "Sensitivity is d′ from rates with the log-linear correction (Hautus 1995), by the model of each "
-                "design (Macmillan & Creelman 2005)."
+                "Sensitivity is expressed as d′, calculated from rates with the log-linear correction (Hautus 1995) "
+                "using the model for each design (Macmillan & Creelman 2005)."
             )

@@ -26,7 +26,7 @@ R = TypeVar("R")
 Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
 """A column of a table of the report: its heading and what makes a cell of a row; None is one that is left out."""
 
-MOTORS: Final = "motors are audible and were not masked: participants may have used their sound."
+MOTORS: Final = "the motors are audible and were not masked, so participants may have used their sound."
 
 
 class LevelStatistic(Generic[R]):
@@ -194,11 +194,11 @@ INTERVAL_2: Final[Shown] = ("95 % interval", lambda row: interval_text(row.low, 
 """With two decimals."""
 
 KINDS: Final = {"weber": "Weber fractions", "difference": "differences", "value": "values"}
-_LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction of ", "difference": "difference of ", "value": ""}
+_LEVELS: Final[Mapping[str | None, str]] = {"weber": "Weber fraction for ", "difference": "difference in ", "value": ""}
 
 
 def level_words(result: LevelsResult) -> str:
-    """Return the name of a level with its unit: "Weber fraction of viscosity", "Viscosity [Pa·s]", "Condition"."""
+    """Return the name of a level with its unit: "Weber fraction for viscosity", "Viscosity [Pa·s]", "Condition"."""
     if result.quantity is None:
         return "Condition"
     words = f"{_LEVELS[result.level_kind]}{result.quantity}"
@@ -211,9 +211,11 @@ def with_unit(result: LevelsResult, value: float) -> str:
 
 
 def standards_of(result: LevelsResult, rows: Iterable[Any]) -> str:
-    """Return the standards of rows as a phrase: " of 4 and 8 N·s/m"; "" without any."""
+    """Return the standards of rows as a phrase: " for standards of 4 and 8 N·s/m"; "" without any."""
     standards = sorted({row.standard for row in rows if row.standard is not None})
-    return f" of {listed([f'{standard:g}' for standard in standards])} {result.unit}".rstrip() if standards else ""
+    noun = "a standard" if len(standards) == 1 else "standards"
+    values = listed([f"{standard:g}" for standard in standards])
+    return f" for {noun} of {values} {result.unit}".rstrip() if standards else ""
 
 
 def interval_words(one: Any, written: Callable[[float], str]) -> str:

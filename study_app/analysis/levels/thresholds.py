@@ -65,8 +65,9 @@ _FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
 _MOST_NAMED: Final = 6
 REMOVED: Final = (
-    "A preference for an interval or for the previous answer, estimated by probit regression (standard deviation "
-    f"between people: {PREFERENCE_SD:g} times the standard deviation of a decision), {{}} removed."
+    "Bias towards one interval or towards repeating the previous answer {} estimated by probit regression and removed "
+    f"(the between-participant standard deviation is assumed to be {PREFERENCE_SD:g} times the standard deviation of "
+    "a single decision)."
 )
 
 
@@ -487,7 +488,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             return (
                 "–"
                 if estimate.fit_p is None
-                else f"{estimate.fit_p:.3f}{'' if estimate.fits else ': the function does not fit'}"
+                else f"{estimate.fit_p:.3f}{'' if estimate.fits else ' (the function does not fit)'}"
             )
 
         def interval(estimate: ThresholdEstimate) -> str:
@@ -536,7 +537,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         reversals = (
             ""
             if percent is None
-            else " The mean of the reversals, the classical estimate of an up–down track, is the level with "
+            else " The mean of the reversals is the classical estimate for an up–down track; it is the level with "
             f"{percent:.1f} % {result.counts}."
         )
         level = (
@@ -544,21 +545,21 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         )
         function = FAMILIES[result.family or ""]
         return (
-            f"A threshold is the level ({level_words(result)}) at which the {function} function is halfway between "
-            f"guess rate and one minus lapse rate{at}: posterior median with an equal-tailed 95 % interval, from all "
-            "analysed answers, at the levels delivered to the hand. The width, from 5 to 95 % of the rise, has a "
-            "log-normal prior; the next column is the threshold under a flat prior. “Above” and “below” mark "
-            "thresholds beyond the levels of the stimulus, “<” and “>” mark ends of intervals that the answers leave "
-            "open. Intervals allow for a difference of a person’s threshold between sessions by a factor of "
-            f"{10**SESSION_SD:.2f} (one standard deviation), and for a change over the trials. The group is the "
-            "random-effects mean (Paule–Mandel), with the interval of Hartung and Knapp if there are at least three "
-            "participants. Each variance is replaced by its geometric mean with the median "
-            f"variance.{level}{reversals} Fit: p of the deviance among {SETS} simulated sets of answers; for the "
-            "group, by how many standard errors errors follow errors more often than expected, with “!” above "
-            f"{MOST_CLUSTERED:g}. Drift: correlation of trial number and deviance residual, with “!” if the threshold "
-            f"changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, by how many "
-            f"standard errors thresholds rose or fell after the first trials. n counts answers{catch}."
-            + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
+            f"A threshold is the level ({level_words(result)}) at which the {function} function lies halfway between "
+            f"the guess rate and one minus the lapse rate{at}. The estimate is the posterior median with an "
+            "equal-tailed 95 % interval, based on all analysed answers at the levels delivered to the hand. The width, "
+            "from 5 to 95 % of the rise, has a log-normal prior; the next column shows the threshold under a flat "
+            "prior. “Above” and “below” mark thresholds outside the levels of the stimulus; “<” and “>” mark ends of "
+            "intervals that the answers do not determine. Intervals allow a person’s threshold to differ between "
+            f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation) and to change over the trials. The "
+            "group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp interval if there are at "
+            "least three participants. Each variance is replaced by its geometric mean with the median "
+            f"variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated sets of answers; for "
+            "the group, the clustering of errors in standard errors above expectation, with “!” above "
+            f"{MOST_CLUSTERED:g}. Drift: correlation between trial number and deviance residual, with “!” if the "
+            f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the "
+            "rise or fall of thresholds after the first trials, in standard errors. n is the number of "
+            f"answers{catch}." + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
     def compares(self, measure: str) -> bool:
@@ -590,17 +591,20 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             )
 
         kinds: tuple[tuple[Callable[[ThresholdEstimate], bool], str], ...] = (
-            (shifted, f"the prior of the width shifts a threshold by more than {100 * _SHIFT:.0f} %: too few answers"),
+            (shifted, f"with so few answers, the width's prior shifts a threshold by more than {100 * _SHIFT:.0f} %"),
             (
                 lambda estimate: estimate.beyond == "above",
-                "a threshold lies above the highest level of the stimulus; the distance is unknown",
+                "a threshold lies above the highest level of the stimulus, by an unknown amount",
             ),
             (
                 lambda estimate: estimate.beyond == "below",
-                "a threshold lies below the lowest level of the stimulus; the distance is unknown",
+                "a threshold lies below the lowest level of the stimulus, by an unknown amount",
             ),
             (lambda estimate: not estimate.fits, "the function does not fit the answers, so a threshold may be biased"),
-            (lambda estimate: estimate.n < _FEW_ANSWERS, f"fewer than {_FEW_ANSWERS} answers, so intervals are wide"),
+            (
+                lambda estimate: estimate.n < _FEW_ANSWERS,
+                f"intervals are wide because there are fewer than {_FEW_ANSWERS} answers",
+            ),
         )
         yield from self._limits_of_lapses()
         for applies, words in kinds:
@@ -608,7 +612,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 yield f"{title}: {words} ({_named_people(own, some)})."
         if some := [estimate for estimate in own if estimate.open_end]:
             yield (
-                f"{title}: the answers leave an end of the 95 % interval open, which is marked “<” or “>” "
+                f"{title}: the answers do not determine one end of the 95 % interval, which is marked “<” or “>” "
                 f"({_named_people(own, some)})."
             )
         for row in self.rows:
@@ -618,20 +622,20 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                     f"{title}: thresholds "
                     f"{'rose' if (row.early_change or 0.0) > 0 else 'fell'} after the first trials{where} by "
                     f"{abs(row.early_change or 0.0):.1f} standard errors. The group's threshold may be biased, because "
-                    "the analysis assumes thresholds that are constant or change evenly."
+                    "the analysis assumes that thresholds are constant or change at a constant rate."
                 )
         if some := [estimate for estimate in own if estimate.drifts]:
             sizes = listed(
                 [f"{100 * (estimate.change or 0.0):+.0f} %".replace("-", "−") for estimate in some[:_MOST_NAMED]]
             )
             yield (
-                f"{title}: the threshold changed over the trials, for which the interval allows "
-                f"({_named_people(own, some)}: {sizes} from the first trial to the last)."
+                f"{title}: the threshold changed over the trials ({_named_people(own, some)}: {sizes} from the first "
+                "trial to the last); the interval allows for this."
             )
         if (people := len({estimate.participant for estimate in own})) < FEWEST:
             yield (
-                f"{title}: {counted(people, 'participant')}; at least {FEWEST} are needed for a group interval, "
-                "because differences between people are otherwise unknown."
+                f"{title}: a group interval needs at least {FEWEST} participants, because differences between people "
+                f"are otherwise unknown. This block has {people}."
             )
         if self.found.level_kind == "weber":
             yield self._limit_of_device()
@@ -647,9 +651,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"{group.error_bursts:.1f} standard errors{where}" for group, where in groups if group.clustered
         ]:
             yield (
-                f"{self.found.title}: errors follow errors more often than the fitted functions expect, by "
-                f"{listed(clusters)}, as if participants answered at random for several trials: the group's threshold "
-                "may be too high."
+                f"{self.found.title}: errors are more clustered than the fitted functions predict, by "
+                f"{listed(clusters)}, as if participants had answered at random for several trials. The group's "
+                "threshold may therefore be too high."
             )
         if thresholds := [
             f"{group.if_many_lapses:.3g} instead of {group.threshold:.3g}{where}"
@@ -657,9 +661,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             if group.if_many_lapses is not None
         ]:
             yield (
-                f"{self.found.title}: the answers do not exclude a mean lapse rate of {100 * MANY_LAPSES:g} %; the "
-                f"group's threshold would then be {listed(thresholds)}. Catch trials far above the threshold determine "
-                "the lapse rate."
+                f"{self.found.title}: the answers do not rule out a mean lapse rate of {100 * MANY_LAPSES:g} %; the "
+                f"group's threshold would then be {listed(thresholds)}. Catch trials far above the threshold would "
+                "determine the lapse rate."
             )
 
     def _limit_of_device(self) -> str:
@@ -668,14 +672,14 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if own is None:
             return (
                 f"{result.title}: the device's own damping, friction and mass are unknown, because they were not "
-                "measured. Weber fractions refer to the force that the motors delivered; relative to the sum of this "
-                "force and the device's own resistance they are smaller."
+                "measured. Weber fractions refer to the force delivered by the motors; they are smaller relative to "
+                "the sum of this force and the device's own resistance."
             )
-        where = "" if own.sessions == own.of else f" (measured for {own.sessions} of {own.of} sessions)"
+        where = "" if own.sessions == own.of else f" (measured in {own.sessions} of {own.of} sessions)"
         words = (
             f"{result.title}: the device's own damping of {own.damping_nspm:.2g} N·s/m, friction of "
-            f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to the force that the motors "
-            "delivered; Weber fractions refer to the motors' force"
+            f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to the force delivered by the "
+            "motors. Weber fractions refer to the motors' force only"
         )
         shares = [
             f"{share:.3g} instead of {row.threshold:.3g} at {row.standard:g} {result.unit}"
@@ -684,7 +688,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         ]
         if not shares:
             return f"{words}."
-        return f"{words}. With the device's damping in the standard, the group values are {listed(shares)}."
+        return f"{words}; if the standard includes the device's damping, the group values are {listed(shares)}."
 
     def methods(self, block: LevelBlock) -> Iterator[str]:
         if not self.rows or block.assumed is None or block.stimulus is None:
@@ -694,8 +698,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         yield (
             f"A {family} function of the {'logarithm of the ' if log else ''}level was fitted, with a flat prior on "
             f"the threshold, a log-normal prior on the width (median {median:.3g} "
-            f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates up to "
-            f"{100 * max(ANALYSIS_LAPSES):.0f} %. The participants’ mean lapse rate has an exponential prior (mean "
+            f"{'decades' if log else 'units of the level'}, factor {factor:.3g}) and lapse rates of up to "
+            f"{100 * max(ANALYSIS_LAPSES):.0f} %. The participants’ mean lapse rate had an exponential prior (mean "
             f"{100 * MEAN_LAPSE:g} %)."
         )
         if block.design.kind == "2ifc":
@@ -705,23 +709,24 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(map(cls.of, blocks)):
             yield (
-                "Thresholds are posterior medians over a grid with equal-tailed 95 % intervals, from all analysed "
-                f"answers at the levels delivered to the hand. The deviance was compared with {SETS} simulated sets of "
-                "answers, and drift is the correlation between trial number and deviance residual (Wichmann & Hill "
-                "2001). Intervals allow for a difference of a person’s threshold between sessions by a factor of "
-                f"{10**SESSION_SD:.2f} (one standard deviation; from data of Jäkel & Wichmann 2006), and for its "
-                f"change over the trials if this exceeded {BEYOND_CHANCE:g} standard errors. The posterior averages "
-                f"over linear changes (prior: a factor of {CHANGE_PRIOR:g}), so the threshold refers to the middle of "
-                f"the trials. We assumed that {100 * ALIKE:.0f} % of the standard deviation of log widths is between "
-                "participants and that lapse rates vary about a common mean, so each participant’s width and lapse "
-                "rate depend on the answers of all; the posterior of what participants share was raised to the power "
-                f"of {NEAR_MODE}. Group means are random-effects means, with each variance replaced by its geometric "
-                "mean with the median variance, the between-person variance of Paule and Mandel (1982) and, with at "
-                f"least {FEWEST} participants, the interval of Hartung and Knapp (2001), widened by the uncertainty of "
-                "the width and the lapse rate that all have in common. Whether thresholds rose or fell after the first "
-                f"trials was tested by the score of a change that fades over {EARLY_TRIALS:g} trials. Whether errors "
-                "form clusters was tested by the errors beyond those expected, each weighted by the probability that "
-                f"the answers before it, at most {BURST_TRIALS - 1}, were random guesses."
+                "Thresholds are posterior medians, computed on a grid, with equal-tailed 95 % intervals, based on "
+                "all analysed answers at the levels delivered to the hand. The deviance was compared with the "
+                f"deviances of {SETS} simulated sets of answers, and drift is the correlation between trial number "
+                "and deviance residual (Wichmann & Hill 2001). Intervals allow a person’s threshold to differ "
+                f"between sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation; from data in Jäkel &"
+                f" Wichmann 2006), and to change over the trials if the change exceeded {BEYOND_CHANCE:g} standard "
+                f"errors. The posterior averages over linear changes (prior: a factor of {CHANGE_PRIOR:g}), so the "
+                f"threshold refers to the middle of the trials. We assumed that {100 * ALIKE:.0f} % of the standard "
+                "deviation of log widths is due to differences between participants and that lapse rates vary "
+                "around a common mean, so each participant’s width and lapse rate depend on all participants’ "
+                f"answers; the posterior of the shared parameters was raised to the power of {NEAR_MODE}. Group "
+                "means are random-effects means with the between-participant variance of Paule and Mandel (1982), "
+                "after replacing each variance by its geometric mean with the median variance. With at least "
+                f"{FEWEST} participants, they have the interval of Hartung and Knapp (2001), widened to include the "
+                "uncertainty of the shared width and lapse rate. A score test for a change that fades over "
+                f"{EARLY_TRIALS:g} trials was used to test whether thresholds rose or fell after the first trials. "
+                "The clustering of errors was tested by comparing errors with those expected, weighting each error "
+                f"by the probability that the answers before it (at most {BURST_TRIALS - 1}) were random guesses."
             )
 
 
@@ -856,24 +861,24 @@ class Exponents(LevelStatistic[ExponentEstimate]):
     def explained(self) -> str:
         if Thresholds.of(self.found):
             return (
-                "The exponent is the least-squares slope of ln JND on ln standard over the standards of a "
-                "participant; the just-noticeable difference (JND) is the threshold in the unit of the "
-                "standard. 1 is Weber’s law (the JND is proportional to the standard), 0 a constant JND. The "
-                "group value is the mean over participants with Student’s interval."
+                "The exponent is the least-squares slope of ln JND on ln standard across a participant's standards; "
+                "the just-noticeable difference (JND) is the threshold in the unit of the standard. An exponent of 1 "
+                "means Weber’s law (the JND is proportional to the standard), and 0 means a constant JND. The group "
+                "value is the mean across participants with a t-based confidence interval."
             )
         return (
             "The exponent n of answer ∝ levelⁿ (Stevens 1957) is the least-squares slope of a participant’s "
             "mean ln answer at each level on ln level, at the levels delivered to the hand; it does not depend "
-            "on the unit that a participant chose. The group value is the mean over participants with "
-            "Student’s interval."
+            "on the unit that a participant chose. The group value is the mean across participants with a "
+            "t-based confidence interval."
         )
 
     def compares(self, measure: str) -> bool:
         return measure == "exponent"
 
     def sentences(self) -> Iterator[str]:
-        over = f" over {self.found.quantity}"
-        meaning = "; 1 is Weber’s law, 0 a constant JND" if Thresholds.of(self.found) else over
+        of_what = f" for {self.found.quantity}"
+        meaning = "; 1 is Weber’s law, 0 is a constant JND" if Thresholds.of(self.found) else of_what
         for row in self.rows:
             if row.participant is None:
                 yield (
@@ -886,12 +891,12 @@ class Exponents(LevelStatistic[ExponentEstimate]):
         held = [block for block in blocks if cls.of(block)]
         if any(result.summary == "geometric mean" for result in held):
             yield (
-                "The exponent of magnitude estimation (Stevens 1957) is the slope of the mean ln answer at each level "
-                "on ln level, by least squares for each participant; the group’s is the mean with Student’s 95 % "
-                "interval."
+                "The exponent of magnitude estimation (Stevens 1957) is the least-squares slope of each participant’s "
+                "mean ln answer at each level on ln level; the group exponent is the mean with a 95 % confidence "
+                "interval (Student’s t)."
             )
         if any(map(Thresholds.of, held)):
             yield (
-                "The Weber exponent is the slope of ln JND on ln standard, by least squares for each participant; the "
-                "group’s is the mean with Student’s 95 % interval."
+                "The Weber exponent is the least-squares slope of each participant’s ln JND on ln standard; the group "
+                "exponent is the mean with a 95 % confidence interval (Student’s t)."
             )

@@ -282,53 +282,66 @@ def _equivalence_curves(block: Planned, counts: Counts, studies: int) -> Iterato
 
 OF_BLOCK: Final = (
     Column("study", "text", "Short name of the study, from its protocol."),
-    Column("simulated", "flag", "true: all answers come from a model, not from people."),
+    Column("simulated", "flag", "Always true, because all answers come from a model and not from people."),
     Column("block", "text", "ID of the block of trials."),
 )
 OF_STUDIES: Final = (
     Column("participants", "integer", "Number of participants in each study.", minimum=2),
-    Column("studies", "integer", "Simulated studies.", minimum=1),
+    Column("studies", "integer", "Number of simulated studies.", minimum=1),
 )
 """Columns of all tables of power."""
 
 COLUMNS: Final = (
     *OF_BLOCK,
-    Column("question", "text", "What is tested."),
+    Column("question", "text", "Question that is tested."),
     optional("item", "text", "ID of the statement; n/a if the test covers several statements."),
     optional("over", "text", "Scope of the test, if it covers more than one statement."),
-    optional("setting", "text", "The delay tested; n/a if the test is about all delays."),
-    Column("people", "text", "Kind of the simulated participants."),
+    optional("setting", "text", "The delay that is tested; n/a if the test covers all delays."),
+    Column("people", "text", "Kind of simulated participants."),
     *OF_STUDIES,
     Column(
         "power",
         "number",
-        "Proportion of the studies that detect the effect, under the answer model.",
+        "Proportion of simulated studies that detect the effect under the answer model.",
         minimum=0,
         maximum=1,
     ),
-    Column("power_low", "number", "Lower end of the 95 % interval of that proportion (Wilson).", minimum=0, maximum=1),
-    Column("power_high", "number", "Upper end of the 95 % interval of that proportion (Wilson).", minimum=0, maximum=1),
+    Column(
+        "power_low",
+        "number",
+        "Lower end of the 95 % confidence interval for that proportion (Wilson).",
+        minimum=0,
+        maximum=1,
+    ),
+    Column(
+        "power_high",
+        "number",
+        "Upper end of the 95 % confidence interval for that proportion (Wilson).",
+        minimum=0,
+        maximum=1,
+    ),
     optional(
         "without_effect",
         "number",
-        "The same proportion if conditions do not differ: false positives; for equivalence, the power.",
+        "The same proportion if the conditions do not differ, that is, the rate of false positives (for equivalence, "
+        "the power).",
         minimum=0,
         maximum=1,
     ),
-    optional("effect_points", "number", "The difference of mean answers in the model, in points."),
+    optional("effect_points", "number", "The difference between the mean answers in the model, in points."),
     optional(
         "detectable_points",
         "number",
-        "The smallest difference of mean answers that 80 % of such studies detect, in points.",
+        "The smallest difference between mean answers that 80 % of such studies detect, in points.",
     ),
 )
 
 _HEADS: Final[dict[Question, tuple[str, str]]] = {
     "settings differ": ("Do the conditions differ?", "statement"),
     "trend": ("Do answers change with the delay?", "statement"),
-    "lowest delay": ("Is a trend shown up to this delay, or up to a shorter delay?", "statement, delay"),
-    "equivalence": ("Is a delay shown to be equivalent to the shortest?", "statement, delay"),
-    "contrast": ("Is the hypothesis shown?", "hypothesis"),
+    "lowest delay": ("Can a trend be shown up to this delay, or up to a shorter one?", "statement, delay"),
+    "equivalence": ("Can any delay be shown to be equivalent to the shortest one?", "statement, delay"),
+    "contrast": ("Can the hypothesis be shown?", "hypothesis"),
 }
 
 
@@ -363,7 +376,7 @@ def _csv_rows(power: Powers) -> Iterator[dict[str, Any]]:
 
 def power_markdown(power: Powers) -> str:
     """Return the tables in Markdown, with their assumptions and limitations."""
-    lines = [f"# Power of {power.plan.title} ({power.plan.name} {power.plan.version})", "", *_preface(power)]
+    lines = [f"# Power for {power.plan.title} ({power.plan.name} {power.plan.version})", "", *_preface(power)]
     lines += _summary(power)
     for block in power.plan.blocks:
         for question, (head, first) in _HEADS.items():
@@ -372,7 +385,11 @@ def power_markdown(power: Powers) -> str:
                 lines += ["", f"## {block.title}: {head[:1].lower()}{head[1:]}", "", *_explained(question, power), ""]
                 lines += _markdown_table(curves, power, first, lambda curve, at: f"{curve.power[at]:.0%}", needed=True)
             if any(curve.detectable for curve in curves):
-                lines += ["", "The smallest difference of mean answers that 80 % of studies detect, in points:", ""]
+                lines += [
+                    "",
+                    "The smallest difference between mean answers that 80 % of studies detect, in points:",
+                    "",
+                ]
                 lines += _markdown_table(
                     [curve for curve in curves if curve.detectable],
                     power,
@@ -386,20 +403,20 @@ def _preface(power: Powers) -> list[str]:
     decided = power.plan.decided
     low, high = interval(WANTED, power.studies)
     of_looks = ", ".join(f"{n}: {level:.2g}" for n, level in zip(decided.looks, decided.alphas, strict=False))
-    looks = f" of all looks ({of_looks}), detected at a look or an earlier look" if of_looks else ""
+    looks = f" across all looks ({of_looks}; an effect counts from the first look that detects it)" if of_looks else ""
     lines = [
-        f"**SIMULATED.** {power.studies} studies of each size were simulated with the rehearsals' answer model "
-        f"(seed {power.seed}, liquid-study {__version__}), whose effects are plausible but not measured: real "
-        "effects may be smaller. Read the tables of the smallest detectable difference together with the tables of "
-        "power.",
+        f"**SIMULATED.** {power.studies} studies of each size were simulated with the answer model that rehearsals use "
+        f"(seed {power.seed}, liquid-study {__version__}). The model's effects are plausible but have not been "
+        "measured, so real effects may be smaller. Read the tables of smallest detectable differences together with "
+        "the power tables.",
         "",
-        f"Tests at α = {decided.alpha:g}{looks}; p values use {PLANNED_DRAWS} random permutations of each "
-        "participant's answers. Tests of primary statements are Holm-corrected; for the others the false discovery "
-        f"rate is controlled (Benjamini and Hochberg). Effects of {EFFECTS[1]:g} to {EFFECTS[-1]:g} times the model's "
-        f"were tried. A power of 80 % is uncertain by ±{50 * (high - low):.1f} percentage points.",
+        f"Tests use α = {decided.alpha:g}{looks}; p values are based on {PLANNED_DRAWS} random permutations of each "
+        "participant's answers. Tests of primary statements are Holm-corrected; for the others, the false discovery "
+        f"rate is controlled (Benjamini–Hochberg). Effects from {EFFECTS[1]:g} to {EFFECTS[-1]:g} times those of the "
+        f"model were simulated. A power of 80 % is uncertain by ±{50 * (high - low):.1f} percentage points.",
         "",
-        f"Numbers are for {_people(next(iter(power.kinds)))}, with the lowest and the highest over all kinds of "
-        "people in parentheses: "
+        f"The numbers are for {_people(next(iter(power.kinds)))}, with the lowest and highest values across all kinds "
+        "of people in parentheses: "
         + "; ".join(f"**{kind}**: {people.described()}" for kind, people in power.plan.kinds.items())
         + f". {_SOURCES}",
     ]
@@ -409,7 +426,7 @@ def _preface(power: Powers) -> list[str]:
         named = ", ".join(power.plan.unknown)
         lines += [
             "",
-            f"The model does not know {named}: effects are not simulated there, so detections occur by chance.",
+            f"The model has no effects for {named}, so any detections for these statements are due to chance.",
         ]
     lines += [
         line
@@ -417,7 +434,7 @@ def _preface(power: Powers) -> list[str]:
         if block.groups
         for line in (
             "",
-            f"{block.title}: n is the number of participants in {' and '.join(block.groups)}; other groups do "
+            f"{block.title}: n is the number of participants in {' and '.join(block.groups)}, because other groups do "
             "not have this block.",
         )
     ]
@@ -425,11 +442,12 @@ def _preface(power: Powers) -> list[str]:
 
 
 _SOURCES: Final = (
-    "Consistent, typical and noisy people have values from published ratings, in points of a seven-point "
-    "scale: a trained panel (data TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen 2017; "
-    "medians over 15 attributes); panelists who rated chocolates (data sensochoc, R package SensoMineR, Lê and "
-    "Husson 2008; medians over 14 descriptors); and the largest of the latter 14 values. Noise: SD between "
-    "equal trials; slopes: SD between people of their effects, relative to the mean effect."
+    "The values for consistent, typical and noisy people come from published ratings, in points on a seven-point "
+    "scale. Consistent: a trained panel (data set TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen "
+    "2017; medians across 15 attributes). Typical: panelists who rated chocolates (data set sensochoc, R package "
+    "SensoMineR, Lê and Husson 2008; medians across 14 descriptors). Noisy: the largest of these 14 values. The SD of "
+    "noise is the SD between identical trials; the SD of slopes is the between-person SD of effects, relative to the "
+    "mean effect."
 )
 """Where the values of `raters.PUBLISHED` come from."""
 BEYOND: Final = "beyond"
@@ -457,8 +475,9 @@ def _summary(power: Powers) -> Iterator[str]:
             shares = dict(zip(power.kinds, (kind.power[place] for kind in power.among_kinds(curve)), strict=True))
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
-                f"- {_name(curve, power).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect it if "
-                f"people are {CONSISTENT}, {shares[main]:.0%} if {main}, and {shares[NOISY]:.0%} if {NOISY}."
+                f"- {_name(curve, power).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect the effect if "
+                f"people are {CONSISTENT}, {shares[main]:.0%} if they are {main}, and {shares[NOISY]:.0%} if they are "
+                f"{NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
@@ -475,8 +494,8 @@ def _between(power: Powers) -> Iterator[str]:
             first, second = contrast_sides(plan, answers, contrast)
             numbers = first if contrast.within is None else first - second
             spreads[name] = float(numbers.std(ddof=1))
-        of = "the mean answers" if contrast.within is None else "the differences within participants"
-        said = f"SD: standard deviation of {of} of simulated participants, in points."
+        of = "mean answers" if contrast.within is None else "within-participant differences"
+        said = f"SD is the standard deviation of the simulated participants' {of}, in points."
         rows = [(f"{contrast.measure}, {_people(name)}", f"{spread:.2f}", spread) for name, spread in spreads.items()]
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
@@ -495,10 +514,10 @@ def form_differences(
 
     The parameters are those of `smallest_differences`.
     """
-    of = "answers or scores" if contrast.within is None else "differences within participants"
+    of = "answers or scores" if contrast.within is None else "within-participant differences"
     said = (
         f"Answers to this form are not simulated. Numbers are multiples of the standard deviation (SD) of the {of}, "
-        "which pilot sessions or published data give."
+        "which you can take from pilot sessions or published data."
     )
     rows = [(contrast.measure, "1", 1.0)]
     yield from smallest_differences(
@@ -534,13 +553,13 @@ def smallest_differences(
     the scale of the standard deviation, which ``bounds`` hypotheses state; ``largest`` is the largest difference of a
     participant that the scale permits, None without a limit.
     """
-    equal = [] if bound is None else [f"shown within the bound {IF_EQUAL}"]
-    heads = (first, "participants", "SD", "half width of the 95 % interval", "smallest difference", *equal)
+    equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
+    heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
-    corrected = "" if members == 1 else f" ({alpha:.2g} over {members} hypotheses)"
+    corrected = "" if members == 1 else f" ({alpha:.2g} divided by {members} hypotheses)"
     both = "" if shares is None else f" The two groups contain {shares[0]:.0%} and {shares[1]:.0%} of the participants."
     yield from ("", f"## Contrast: {contrast.described()}", "")
-    at = f"at α = {strictest:.2g}{corrected}, {sides}"
+    at = f"{sides}, α = {strictest:.2g}{corrected}"
     within = (
         ""
         if bound is None
@@ -548,8 +567,8 @@ def smallest_differences(
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
     )
     yield (
-        f"{said}{both} The smallest difference is the difference that {WANTED:.0%} of studies detect "
-        f"{at}.{within} {LEFT_OUT}"
+        f"{said}{both} The smallest difference is the one that {WANTED:.0%} of studies detect "
+        f"({at}).{within} {LEFT_OUT}"
     )
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
@@ -621,26 +640,29 @@ def _truly_equal(curves: Sequence[Curve]) -> list[Curve]:
 def _explained(question: Question, found: Powers) -> list[str]:
     match question:
         case "settings differ":
-            return ["Friedman's permutation test, or Wilcoxon's signed-rank test for two conditions."]
+            return [
+                "Tested with Friedman's test (permutation), or with Wilcoxon's signed-rank test for two conditions."
+            ]
         case "trend":
             by = TRENDS[found.plan.decided.trends]
-            return [f"A trend by {by}, one-sided if the protocol states a direction."]
+            return [f"Trend tested with {by}; one-sided if the protocol states a direction."]
         case "lowest delay":
             return [
-                "Rank correlations are tested again without the longest delay as long as there is a trend; the result "
-                "is an upper bound of the noticeable delay."
+                "As long as there is a trend, the longest delay is dropped and the rank correlations are tested again; "
+                "the result is an upper bound for the noticeable delay."
             ]
         case "equivalence":
             bound = found.plan.decided.equivalence_bound or STEPS
             return [
-                f"Two one-sided t tests within ±{bound} points, with which the bootstrap must agree, and with "
-                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the model's difference is near the "
-                "bound or beyond it, a finding of equivalence is wrong, so few studies should find it."
+                f"Tested with two one-sided t tests (bounds ±{bound} points) and a bootstrap, which must agree, with "
+                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the model's difference is near or "
+                "outside the bounds, a finding of equivalence is wrong, so few studies should find it."
             ]
         case "contrast":
             return [
-                "Paired t tests of each participant's mean answers, Holm-corrected across the hypotheses; the "
-                f"bootstrap and t corrected for skewness must agree. Equivalence is tested as in the report. {LEFT_OUT}"
+                "Tested with paired t tests on each participant's mean answers, Holm-corrected across the hypotheses; "
+                "the bootstrap and the t test corrected for skewness must agree. Equivalence is tested as in the "
+                f"report. {LEFT_OUT}"
             ]
 
 
@@ -693,10 +715,10 @@ def _name(curve: Curve, power: Powers) -> str:
 _PLOTS_A_ROW: Final = 5
 _TITLE_LETTERS: Final = 21
 HEADS: Final[dict[Question, str]] = {
-    "settings differ": "settings differ",
+    "settings differ": "conditions differ",
     "trend": "trend over delay",
     "lowest delay": "trend up to this delay",
-    "equivalence": "delay equivalent",
+    "equivalence": "delay is equivalent",
 }
 """What a study shows, as the vertical axis of its plots says it."""
 
@@ -730,9 +752,9 @@ def draw_power(power: Powers, block: Planned) -> Figure:
     rows = list(_plots(power, block))
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 0.7 + 1.45 * len(rows)), layout="constrained")
     figure.suptitle(
-        f"{block.title}: share of {power.studies} studies with SIMULATED participants, over their number\n"
-        f"α = {power.plan.decided.alpha:g}; {_people(next(iter(power.kinds)))}, band: range over all kinds of people; "
-        "dashed: without any effect",
+        f"{block.title}: proportion of {power.studies} studies with SIMULATED participants, by number of participants\n"
+        f"α = {power.plan.decided.alpha:g}; line: {_people(next(iter(power.kinds)))}; band: range across all kinds of "
+        "people; dashed line: no effect",
         fontsize=7.5,
     )
     for row, plots in enumerate(rows):

@@ -56,7 +56,7 @@ def estimate_power(
             yield Precisions(protocol=study, sizes=sizes, studies=done, asked=asked, seed=seed, found=found)
         return
     asked = studies or STUDIES
-    progress("simulating every condition")
+    progress("simulating all conditions")
     planned = plan(study, rehearse())
     for done, counts in sweep_statements(planned, sizes, asked, seed, executor):
         yield powers(planned, sizes, done, asked, seed, counts)

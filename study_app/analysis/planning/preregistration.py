@@ -89,8 +89,8 @@ def read_commitment(folder: Path) -> Commitment | None:
         return TypeAdapter(Commitment).validate_json(blocks[-1], strict=True)
     except (IndexError, ValueError) as error:
         raise AnalysisError(
-            f"{path} does not end with what `liquid-study preregister` writes there ({type(error).__name__}): restore "
-            "it from a copy, or remove it"
+            f"{path} does not end with the block that `liquid-study preregister` writes ({type(error).__name__}): "
+            "restore the file from a copy, or remove it"
         ) from error
 
 
@@ -100,14 +100,14 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         stimuli = {block.id: stimulus_of(protocol, block) for block in protocol.main_blocks if block.stimulus}
         words = contrast.words({block: condition_of(protocol, stimulus) for block, stimulus in stimuli.items()})
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
-        test = _test_of(contrast, " of logarithms" if ratio else "")
+        test = _test_of(contrast, " on logarithms" if ratio else "")
+        sides = "two-sided" if contrast.expected is None else "one-sided"
+        weighted = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
         yield (
-            f"Hypothesis: {contrast.described(words)}. We test it by a {test} "
-            f"({'two-sided' if contrast.expected is None else 'one-sided'}"
-            f"{', weighted as in the group mean' if contrast.measure == 'threshold' else ''}) on one number per "
-            "participant. A bootstrap that adds a participant like the most extreme one and t corrected for skewness "
-            "(Hall 1992) must agree. p is Holm-adjusted across all hypotheses of this kind."
-            f"{_equality_of(protocol, contrast)}"
+            f"Hypothesis: {contrast.described(words)}. We test it with a {sides} {test}, using one value per "
+            f"participant.{weighted} A bootstrap that adds a participant as extreme as the most extreme one (Gaffke "
+            "2005) and a t test corrected for skewness (Hall 1992) must agree. The p value is Holm-adjusted across all "
+            f"hypotheses of this kind.{_equality_of(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
         yield LEFT_OUT
@@ -120,12 +120,14 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         yield f"Published value for comparison, block {published.described()}."
 
 
-def _test_of(contrast: Contrast, of: str) -> str:
+def _test_of(contrast: Contrast, logarithms: str) -> str:
     """Return the t test of a contrast."""
     if contrast.groups is None:
-        return f"paired t test{of}"
-    differences = "of differences within participants between" if contrast.is_interaction else "of"
-    return f"t test{of} {differences} two groups with unequal variances and the degrees of freedom of the smaller group"
+        return f"paired t test{logarithms}"
+    differences = " on within-participant differences" if contrast.is_interaction else ""
+    return (
+        f"two-sample t test{differences}{logarithms} with unequal variances and the smaller group's degrees of freedom"
+    )
 
 
 def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
@@ -136,8 +138,8 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
     reach, largest = equality_limits(contrast, contrast.bound, ratio=contrast.measure in RATIOS)
     alpha = decisions(protocol).alphas[-1] / bounds
     return (
-        " We test equivalence by two one-sided t tests and the bootstrap, Holm-adjusted across "
-        f"{number_text.counted(bounds, 'bound')}; it requires at least {fewest_participants(alpha, reach, largest)} "
+        " We test equivalence with two one-sided t tests and with a bootstrap, Holm-adjusted across "
+        f"{number_text.counted(bounds, 'bound')}; this requires at least {fewest_participants(alpha, reach, largest)} "
         f"participants{' in each group' if contrast.groups else ''}."
     )
 
@@ -151,12 +153,14 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
     what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit
     standards = [one for one in standards_of(protocol, block) if one is not None]
     if threshold_plan(protocol, block) is None:
-        asked = {"number": "With which exponent do estimates grow with", "rating": "How do ratings change with"}
+        asked = {"number": "With what exponent do estimates increase with", "rating": "How do ratings change with"}
         yield f"Block {block.id}: {asked.get(design.reply, 'How do answers change with')} {what}?"
         return
     at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
-    yield f"Block {block.id}: what is the {kind} of {what}{at}? We estimate it with its interval and do not test it."
+    yield (
+        f"Block {block.id}: what is the {kind} for {what}{at}? We estimate it with a 95 % interval and do not test it."
+    )
     if len(standards) > 1:
         yield (
             f"Block {block.id}: is the just-noticeable difference proportional to the standard (exponent 1, Weber's "
@@ -172,12 +176,12 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
     if protocol.compared_in(block.id) == "delays":
         for name, words in texts.items():
             if name in decided.rising or name in decided.falling:
-                moves = "rises" if name in decided.rising else "falls"
+                moves = "increases" if name in decided.rising else "decreases"
                 yield f"Hypothesis, block {block.id}: agreement with “{words}” ({name}) {moves} with the delay."
         if decided.noticed in texts:
             yield (
-                f"Block {block.id}: at which delay do participants notice a difference (agreement, 5 to 7, with "
-                f"{decided.noticed})?"
+                f"Block {block.id}: at what delay do participants notice a difference (agreement, 5 to 7, with the "
+                f"statement “{decided.noticed}”)?"
             )
         if decided.equivalence_bound is not None:
             yield (
@@ -187,7 +191,7 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
         return
     primary = [name for name in texts if not decided.primary or name in decided.primary]
     yield (
-        f"Hypothesis, block {block.id}: {listed(block.conditions)} differ in agreement with "
+        f"Hypothesis, block {block.id}: agreement differs between {listed(block.conditions)} for "
         f"{listed([f'“{texts[name]}” ({name})' for name in primary])}."
     )
     labels = [
@@ -205,34 +209,38 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             stimulus, design = stimulus_of(protocol, block), design_of(protocol, block)
             method, family = method_of(protocol, block), FAMILIES[assumed_for(stimulus, design).family]
             yield (
-                f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard we "
-                f"estimate the threshold by the posterior median ({family} function) with its equal-tailed 95 % "
-                "interval, at the delivered levels, and also report the median under a flat prior on the width. "
-                "Goodness of fit is tested with 999 simulated sets of answers; drift over trials is reported."
-                + (f" {REMOVED.format('is', 'is')}" if design.kind == "2ifc" else "")
+                f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard, we "
+                f"estimate the threshold as the posterior median ({family} function) with its equal-tailed 95 % "
+                "interval, using the delivered levels, and also report the median under a flat prior on the width. "
+                "Goodness of fit is tested with 999 simulated sets of answers, and drift over the trials is reported."
+                + (f" {REMOVED.format('is')}" if design.kind == "2ifc" else "")
             )
             yield (
-                f"Block {block.id}, group: the random-effects mean of logarithmic thresholds (Paule–Mandel) with the "
-                f"Hartung–Knapp 95 % interval, if there are at least {FEWEST} participants. Each variance is replaced "
-                "by its geometric mean with the median of all variances."
+                f"Block {block.id}, group: we report the random-effects mean of the logarithmic thresholds "
+                f"(Paule–Mandel), with the Hartung–Knapp 95 % interval if there are at least {FEWEST} participants. "
+                "Each variance is replaced by its geometric mean with the median variance."
             )
             if plan.standards > 1:
                 yield (
-                    f"Block {block.id}, exponent: the slope of ln JND on ln standard for each participant, with "
-                    "Student's interval."
+                    f"Block {block.id}, exponent: we report the mean of the participants' slopes of ln JND on ln "
+                    "standard, with a 95 % confidence interval (Student's t)."
                 )
         elif block.design is not None and block.stimulus is not None:
             yield (
-                f"Block {block.id}: we report the mean over participants of their mean answers at each level, "
-                "with Student's 95 % interval (of logarithms if numbers are estimated; the exponent is the "
-                "slope on the logarithm of the level)."
+                f"Block {block.id}: for each level, we report the mean across participants of their mean answers, "
+                "with a 95 % confidence interval (Student's t). If participants estimate numbers, we use the "
+                "logarithms of the answers, and the exponent is their slope on the logarithm of the level."
             )
             if design_of(protocol, block).reply == "rating":
                 yield (
-                    f"Block {block.id}: d_a of each level relative to the lowest, from the area under the ROC curve."
+                    f"Block {block.id}: we report d_a for each level relative to the lowest, calculated from the area "
+                    "under the ROC curve."
                 )
         elif block.design is not None:
-            yield f"Block {block.id}: d′ of each participant, from rates with the log-linear correction."
+            yield (
+                f"Block {block.id}: we report d′ for each participant, calculated from rates with the log-linear "
+                "correction."
+            )
     asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]
     if not asked:
         return
@@ -240,27 +248,27 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     kinds = {protocol.compared_in(block.id) for block in asked}
     if "delays" in kinds:
         yield (
-            f"Delays: we test trends by {TRENDS[decided.trends]}, one-sided if a direction is stated, otherwise "
-            "two-sided. If a statement shows a trend, we drop the longest delay and test the rank correlations again "
-            f"until no trend remains. {_equivalence_words(decided)}We estimate the detection threshold from agreement "
-            "if agreement shows a trend."
+            f"Delays: we test trends with {TRENDS[decided.trends]}. The test is one-sided if a direction is stated, "
+            "otherwise two-sided. If a statement shows a trend, we drop the longest delay and test the rank "
+            f"correlations again, until no trend remains. {_equivalence_words(decided)}We estimate the "
+            "detection threshold from agreement if agreement shows a trend."
         )
     if others := kinds - {None, "delays"}:
         yield (
-            f"{' and '.join(sorted(map(str, others))).capitalize()}: we test each statement by Friedman's permutation "
-            "test, and two conditions by Wilcoxon's signed-rank test."
+            f"{' and '.join(sorted(map(str, others))).capitalize()}: we test each statement with Friedman's test "
+            "(permutation), and compare two conditions with Wilcoxon's signed-rank test."
         )
     yield (
-        "A difference in a statement is claimed only if the permutation test over all statements of its block is "
-        "significant, Holm-adjusted across the blocks. Intervals of mean rank correlations and exploratory tests of "
+        "We claim a difference for a statement only if the permutation test over all statements in its block is "
+        "significant (Holm-adjusted across the blocks). Intervals for mean rank correlations and exploratory tests of "
         f"means require at least {FEW} participants."
     )
     yield (
-        f"α = {decided.alpha:g}. p values of primary statements ({', '.join(decided.primary) or 'all'}) are "
-        "Holm-adjusted; those of other statements, which are exploratory, are adjusted with the method of Benjamini "
-        "and Hochberg."
+        f"Alpha is {decided.alpha:g}. The p values of primary statements ({', '.join(decided.primary) or 'all'}) are "
+        "Holm-adjusted; those of other statements, which are exploratory, are adjusted with the Benjamini–Hochberg "
+        "method."
         if protocol.analysis is not None
-        else "There is no table [analysis], so all results are exploratory."
+        else "The protocol does not have an [analysis] table, so all results are exploratory."
     )
 
 
@@ -269,8 +277,8 @@ def _equivalence_words(decided: Decided) -> str:
     if (bound := decided.equivalence_bound) is None:
         return ""
     return (
-        "We test equivalence to the shortest delay by two one-sided tests with which the bootstrap must agree; it "
-        f"requires {min_sample(decided.alphas[-1], bound)}. "
+        "We test equivalence to the shortest delay with two one-sided t tests and with a bootstrap, which must agree; "
+        f"this requires {min_sample(decided.alphas[-1], bound)}. "
     )
 
 
@@ -326,9 +334,9 @@ def _design(protocol: Protocol) -> Iterator[str]:
     yield (
         "Conditions are known only by codes until the key is opened. The study is "
         + (
-            "double-blind: the operator sees no force."
+            "double-blind: the operator does not see the force."
             if study.blinding == "double"
-            else "single-blind: the operator sees force and wake."
+            else "single-blind: the operator sees the force and the wake."
         )
     )
     names, ratio = listed(list(protocol.shares)), ":".join(map(str, protocol.shares.values()))
@@ -339,17 +347,17 @@ def _design(protocol: Protocol) -> Iterator[str]:
         )
     elif protocol.asks_group:
         yield (
-            f"Participants belong to the groups {names} by an existing attribute, which is recorded at the start of "
-            f"their first session; the planned ratio is {ratio}. Groups are not randomised, so a difference between "
-            "them may have other causes."
+            f"Participants belong to the groups {names} because of an existing attribute, which is recorded at the "
+            f"start of their first session; the planned ratio is {ratio}. The groups are not randomised, so a "
+            "difference between them may have other causes."
         )
     for group, words in block_orders_by_group(protocol).items():
         yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
-    yield "Orders of trials are drawn for each participant from the session's seed, as described for each block below."
+    yield "Trial orders are drawn for each participant from the session's seed, as described below for each block."
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
         kind = "levels" if block.stimulus is not None else "conditions"
-        yield f"Block {block.id} compares {kind}, which are described below." + (
+        yield f"Block {block.id} compares {kind} that are described below." + (
             f" Expected precision: {rows['Expected precision']}." if rows else ""
         )
 
@@ -360,19 +368,19 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
     if one.participants is not None:
         decided = decisions(protocol)
         planned = (
-            f"We plan {number_text.counted(one.participants, 'participant')}. The study ends when this number "
-            "of valid sessions is complete; only then is the key opened and the data tested."
+            f"We plan to include {number_text.counted(one.participants, 'participant')}. The study ends when this "
+            "number of valid sessions is complete; only then are the key opened and the data tested."
             if not decided.looks
-            else f"We plan {one.participants} participants. The key is opened and everything is tested when "
-            f"{listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values up to "
+            else f"We plan to include {one.participants} participants. The key is opened and everything is tested when "
+            f"{listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values of up to "
             f"{listed([significant(level) for level in decided.alphas])} are significant at these looks "
-            f"({SPENDINGS[decided.spending]} spending of alpha, Lan & DeMets 1983). The study ends at the first look "
-            "at which all primary statements and hypotheses are shown, and otherwise at the last look."
+            f"({SPENDINGS[decided.spending]} alpha spending, Lan & DeMets 1983). The study ends at the first look at "
+            "which all primary statements and hypotheses are shown, or otherwise at the last look."
         )
     wanted = (
         ""
         if one.precision is None
-        else f" The goal is a 95 % interval of the group mean within ±{percent(one.precision)}."
+        else f" The goal is a 95 % interval for the group mean no wider than ±{percent(one.precision)}."
     )
     yield planned + wanted
     reasons = []
@@ -384,9 +392,9 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
         if one.participants is not None:
             half = 100 * expected.of_group(one.participants)
             people = number_text.counted(one.participants, "participant")
-            reached = f" With {people} the expected precision is ±{half:.0f} %."
+            reached = f" With {people}, the expected precision is ±{half:.0f} %."
         needed = None if one.precision is None else expected.participants_for(one.precision)
-        enough = "" if needed is None else f" This goal needs at least {number_text.counted(needed, 'participant')}."
+        enough = "" if needed is None else f" The goal requires at least {number_text.counted(needed, 'participant')}."
         reasons.append(
             f"- Block {block.id}: we simulated {expected.trials} trials{plan.per}, with thresholds that differ between "
             f"people by a factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
@@ -415,20 +423,23 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
     has_intervals = any(block.design is not None for block in protocol.main_blocks)
     if has_intervals:
         attempts = protocol.limits.attempts
-        times = "" if attempts is None else f", up to {attempts} times"
-        yield f"If a trial of intervals exceeds a limit, no question is asked and the trial is presented again{times}."
+        times = "" if attempts is None else f", for up to {number_text.counted(attempts, 'presentation')} in total"
+        yield (
+            f"If an interval of a trial exceeds a limit, no question is asked and the trial is presented again{times}."
+        )
         if (permitted := protocol.limits.missing_percent) is not None:
             yield (
                 f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of its main trials '
-                "of intervals stay unanswered because no presentation was within the limits."
+                "with intervals remain unanswered because no presentation was within the limits."
             )
     if any(block.design is None for block in protocol.main_blocks):
         trials = "Other trials" if has_intervals else "Trials"
-        yield f"{trials} beyond a limit are analysed, and their number is reported."
+        yield f"{trials} that exceed a limit are analysed, and their number is reported."
     for rule in () if protocol.analysis is None else protocol.analysis.exclusions:
         yield (
-            f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. A person decides; the report '
-            "names the session and the decision, and states the conclusions with and without all such sessions."
+            f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. Somebody decides whether to '
+            "exclude it; the report lists the session and the decision, and states the conclusions with and without "
+            "all such sessions."
         )
     yield f"Limits: {limits}."
     yield "Any other exclusion is a deviation from this preregistration; the report lists it with its reason and date."
@@ -463,14 +474,11 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
     """Yield the differences of a study, or of a site's preregistration, from the commitments."""
     for site, own in sites.items():
         if own is None:
-            yield f"site {site} does not have {FILE}"
+            yield f"site {site} does not have the file {FILE}"
         elif own != committed:
-            yield (
-                f"the preregistration of site {site} differs from the preregistration of the first site, "
-                "which is used here"
-            )
+            yield (f"the preregistration at site {site} differs from the one at the first site, which is used here")
     if study.name != committed.study:
-        yield f"the preregistration belongs to another study, {committed.study}"
+        yield f"the preregistration belongs to a different study, {committed.study}"
     rows = study.participants
     other = rows[rows["counted"] & (rows["protocol_hash"] != committed.protocol_hash)]
     if len(other):
@@ -478,26 +486,26 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
         who = listed([f"{row.participant}/{row.session}" for row in other.head(_SHOWN).itertuples()])
         more = "" if len(other) <= _SHOWN else f" and {len(other) - _SHOWN} more"
         yield (
-            f"{counted(len(other), 'session')} ran under a protocol (version {versions}) that differs from the "
+            f"{counted(len(other), 'session')} used a protocol (version {versions}) that differs from the "
             f"preregistered one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
         )
     yield from _other_participants(study, committed.participants)
     by_person = [exclusion for exclusion in study.exclusions if exclusion.rule_or_person not in committed.rules]
     for exclusion in by_person[:_SHOWN]:
         yield (
-            f"an exclusion without a preregistered rule ({describe_exclusion(exclusion)}; {exclusion.reason}; "
+            f"there is an exclusion without a preregistered rule ({describe_exclusion(exclusion)}; {exclusion.reason}; "
             f"{exclusion.rule_or_person})"
         )
     if len(by_person) > _SHOWN:
-        yield f"{len(by_person) - _SHOWN} more exclusions without a preregistered rule are in report.json"
+        yield f"report.json lists {len(by_person) - _SHOWN} more exclusions without a preregistered rule"
     if study.decided.changed:
-        yield "the decisions about the analysis differ between sessions: all results are exploratory"
+        yield "the decisions about the analysis differ between sessions, so all results are exploratory"
 
 
 def _other_participants(study: Study, planned: int | None) -> Iterator[str]:
     if planned is not None and study.n not in (planned, *study.decided.looks):
         kind = "fewer" if study.n < planned else "more"
-        yield f"{kind} participants: {study.n} are analysed, {planned} were planned"
+        yield f"there are {kind} participants than planned ({study.n} instead of {planned})"
 
 
 def deviations_section(study: Study) -> Iterator[str]:
@@ -508,8 +516,8 @@ def deviations_section(study: Study) -> Iterator[str]:
     yield heading(2, "Preregistration")
     if (committed := compared.commitment) is None:
         yield paragraph(
-            f"The study's folder does not contain {FILE}. Comparison with the protocol's planned number of "
-            "participants:"
+            f"The study's folder does not contain {FILE}, so only the number of participants is compared with the "
+            "protocol's plan."
         )
     else:
         yield paragraph(
@@ -517,11 +525,13 @@ def deviations_section(study: Study) -> Iterator[str]:
             f"{committed.protocol_hash}."
         )
     if compared.found:
-        yield paragraph("The study differs from the preregistration in:")
+        plan = "preregistration" if committed is not None else "plan"
+        yield paragraph(f"The study differs from the {plan} as follows:")
         yield bullets(compared.found)
     else:
         yield paragraph(
-            "There was no difference in protocol, number of participants, exclusions or decisions."
+            "The protocol, the number of participants, the exclusions and the decisions do not differ from the "
+            "preregistration."
             if compared.commitment is not None
-            else "As many participants as planned."
+            else "The number of participants is as planned."
         )

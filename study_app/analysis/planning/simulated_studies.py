@@ -98,7 +98,7 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     asked = _compared(protocol)
     if not asked:
         raise AnalysisError(
-            f"{protocol.study.name} does not make a comparison: power needs a main block of two or more "
+            f"{protocol.study.name} does not compare anything: a power analysis needs a main block with two or more "
             "conditions and a questionnaire with statements"
         )
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")
@@ -405,7 +405,7 @@ def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: 
     return counts | means
 
 
-IF_EQUAL: Final = "if truly equal"
+IF_EQUAL: Final = "if there is no difference"
 
 
 def shown_contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:

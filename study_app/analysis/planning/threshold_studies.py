@@ -105,7 +105,7 @@ def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
         for asked, one in zip(trials, changed, strict=False):
             if abs(one.trials - asked) > max(1, asked / 2):
                 raise AnalysisError(
-                    f"{asked} trials cannot be divided among the tracks and levels of {block.id}: specify at least "
+                    f"{asked} trials cannot be divided among the tracks and levels in {block.id}: specify at least "
                     f"{one.trials}"
                 )
         planned[block.id] = {one.trials: one for one in changed}
@@ -228,27 +228,32 @@ COLUMNS: Final = (
     Column(
         "trials",
         "integer",
-        "Number of trials per standard, comparison or rated level; for magnitude estimation, of all trials.",
+        "Number of trials per standard, comparison or rated level; for magnitude estimation, the total number of "
+        "trials.",
         minimum=1,
     ),
     *OF_STUDIES,
     optional(
         "spread",
         "number",
-        "Standard deviation of the logarithm of one participant's threshold, median of the studies; for d′, d_a "
+        "Standard deviation of the logarithm of one participant's threshold (median across the studies); for d′, d_a "
         "and exponents, relative to their value; empty if limits clip the levels.",
         minimum=0,
     ),
     optional(
         "half_interval",
         "number",
-        "Half width of the 95 % interval of the group mean, relative to the mean (median of the studies).",
+        "Half-width of the 95 % interval for the group mean, relative to the mean (median across the studies).",
         minimum=0,
     ),
-    optional("precision", "number", "The planned half width; n/a if none is planned.", minimum=0),
-    optional("within", "number", "Proportion of the studies that reach the planned half width.", minimum=0, maximum=1),
-    optional("within_low", "number", "Lower end of the proportion's 95 % interval.", minimum=0, maximum=1),
-    optional("within_high", "number", "Upper end of the proportion's 95 % interval.", minimum=0, maximum=1),
+    optional("precision", "number", "The planned half-width; n/a if no half-width is planned.", minimum=0),
+    optional("within", "number", "Proportion of studies that reach the planned half-width.", minimum=0, maximum=1),
+    optional(
+        "within_low", "number", "Lower end of the 95 % confidence interval for the proportion.", minimum=0, maximum=1
+    ),
+    optional(
+        "within_high", "number", "Upper end of the 95 % confidence interval for the proportion.", minimum=0, maximum=1
+    ),
 )
 
 
@@ -307,15 +312,15 @@ def threshold_markdown(precisions: Precisions) -> str:
     study, precision = precisions.protocol.study, precisions.precision
     language = display_language({"study": {"languages": study.languages}})
     lines = [
-        f"# Expected precision of {text_in(study.title, language)} ({study.name} {study.version})",
+        f"# Expected precision for {text_in(study.title, language)} ({study.name} {study.version})",
         "",
         f"**SIMULATED.** Each row summarises {precisions.studies} studies (seed {precisions.seed}, liquid-study "
-        f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Results are estimated as in the report.",
+        f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Estimates are computed as in the report.",
     ]
     if precisions.studies < precisions.asked:
         lines += ["", f"**Ended early: {precisions.studies} of {precisions.asked} studies.**"]
     wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
-    heads = ["participants", "SD of one participant", "half width of the group's 95 % interval", *wanted]
+    heads = ["participants", "SD for one participant", "half-width of the group's 95 % interval", *wanted]
     planned = plans(precisions.protocol, ())
     blocks = precisions.protocol.blocks
     for block in dict.fromkeys(block for block, _ in precisions.found):
@@ -348,8 +353,9 @@ def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
     if math.isfinite(medians[worst]):
         yield ""
         yield (
-            f"By kind of people, {precisions.sizes[-1]} participants and {trials} trials: ±"
-            f"{sorted(medians.values())[len(medians) // 2]:.0%} (median), ±{medians[worst]:.0%} at worst ({worst})."
+            f"With {precisions.sizes[-1]} participants and {trials} trials, the precision depends on the kind of "
+            f"people: ±{sorted(medians.values())[len(medians) // 2]:.0%} (median across kinds), "
+            f"±{medians[worst]:.0%} at worst ({worst})."
         )
 
 
@@ -377,13 +383,13 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
             continue
         what = contrast.measure.replace("d_prime", "d′")
         share = "" if isinstance(first, ThresholdPlan) else f", relative to a mean {what} of {first.value:g}"
-        whose = f"one participant's {what}, from the error of the estimate and differences between people"
+        whose = f"for one participant's {what}, from the estimation error and differences between people"
         if contrast.within is not None:
-            whose = "one participant's difference, from the errors of both estimates and differences between people"
+            whose = "for one participant's difference, from both estimation errors and differences between people"
         yield from smallest_differences(
             contrast, precisions.sizes, alpha, members, rows,
             f"trials{first.per}",
-            f"SD{share}; {whose} by a factor of {BETWEEN_PEOPLE:g}.",
+            f"SD: standard deviation {whose} (a factor of {BETWEEN_PEOPLE:g}){share}.",
             (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
             group_shares(precisions.protocol, contrast),
             log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
@@ -419,21 +425,21 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (
-            "Each study has people of one kind, and kinds alternate: psychometric functions as wide as the "
-            "prior's median, half, 1.5 and 2.5 times as wide, 2 or 5 % of answers at random, "
-            f"{'a preference for an interval or for the last answer, ' if plan.two_intervals else ''}thresholds "
-            "that fall or rise. The mean of their thresholds is in the middle half of the levels. The group "
-            "interval is the Hartung–Knapp interval for the mean over all standards."
+            "Each study simulates one kind of people, and the kinds alternate: psychometric functions that are as wide "
+            "as the prior's median, or 0.5, 1.5 or 2.5 times as wide; 2 or 5 % random answers; "
+            f"{'a preference for one interval or for the last answer; ' if plan.two_intervals else ''}thresholds "
+            "that fall or rise. Their mean threshold lies in the middle half of the levels. The group "
+            "interval is the Hartung–Knapp interval for the mean across all standards."
         )
-    group = "The group interval is Student's t interval for the mean."
+    group = "The group interval is a t-based confidence interval for the mean."
     if isinstance(plan, SensitivityPlan):
-        return f"Observers are unbiased, with a mean d′ of {plan.value:g}; the SD is relative to it. {group}"
+        return f"Observers are unbiased and have a mean d′ of {plan.value:g}; the SD is relative to this mean. {group}"
     if isinstance(plan, RatingPlan):
         return (
-            f"Observers have a mean d_a of {plan.value:g} between a level and the lowest, and use all "
-            f"{plan.points} points of the scale about equally often; the SD is relative to d_a. {group}"
+            f"Observers have a mean d_a of {plan.value:g} between a level and the lowest level, and use all "
+            f"{plan.points} points on the scale about equally often; the SD is relative to d_a. {group}"
         )
     return (
-        f"Observers follow a power law with a mean exponent of {plan.value:g}; ln answers have a standard "
+        f"Observers follow a power law with a mean exponent of {plan.value:g}, and their ln answers have a standard "
         f"deviation of {ESTIMATE_NOISE:g}; the SD is relative to the exponent. {group}"
     )

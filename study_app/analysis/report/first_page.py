@@ -158,7 +158,7 @@ def _number_words(numbers: Numbers) -> str:
         f"{number(mean.value)}{f' for {name.lower()}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
     ]
     n = max(count for *_, count in means)
-    text = f"{what} was {listed(parts)} (95 % interval{'s' * (len(parts) > 1)}, n = {n})."
+    text = f"{what} was {listed(parts)} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
     if len(means) != 2:
         return text
     (first, second), (one, other) = numbers.by_setting, numbers.by_setting.values()
@@ -193,7 +193,7 @@ def _choice_words(result: QuestionResult) -> str:
         ends = f"[{100 * share.low:.0f}, {100 * share.high:.0f}] %"
         parts.append(
             f"{counts[option]} of {n} participants chose “{option}”{of} ({100 * counts[option] / n:.0f} %, 95 % "
-            f"interval {ends})"
+            f"confidence interval {ends})"
         )
     return f"“{result.short}”: {'; '.join(parts)}."
 

@@ -21,16 +21,16 @@ _WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
 """The devices without force: reading results must not load their descriptors."""
 
 _ORDERS: Final = {
-    "fixed": "in one order for all participants",
-    "shuffled": "in an order drawn for each participant",
-    "constrained": "in a constrained order drawn for each participant",
-    "williams": "in the orders of a Williams design",
-    "latin": "in the orders of a Latin square",
+    "fixed": "in the same order for all participants",
+    "shuffled": "in a random order for each participant",
+    "constrained": "in a constrained random order for each participant",
+    "williams": "in orders from a Williams design",
+    "latin": "in orders from a Latin square",
 }
 _BLOCK_ORDERS: Final = {
     "fixed": "in the same order for all participants",
-    "balanced": "in orders balanced over participants (Williams design)",
-    "random": "in an order drawn for each participant",
+    "balanced": "in orders balanced across participants (Williams design)",
+    "random": "in a random order for each participant",
 }
 
 
@@ -82,7 +82,8 @@ def _fewer_settings(study: Study) -> str:
     if not fewer:
         return ", not all of them in all conditions"
     people = counted(len(fewer), "participant")
-    return f"; {people} {'lacks' if len(fewer) == 1 else 'lack'} a condition, because individual trials were excluded"
+    lack = "lacks" if len(fewer) == 1 else "lack"
+    return f"; {people} {lack} at least one condition because individual trials were excluded"
 
 
 def _groups(study: Study) -> str:
@@ -92,8 +93,8 @@ def _groups(study: Study) -> str:
     match group_assignment(study):
         case "pre-existing":
             return (
-                f"Participants belonged to the groups {named} by an existing attribute, recorded at the start of the "
-                "session; groups were not randomised."
+                f"Participants belonged to the groups {named} because of an existing attribute, which was recorded at "
+                "the start of the session; the groups were not randomised."
             )
         case "randomised":
             ratio = ":".join(f"{share}" for share in shares.values())
@@ -111,11 +112,11 @@ def _planned(study: Study, results: Results) -> str:
         levels = listed([significant(level) for level in decided.alphas])
         alpha = significant(decided.planned_alpha or decided.alpha)
         return (
-            f"{decided.look_words(len(results.people))} At the planned looks, adjusted p values up to {levels} are "
-            f"significant ({SPENDINGS[decided.spending]} spending of alpha = {alpha}, Lan & DeMets 1983)."
+            f"{decided.look_words(len(results.people))} At the planned looks, adjusted p values of up to {levels} are "
+            f"significant ({SPENDINGS[decided.spending]} alpha spending with alpha = {alpha}, Lan & DeMets 1983)."
         )
     planned = (study.protocol.get("analysis") or {}).get("participants")
-    return "" if planned is None else f"{number_text.capitalised(counted(planned, 'participant'))} had been planned."
+    return "" if planned is None else f"The planned sample size was {counted(planned, 'participant')}."
 
 
 def _exclusions(study: Study) -> str:
@@ -125,7 +126,7 @@ def _exclusions(study: Study) -> str:
     parts = [counted(count, noun) for count, noun in out if count]
     sentences = [f"The analysis does not include {listed(parts)}."] if parts else []
     if study.late:
-        sentences.append(f"Decisions after the key was opened: {late_exclusions(study)}.")
+        sentences.append(f"Some decisions were made after the key was opened: {late_exclusions(study)}.")
     elif study.revealed and any(exclusion.rule_or_person not in RULES for exclusion in study.exclusions):
         sentences.append("Exclusions were decided while the key was sealed.")
     return " ".join(sentences)
@@ -135,7 +136,7 @@ def late_exclusions(study: Study) -> str:
     """Return the number of exclusions decided, and of those reversed, after the key was opened, as text."""
     decided = sum(exclusion in study.exclusions for exclusion in study.late)
     back = len(study.late) - decided
-    parts = [f"{counted(decided, 'exclusion')} of {len(study.exclusions)}"] if decided else []
+    parts = [f"{decided} of {number_text.counted(len(study.exclusions), 'exclusion')}"] if decided else []
     return listed([*parts, *([f"the reversal of {counted(back, 'exclusion')}"] if back else [])])
 
 
@@ -143,7 +144,7 @@ def version_words(study: Study) -> str:
     """Return the protocol versions of the pooled sessions as text."""
     versions = study.versions
     pooled = f"version {versions[0]}" if len(versions) == 1 else f"versions {listed(versions)}, pooled"
-    return f"{pooled}, in {study.contents} different files" if study.contents > len(versions) else pooled
+    return f"{pooled}, from {study.contents} different files" if study.contents > len(versions) else pooled
 
 
 def _apparatus(study: Study) -> str:
@@ -164,8 +165,8 @@ def _apparatus(study: Study) -> str:
     )
     return (
         f"Participants used {device_words}. "
-        f"A ball of {1000 * scene['body']['diameter_m']:g} mm diameter moved {scene['scale']:g} times as far as the "
-        f"hand{velocity}."
+        f"A ball with a diameter of {1000 * scene['body']['diameter_m']:g} mm moved {scene['scale']:g} times as far as "
+        f"the hand{velocity}."
     )
 
 
@@ -193,7 +194,7 @@ def _parameters(liquid: Mapping[str, Any]) -> str:
     numbers = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
     numbers += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
     if liquid["effects"] == "auto":
-        return ", ".join([*numbers, "effects chosen by their size"])
+        return ", ".join([*numbers, "effects selected by size"])
     wake = liquid.get("wake") or {}
     of_wake = ", ".join(f"{key} {wake[key]:g}" for key in ("length", "scaling", "exponent") if key in wake)
     of = {"drag": f"drag (law: {liquid['drag']['law']})", "wake": f"wake ({of_wake})"}
@@ -260,12 +261,12 @@ def _delays(study: Study, results: Results) -> Iterator[str]:
             continue
         known = [row for row in rows if row.achieved_ms is not None]
         if not known:
-            yield f"The delays achieved in “{block.title}” were not measured."
+            yield f"The achieved delays in “{block.title}” were not measured."
             continue
         pairs = [f"{number(delivered.achieved_ms, 1)} ms ({ms(delivered.delay_ms or 0.0)})" for delivered in known]
         yield (
-            f"The mean delays achieved in “{block.title}” (and requested) were {listed(pairs)}, by the program's clock "
-            "and without the latency of the display."
+            f"The mean achieved delays in “{block.title}” (requested delays in parentheses) were {listed(pairs)}, "
+            "measured by the program's clock and excluding display latency."
         )
 
 
@@ -276,7 +277,7 @@ def _missing_trials(study: Study) -> str:
     if not study.levels or not asked:
         return ""
     if not count:
-        return "All main trials of intervals were delivered within the limits."
+        return "All main trials with intervals were delivered within the limits."
     lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
     return f"{lost} because no presentation was within the limits."
 
@@ -284,7 +285,7 @@ def _missing_trials(study: Study) -> str:
 def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
-        "Statements were rated on seven-point scales and treated as ordinal: answers are summarised by medians and "
+        "Statements were rated on seven-point scales and treated as ordinal; answers are summarised by medians and "
         f"quartiles ({quartiles})."
     )
     yield from _means(results, blocks)
@@ -299,7 +300,7 @@ def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) ->
 def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     """Yield sentences on the means shown, and on the tests that use them."""
     if any(Effects.of(block) for block in blocks):
-        yield "Mean differences from the first setting are shown with Student's 95 % intervals."
+        yield "Mean differences from the first setting are shown with 95 % confidence intervals (Student's t)."
     tested = [
         (
             "the hypotheses",
@@ -319,7 +320,7 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     if gated:
         holm = f", Holm-adjusted across {counted(len(gated), 'block')}" if len(gated) > 1 else ""
         yield (
-            "An adjusted p value of a statement is at least the p value of the test over all statements of its "
+            "A statement's adjusted p value is never smaller than the p value of the test over all statements in its "
             f"block{holm}."
         )
     if decided.binding:
@@ -330,22 +331,23 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
         )
     elif decided.changed:
         yield (
-            "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
-            f"first session were used (alpha = {decided.alpha_words()})."
+            "The decisions about the analysis changed between sessions, so all results are exploratory; the decisions "
+            f"from the first session were used (alpha = {decided.alpha_words()})."
         )
     elif not decided.made:
-        yield f"No decisions were made beforehand: all results are exploratory, with alpha = {decided.alpha:g}."
+        yield f"No decisions were made beforehand, so all results are exploratory (alpha = {decided.alpha:g})."
     for finding in all_findings():
         yield from finding.common_methods(blocks)
     if gone := sorted({person for block in blocks for people in block.incomplete.values() for person in people}):
+        were = "was" if len(gone) == 1 else "were"
         yield (
-            f"Missing answers were not replaced: {number_text.counted(len(gone), 'participant')} with a missing "
-            "answer to a statement were excluded from its tests over all conditions, and from comparisons of "
-            "two conditions that involve the missing answer."
+            f"Missing answers were not replaced; {number_text.counted(len(gone), 'participant')} with a missing "
+            f"answer to a statement {were} excluded from that statement's tests over all conditions, and from "
+            "comparisons of two conditions that involve the missing answer."
         )
     measured = results.performance
     if measured is not None and measured.recorded:
         yield (
-            "Movement times were measured from recordings at the servo's rate, from the moment a target lit up "
-            "until the final entry; the first reach of each trial was excluded."
+            "Movement times were measured from recordings at the servo rate, from the moment a target lit up until the "
+            "hand entered it for the last time; the first reach in each trial was excluded."
         )

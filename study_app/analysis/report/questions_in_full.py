@@ -27,8 +27,8 @@ def changed_questions(contents: Sequence[RecordedContent]) -> Iterator[str]:
         reworded = sorted({place[0] for place in old.keys() & new.keys() if old[place] != new[place]})
         if reworded:
             yield (
-                f"Reworded in version {after.name}: {listed(reworded)}. Answers before and after the change are "
-                "analysed together; “Questions in full” has both wordings."
+                f"The wording of {listed(reworded)} changed in version {after.name}. Answers from before and after the "
+                "change are analysed together; “Questions in full” shows both wordings."
             )
 
 
@@ -51,10 +51,10 @@ def appendix(contents: Sequence[RecordedContent]) -> Iterator[str]:
         words=4,
     )
     for after, sentences in content_changes(contents):
-        yield heading(3, f"Changed in version {after.name}")
+        yield heading(3, f"Changes in version {after.name}")
         yield bullets(sentences)
     if several:
-        yield paragraph("The changes are read from the receipts, which do not contain liquids and conditions.", "soft")
+        yield paragraph("The changes were found in the receipts, which do not contain liquids or conditions.", "soft")
 
 
 def _texts(protocol: Mapping[str, Any]) -> Iterator[_Text]:

@@ -63,8 +63,8 @@ def none_found(results: Results) -> str:
     if results.blocks:
         return "No answers are included yet."
     return (
-        "The study does not ask for statements after trials, so there are no tests; the sections below show "
-        "the answers."
+        "The study does not ask participants to rate statements after trials, so there are no tests; the sections "
+        "below show the answers."
     )
 
 
@@ -80,9 +80,9 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
         out = [f"“{short_text(result, one.item)}”" for one in decisive if one.verdict == "out of reach"]
         if out:
             lines.append(
-                f"{lead_phrase(result)}: the tests of {listed(out)} could not have been significant with so few "
-                "participants: no rearrangement of the answers within participants gives an adjusted p that is small "
-                "enough."
+                f"{lead_phrase(result)}: the tests for {listed(out)} could not have been significant with so few "
+                "participants, because no rearrangement of the answers within participants gives a small enough "
+                "adjusted p value."
             )
         untested: dict[str, list[str]] = {}
         for one in decisive:
@@ -107,53 +107,53 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "--reason TEXT."
         )
         if study.own_codes:
-            yield "Until unblinding each participant has separate codes, so conditions cannot be compared."
+            yield "Until unblinding, each participant has separate codes, so conditions cannot be compared."
         if study.sites:
             yield (
-                "Each site has its own key: until all sites are unblinded, codes begin with the site, and "
-                "conditions of different sites cannot be compared."
+                "Each site has its own key. Until all sites are unblinded, codes begin with the site, and conditions "
+                "cannot be compared across sites."
             )
     if study.simulated:
-        yield "The participants were SIMULATED: this report is not evidence about people."
+        yield "The participants were SIMULATED, so this report is not evidence about people."
     if study.pilot:
-        yield "These are pilot sessions: do not report them as results of the study."
+        yield "These are pilot sessions, so do not report them as results of the study."
     if not decided.made:
         yield (
-            "The protocol does not state decisions about the analysis (the table [analysis] is missing), so "
+            "The protocol does not state decisions about the analysis (the [analysis] table is missing), so "
             "all results are exploratory."
         )
     elif decided.changed:
         yield (
-            "The decisions about the analysis changed between sessions, so all results are exploratory; those of the "
-            "first session are used."
+            "The decisions about the analysis changed between sessions, so all results are exploratory; the decisions "
+            "from the first session are used."
         )
     hypotheses = [contrast.contrast for contrast in results.contrasts]
     if len({one.groups is None for one in hypotheses}) == 2 and not any(one.is_interaction for one in hypotheses):
         yield "No hypothesis tests an interaction between groups and blocks or conditions."
     if results.questions and not (results.blocks or results.levels):
         yield (
-            "The answers to these questions are described, not tested: intervals are not corrected for the number of "
-            "questions, so that chance differences are to be expected among many."
+            "The answers to these questions are described but not tested. Intervals are not corrected for the number "
+            "of questions, so with many questions some differences are to be expected by chance."
         )
     if study.contents > len(study.versions):
         yield (
-            f"The study file was changed between sessions without a new version: {study.contents} different files were "
-            "run. Compare the protocols in the receipts; report.json lists each session's protocol_hash."
+            "The study file was changed between sessions without a new version number, so "
+            f"{study.contents} different files were used. Compare the protocols in the receipts; report.json lists "
+            "each session's protocol_hash."
         )
     yield from changed_questions(recorded_contents(study.folder))
     if study.late:
         yield (
-            "Decisions after the key was opened, when their effect on the results was visible: "
-            f"{late_exclusions(study)}. Compare this report with the report of a copy in which `include` or "
-            "`exclude` reverses these decisions."
+            "Some decisions were made after the key was opened, when their effect on the results was visible: "
+            f"{late_exclusions(study)}. Compare this report with the report for a copy of the study in which `include` "
+            "or `exclude` reverses these decisions."
         )
     if study.n == 1:
-        yield "There is only one participant: the results do not generalise to other people."
+        yield "There is only one participant, so the results do not generalise to other people."
     if study.n < FEW and results.blocks:
-        people = counted(study.n, "participant")
         yield (
-            f"{people[:1].upper()}{people[1:]}: intervals of mean rank correlations and exploratory tests of "
-            f"means need at least {FEW}. Effects that are not shown here may still exist."
+            "Intervals for mean rank correlations and exploratory tests of means need at least "
+            f"{FEW} participants; this study has {study.n}. Effects that are not shown here may still exist."
         )
 
 
@@ -198,7 +198,7 @@ def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
         planned.proposals,
         ("Session", lambda proposal: f"{proposal.participant}, session {proposal.session}"),
         ("rule", lambda proposal: proposal.rule.replace("_", " ")),
-        ("because", lambda proposal: proposal.why),
+        ("reason", lambda proposal: proposal.why),
         ("decision", lambda proposal: ", ".join(filter(None, [proposal.decision, proposal.by]))),
         words=4,
     )
@@ -210,8 +210,8 @@ def planned_section(planned: PlannedExclusions | None) -> Iterator[str]:
     yield table_of(
         differing,
         ("Conclusion", lambda name: name),
-        ("with all of them", lambda name: included.get(name, "–")),
-        ("without them", lambda name: left_out.get(name, "–")),
+        ("with these sessions", lambda name: included.get(name, "–")),
+        ("without these sessions", lambda name: left_out.get(name, "–")),
         words=3,
     )
 
@@ -250,8 +250,8 @@ def empty_studies(participants: int) -> str:
     share, low, high = (number(100 * one, 1) for one in (claims / studies, *share_interval(claims / studies, studies)))
     return (
         f"In {studies} simulated studies with {n} participants, three liquids, seven delays and no true effect, "
-        f"{share} % of the reports claimed a difference or a noticed delay ({claims} reports, 95 % interval {low} to "
-        f"{high} %; liquid-study validate-report)."
+        f"{share} % of the reports claimed a difference or a noticed delay ({claims} reports, 95 % confidence "
+        f"interval {low} to {high} %; liquid-study validate-report)."
     )
 
 
@@ -350,7 +350,7 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
         if any(level.summary == "settings" for level in levels):
             continue  # each from another start
         if not result.n:
-            yield paragraph("No answers count yet.")
+            yield paragraph("No answers are included yet.")
             continue
         measure = by_name(MEASURES, result.measure)
         if measure.cells is None:
@@ -395,7 +395,7 @@ _SHOWN: Final = 20
 
 def conduct(study: Study, results: Results) -> Iterator[str]:
     """Yield the section on sessions and on the conduct of the study."""
-    yield heading(2, "How it was run")
+    yield heading(2, "How the study was run")
     states = Counter(map(str, study.participants["status"]))
     yield paragraph(
         f"{counted(len(study.participants), 'session').capitalize()}: "
@@ -405,7 +405,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
     if study.sites:
         here = Counter(map(study.site_of, study.people))
         people = listed([f"{site} ({counted(here[site], 'participant')})" for site in study.sites])
-        yield paragraph(f"The results of these sites are merged: {people}.")
+        yield paragraph(f"The results from these sites are merged: {people}.")
     if study.withdrawn:
         people = counted(len(study.withdrawn), "participant").capitalize()
         yield paragraph(f"{people} withdrew; their data were erased.")
@@ -421,7 +421,8 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         for exclusion in study.exclusions
     ]
     if study.left_out:
-        gone.append(f"{counted(study.left_out, 'session')} not completed and not analysed")
+        were = "was" if study.left_out == 1 else "were"
+        gone.append(f"{counted(study.left_out, 'session')} {were} not completed and therefore not analysed")
     yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded.")
     yield from _missing(study)
     if study.doubts:
@@ -455,8 +456,8 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
     )
     preexisting = by == "group" and group_assignment(study) == "pre-existing"
     yield paragraph(
-        f"Mean and standard deviation over participants of each participant's mean answer. {tested}"
-        f"{' Groups were not randomised, so a difference may have other causes.' * preexisting}",
+        "The table shows the mean and standard deviation, across participants, of each participant's mean answer. "
+        f"{tested}{' The groups were not randomised, so a difference may have other causes.' * preexisting}",
         "soft",
     )
 
@@ -505,12 +506,12 @@ def _missing(study: Study) -> Iterator[str]:
                 ),
             ),
             (
-                "because",
+                "reason",
                 lambda lost_trials: listed(
                     [limit_reason(limit, lost_trials.missing.limits) for limit in lost_trials.missing.reasons]
                 ),
             ),
-            ("session", lambda lost_trials: "counted" if lost_trials.counted else "not counted"),
+            ("session", lambda lost_trials: "included" if lost_trials.counted else "not included"),
             words=5,
         )
     else:
@@ -520,8 +521,8 @@ def _missing(study: Study) -> Iterator[str]:
     permitted = study.protocol.get("limits", {}).get(MISSING_PERCENT)
     if permitted is not None:
         yield paragraph(
-            f"The study states that {permitted:g} % of a session's trials may be missing. A session with more "
-            "is incomplete, and excluded unless a person included it again.",
+            f"The study permits up to {permitted:g} % of a session's trials to be missing. A session with more missing "
+            "trials is incomplete and is excluded, unless somebody has included it again.",
             "soft",
         )
 
@@ -535,7 +536,7 @@ def _track(study: Study, block: str, code: str) -> str:
 
 def _first(lines: list[str]) -> list[str]:
     more = len(lines) - _SHOWN
-    return [*lines[:_SHOWN], *([f"and {more} more, in report.json"] if more > 0 else [])]
+    return [*lines[:_SHOWN], *([f"and {more} more, listed in report.json"] if more > 0 else [])]
 
 
 def _delivered(study: Study, results: Results) -> Iterator[str]:
@@ -568,12 +569,16 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
     )
     limits = study.protocol.get("limits", {})
     yield paragraph(
-        "Delay error is the age of the drawn position minus the requested delay. The table shows the mean over trials "
-        "and the trial with the largest mean error. Times are from the program's clock and do not include display "
-        "latency. "
+        "Delay error is the age of the drawn position minus the requested delay. The table shows the mean across "
+        "trials and the trial with the largest mean error. Times are from the program's clock and do not include "
+        "display latency. "
         + (f"Timing limits: {'; '.join(_limit(what, limit) for what, limit in limits.items())}. " if limits else "")
-        + f"{_violated_limits(study, limits)}Trials beyond a limit are included, unless they are excluded above."
-        + ("" if study.revealed else " Delay error and force held back are sealed, and not checked, until unblinding."),
+        + f"{_violated_limits(study, limits)}Trials that exceed a limit are included, unless they are excluded above."
+        + (
+            ""
+            if study.revealed
+            else " Until unblinding, the delay error and the force held back are sealed and not checked."
+        ),
         "soft",
     )
 
@@ -612,22 +617,22 @@ def _orders(results: Results) -> Iterator[str]:
     several = [(result, counts) for result, counts in several if counts.orders and len(counts.codes) >= 2]
     if not several:
         return
-    yield heading(3, "Orders that were run")
+    yield heading(3, "Trial orders")
     for result, counts in several:
         names = [name(result, code) if result.revealed else code for code in counts.codes]
-        yield paragraph(f"{result.title}, {counted(counts.orders, 'order')}: {_evenness(counts)}")
+        yield paragraph(f"{result.title} ({counted(counts.orders, 'order')}): {_evenness(counts)}")
         lines = enumerate(counts.positions, start=1)
         yield table(("Position", *names), [[str(place), *map(str, line)] for place, line in lines])
-    yield paragraph("Number of times that each condition was in each position of its block.", "soft")
+    yield paragraph("The tables show how often each condition occurred in each position of its block.", "soft")
 
 
 def _evenness(counts: Evenness) -> str:
     cells, after = [count for line in counts.positions for count in line], counts.after_another
-    places = f"positions were not balanced: each setting was {min(cells)} to {max(cells)} times in each position"
+    places = f"positions were not balanced; each setting occurred {min(cells)} to {max(cells)} times in each position"
     if counts.positions_even:
-        places = f"each setting was in each position {counted(cells[0], 'time')}"
+        places = f"each setting occurred {counted(cells[0], 'time')} in each position"
     times = "equally often" if counts.follows_even else f"{min(after)} to {max(after)} times"
-    return f"{places}, and followed each other setting {times}."
+    return f"{places} and followed each other setting {times}."
 
 
 def motion(results: Results) -> Iterator[str]:
@@ -637,7 +642,7 @@ def motion(results: Results) -> Iterator[str]:
     yield heading(2, "Motion and force")
     measured = results.performance
     if measured is None:
-        yield paragraph("Shown after unblinding, because force and motion reveal liquids and delays.")
+        yield paragraph("Motion and force are shown after unblinding, because they reveal liquids and delays.")
         return
     for result in results.blocks:
         measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_movement_measures(measured, result, measure=one))]
@@ -654,16 +659,16 @@ def motion(results: Results) -> Iterator[str]:
                 )
             elif not measured.recorded_in(result.id):
                 yield paragraph(
-                    "The recordings of this block could not be read, so there are no measures of reaches.", "soft"
+                    "The recordings of this block could not be read, so there are no reaching measures.", "soft"
                 )
     yield paragraph(_recordings(measured))
     yield bullets(
         f"{_label(measure)}: {words}." for measure, words in {**TRIAL_DEFINITIONS, **REACH_DEFINITIONS}.items()
     )
     yield paragraph(
-        "Median over participants (quartiles) of each participant's own median. Within limits: how many of the "
-        "measured trials met the protocol's timing limits. All trials are included in the other columns. These "
-        "measures are not tested.",
+        "The tables show the median across participants (with quartiles) of each participant's own median. “Trials "
+        "within limits” shows how many of the measured trials met the protocol's timing limits; the other columns "
+        "include all trials. These measures are not tested.",
         "soft",
     )
 
@@ -703,12 +708,12 @@ def _label(measure: str) -> str:
 
 def _recordings(measured: Performance) -> str:
     if not measured.trials:
-        return "The study does not contain reaching trials, so there are no measures of reaches."
-    text = f"Measures of reaches come from the recordings of {measured.recorded} of {measured.trials} reaching trials"
+        return "The study does not contain reaching trials, so there are no reaching measures."
+    text = f"Reaching measures come from the recordings of {measured.recorded} of {measured.trials} reaching trials"
     if measured.unread:
-        text += f" (others: {'; '.join(measured.unread)})"
+        text += f" (reasons for the others: {'; '.join(measured.unread)})"
     if not measured.judged:
-        return f"{text}. Whether trials met the protocol's timing limits was not measured."
+        return f"{text}. It was not measured whether trials met the protocol's timing limits."
     if not measured.invalid:
         return f"{text}. All measured trials met the protocol's timing limits."
     verb = "is" if measured.invalid == 1 else "are"

@@ -70,7 +70,9 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
     """
     study = load_study(folder)
     if not study.blocks and not study.others.questions:
-        raise AnalysisError(f"{folder}: the study {study.name!r} does not ask questions, so there is nothing to draw")
+        raise AnalysisError(
+            f"{folder}: the study {study.name!r} does not ask any questions, so there is nothing to draw"
+        )
     files: dict[str, bytes] = {}
     failures = Failures()
     questions = question_pictures(study, question_results(study), failures=failures)
@@ -83,9 +85,9 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
         files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
         files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
     if failures.found:
-        raise AnalysisError(f"a figure cannot be drawn: {failures.found[0]}")
+        raise AnalysisError(f"one of the figures cannot be drawn: {failures.found[0]}")
     if not files:
-        raise AnalysisError(f"{folder}: no completed session with answers yet: there is nothing to draw")
+        raise AnalysisError(f"{folder}: there is nothing to draw, because no completed session has answers yet")
     written = write_output(study.folder, Path(to), files, warn)
     study.tell_doubts(warn)
     return written

@@ -90,7 +90,7 @@ def as_json_types(value: Any) -> Any:
     if hasattr(value, "item"):
         return as_json_types(value.item())
     if isinstance(value, float) and not math.isfinite(value):
-        raise AnalysisError(f"a result is {value}: this is a fault of the program, please report it")
+        raise AnalysisError(f"a result is {value}; this is a fault in the program: please report it")
     return value
 
 
@@ -110,14 +110,14 @@ _FORMAT: Final = 1
 LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")
 
 _MOTION: Final = (
-    Column("block", "text", "Id of the block."),
+    Column("block", "text", "ID of the block."),
     Column("code", "text", "Code of the setting."),
-    Column("setting", "text", "What the setting is."),
-    Column("measure", "text", "The measure, ending with its unit."),
-    Column("n", "integer", "Participants with the measure.", minimum=0),
-    optional("median", "number", "Median over participants."),
-    optional("q1", "number", "Lower quartile over participants."),
-    optional("q3", "number", "Upper quartile over participants."),
+    Column("setting", "text", "Name of the setting."),
+    Column("measure", "text", "Name of the measure, ending with its unit."),
+    Column("n", "integer", "Number of participants with a value for the measure.", minimum=0),
+    optional("median", "number", "Median across participants."),
+    optional("q1", "number", "Lower quartile across participants."),
+    optional("q3", "number", "Upper quartile across participants."),
     Column("trials", "integer", "Number of analysed trials in the condition.", minimum=0),
     Column("judged", "integer", "Number of these trials whose limits were checked.", minimum=0),
     Column("valid", "integer", "Number of these trials that met the protocol's timing limits.", minimum=0),
@@ -274,7 +274,7 @@ def report(
     study = load_study(folder)
     if not has_questions(study):
         raise AnalysisError(
-            f"{folder}: the study {study.name!r} does not ask for statements, so there is nothing to report"
+            f"{folder}: the study {study.name!r} does not ask any questions, so there is nothing to report"
         )
     files, found = report_files(study, progress)
     progress("writing", 0.95)
@@ -299,7 +299,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
     drawn = []
-    numbers = failures.value("numbers of participants", lambda: numbers_of(study), {})
+    numbers = failures.value("the participants' values", lambda: numbers_of(study), {})
     for picture in _drawn(study, results, numbers, failures):
         drawn.append(picture)
         progress(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
@@ -353,7 +353,7 @@ def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
                 for proposal in proposals
             ]
         )
-        yield f"Proposed for exclusion but not yet decided: {who}. See “Planned exclusions”."
+        yield f"A rule proposes the exclusion of {who}; nobody has decided yet (see “Planned exclusions”)."
 
 
 def _page(
@@ -365,7 +365,7 @@ def _page(
     planned: PlannedExclusions | None,
     failures: Failures,
 ) -> str:
-    on_first = failures.value("first page, figures", lambda: figures_shown(cards(results, numbers), drawn), set())
+    on_first = failures.value("figures on the first page", lambda: figures_shown(cards(results, numbers), drawn), set())
     others = [picture for picture in drawn if picture.name not in on_first]
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("Hypotheses", lambda: contrast_section(results)),
@@ -382,7 +382,7 @@ def _page(
         ("Sites", lambda: sections.groups(study, results, "site")),
         ("Motion and force", lambda: sections.motion(results)),
         ("Planned exclusions", lambda: sections.planned_section(planned)),
-        ("How it was run", lambda: sections.conduct(study, results)),
+        ("How the study was run", lambda: sections.conduct(study, results)),
         ("Preregistration", lambda: preregistration_section(study)),
         (
             "Methods (text to paste)",
@@ -434,7 +434,7 @@ def _marks(study: Study) -> list[tuple[str, str]]:
     """Return the marks at the top of the page: CSS class and text."""
     marks = [("mark", "SIMULATED participants, not people")] if study.simulated else []
     marks += [("mark", "PILOT")] if study.pilot else []
-    return marks if study.revealed else [*marks, ("sealed", "Blinded: conditions as codes")]
+    return marks if study.revealed else [*marks, ("sealed", "Blinded: conditions appear as codes")]
 
 
 def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
@@ -443,7 +443,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     decided = results.decided
     bound = decided.equivalence_bound
     rows = [
-        ("Decided before the first session", "yes" if decided.binding else "no, all results are exploratory"),
+        ("Decided before the first session", "yes" if decided.binding else "no; all results are exploratory"),
         ("Alpha", decided.alpha_words()),
         ("Equivalence bound", "none" if bound is None else f"±{bound:g}"),
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
@@ -458,14 +458,14 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     if len(hashes) <= _HASHES_SHOWN:
         yield table(("File", "SHA-256"), list(hashes.items()), words=2)
     yield paragraph(
-        f"The numbers come from {counted(len(hashes), 'file')}; SHA-256 over their hashes and names: "
+        f"The numbers come from {counted(len(hashes), 'file')}. The SHA-256 of their hashes and names is "
         f"{together.hexdigest()}. report.json contains the hash of each file and the seed of each session."
     )
     yield paragraph(
-        "Files next to this page: report.json (every number), tests.csv (one row per test), motion.csv, the "
+        "The files next to this page are report.json (all numbers), tests.csv (one row per test), motion.csv, the "
         "tables of responses, trials and aggregates with their codebook, every figure as PNG, SVG and PDF with "
-        "its caption, methods.txt, and report.R, which recomputes the main numbers in base R. Made by "
-        f"liquid-study {__version__}.",
+        "its caption, methods.txt, and report.R, which recomputes the main numbers in base R. This report was made "
+        f"with liquid-study {__version__}.",
         "soft",
     )
 

@@ -93,7 +93,7 @@ def tost(
     """
     if not (bound > 0.0 and math.isfinite(bound)):
         raise AnalysisError(
-            f"an equivalence bound of {bound} is not meaningful; specify a bound above 0 in points of the scale"
+            f"an equivalence bound of {bound} is not meaningful; specify a bound above 0, in points on the scale"
         )
     array = checked_values(differences, "participants")
     kept = np.sort(array[~np.isnan(array)])
@@ -150,7 +150,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             equivalence,
             statistic=min(t_lower, -t_upper),
             p=max(p_lower, p_upper),
-            method=f"t({equivalence.n - 1}), bound ±{bound:g} points",
+            method=f"t({equivalence.n - 1}), bounds ±{bound:g} points",
             interval=Interval(low=float(low[0]), high=float(high[0]), level=level, method="t"),
             no_interval="",
             t_lower=t_lower,
@@ -159,7 +159,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             p_upper=p_upper,
         )
     else:
-        equivalence = replace(equivalence, method=f"bootstrap, bound ±{bound:g} points: all differences are equal")
+        equivalence = replace(equivalence, method=f"bootstrap, bounds ±{bound:g} points; all differences are equal")
     by_tests = max(p_lower, p_upper, by_bootstrap) <= alpha
     beyond = is_beyond(equivalence, bound, alpha)
     if equivalence.interval is not None:
@@ -167,8 +167,8 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
         agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
         equivalence = replace(equivalence, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
     verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
-    few = f"too few participants to call it equivalent: {fewest_participants(alpha, bound, largest)} are needed"
-    note = "" if verdict == "equivalent" else few if by_tests else "equivalence is not shown"
+    few = f"too few participants to show equivalence: {fewest_participants(alpha, bound, largest)} are needed"
+    note = "" if verdict == "equivalent" else few if by_tests else "equivalence was not shown"
     return replace(
         equivalence,
         verdict="not equivalent" if beyond else verdict,

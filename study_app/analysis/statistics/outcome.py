@@ -35,7 +35,7 @@ SAMPLES: Final = 1999
 FEW: Final = 10
 """Below so many participants there is no percentile bootstrap interval and no test of slopes."""
 
-_TOO_FEW: Final = f"no interval below {FEW} participants: the coverage of an interval from so few people is far too low"
+_TOO_FEW: Final = f"no interval below {FEW} participants, because its coverage would be far too low"
 NO_VARIATION: Final = "no variation: every participant gave the same answer in all conditions"
 
 
@@ -81,7 +81,7 @@ def checked_values(values: ArrayLike, axes: str) -> Array:
     if array.ndim != wanted:
         raise AnalysisError(f"answers of shape {array.shape} cannot be tested; specify {wanted} axes: {axes}")
     if np.isinf(array).any():
-        raise AnalysisError("an answer is infinite; specify numbers, and NaN for missing answers")
+        raise AnalysisError("an answer is infinite; specify finite numbers, with NaN for missing answers")
     return array
 
 
@@ -89,7 +89,7 @@ def complete_rows(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array,
     """Return the participants (rows) with answers in all settings (columns), and the number of others."""
     array = checked_values(values, "participants, settings")
     if array.shape[1] < at_least:
-        raise AnalysisError(f"{array.shape[1]} settings: at least {at_least} are needed{why}")
+        raise AnalysisError(f"at least {at_least} settings are needed{why}, not {array.shape[1]}")
     whole = ~np.isnan(array).any(axis=1)
     return array[whole], int((~whole).sum())
 
@@ -182,7 +182,7 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
     (draws, n), NaN where it is undefined; ``alike`` is the reason if all draws give the same value.
     """
     if seed is None:
-        return None, "an interval was not requested"
+        return None, "no interval was requested"
     if n < FEW:
         return None, _TOO_FEW
     rng = np.random.default_rng(seed)

@@ -66,7 +66,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
     first, second = checked_values(x, "participants"), checked_values(y, "participants")
     if len(first) != len(second):
         raise AnalysisError(
-            f"{len(first)} and {len(second)} answers are not pairs; specify one of each per participant"
+            f"{len(first)} and {len(second)} answers are not pairs; specify two answers per participant"
         )
     both = first - second
     differences = both[~np.isnan(both)]
@@ -85,8 +85,8 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
         statistic=v / 2 if len(ranks) else None,
         p=p,
         smallest_p=smallest,
-        method=f"{method}, two-sided; equal pairs left out (Wilcoxon)",
-        effect_name="matched rank-biserial correlation",
+        method=f"{method}, two-sided; equal pairs dropped",
+        effect_name="matched-pairs rank-biserial correlation",
         effect=effect,
         interval=interval,
         no_interval=reason,
@@ -137,7 +137,7 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     if effect is None:
         return None, "no interval: no pair differs"
     if n < _INTERVAL_FROM:
-        return None, f"no interval below {_INTERVAL_FROM} pairs that differ: it would cover far less than it claims"
+        return None, f"no interval below {_INTERVAL_FROM} differing pairs, because its coverage would be far too low"
     if abs(effect) == 1.0:
         return None, f"no interval: all {n} pairs that differ went one way"
     deviation = math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
@@ -150,12 +150,12 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
 
 def _note(n: int, different: int, smallest: float | None, effect: float | None, alpha: float) -> str:
     if n == 0:
-        return "no participant answered under both settings"
+        return "no participant answered in both settings"
     if smallest is None:
         return f"all {n} pairs are equal"
     if smallest > alpha:
         return (
-            f"cannot reach p ≤ {significant(alpha)}: the smallest p of {different} pairs that differ is "
+            f"cannot reach p ≤ {significant(alpha)}: the smallest possible p with {different} differing pairs is "
             f"{p_value(smallest)}"
         )
     return f"all {different} pairs that differ went one way" if effect is not None and abs(effect) == 1.0 else ""

@@ -126,7 +126,7 @@ def recognition(names: ArrayLike, truth: Sequence[int | None], labels: int, *, s
         p=chance.at_least(hits) if n else None,
         smallest_p=chance.highest if n else None,
         method="exact permutation of the conditions within participants, one-sided",
-        effect_name="Cohen's kappa of decided answers",
+        effect_name="Cohen's kappa for decided answers",
         effect=effect,
         interval=interval,
         no_interval=reason,
@@ -144,12 +144,13 @@ def _names(names: ArrayLike, truth: Sequence[int | None], labels: int) -> Whole:
     given = checked_values(names, "participants, settings")
     if given.shape[1] != len(truth) or not 2 <= len(truth) <= MOST:
         raise AnalysisError(
-            f"{given.shape[1]} settings with names, {len(truth)} true names; specify the same number of each, 2 to "
-            f"{MOST}"
+            f"there are {given.shape[1]} settings with names but {len(truth)} true names; specify the same number of "
+            f"each, from 2 to {MOST}"
         )
     if not np.isin(given, _columns(labels)).all() or not {*truth} <= {None, *range(labels)}:
         raise AnalysisError(
-            f"a name is not among the {labels} labels; specify positions 0 to {labels - 1}, -1 undecided, -2 missing"
+            f"a name is not one of the {labels} labels; specify positions from 0 to {labels - 1}, -1 for undecided and "
+            "-2 for missing"
         )
     return given.astype(np.int64)
 
@@ -183,11 +184,11 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
     tables = tables[used.any(axis=1)]
     whole = float(kappa(tables.sum(axis=0)))
     if math.isnan(whole):
-        why = "no variation: always the same name for the same liquid" if used.any() else "nothing was named"
+        why = "only one name was used, and for only one liquid" if used.any() else "no liquid was named"
         return None, None, f"no interval: {why}"
 
     if seed is None:
-        return whole, None, "an interval was not requested"
+        return whole, None, "no interval was requested"
     if (n := len(tables)) < 2:
         return whole, None, "no interval: there is only one participant"
     correct, decided = np.trace(tables, axis1=1, axis2=2), tables.sum(axis=(1, 2))
@@ -201,8 +202,8 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
         for shares, end in ((lowest, 0.025), (highest, 0.975))
     )
     method = (
-        "bootstrap over participants with one additional participant who is always incorrect, or always "
-        "correct (Gaffke 2005)"
+        "bootstrap over participants with one additional participant who is always incorrect (lower end) or always "
+        "correct (upper end) (Gaffke 2005)"
     )
     return whole, Interval(low=low, high=high, level=0.95, method=method), ""
 

@@ -67,7 +67,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     covariance = np.atleast_2d(np.cov(own, rowvar=False)) if n > 1 else np.zeros((several, several))
     fewest = max(FEW, several + 1)
     if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
-        few = f"no test of means below {fewest} participants: slopes of so few would have to be normal"
+        few = f"no test of means below {fewest} participants, because it would rely on normally distributed slopes"
         note = few if n < fewest else _NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
         return replace(test, no_interval=note, note=note)
@@ -91,7 +91,9 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         method=freedom,
         effect=float(means[0]) if several == 1 else None,
         interval=intervals[0] if several == 1 else None,
-        no_interval="" if several == 1 else "no single effect: one difference for each setting",
+        no_interval=""
+        if several == 1
+        else "there is no single effect size, because there is one difference per setting",
         slopes=tuple(means.tolist()),
         intervals=intervals,
         sds=tuple(np.sqrt(np.diag(covariance)).tolist()),

@@ -105,7 +105,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
                 low=lower,
                 high=upper,
                 level=_SURE,
-                method="posterior density, scaled for differences between participants",
+                method="posterior density, widened for differences between participants",
             )
         note = "; ".join(_remarks(order, lower, upper, len(yes), dispersion))
         found = {
@@ -126,7 +126,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
         n=int(used.sum()),
         dropped=int((~used).sum()),
         statistic_name="deviance",
-        method="posterior median, logistic function of level",
+        method="posterior median of a logistic function of level",
         effect_name="detection threshold",
         note=note,
         levels=tuple(order.tolist()),
@@ -139,9 +139,9 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
 def _impossible(levels: Array, yes: Array, asked: Array) -> str:
     """Return the reason why no curve can give a threshold, or ""."""
     if len(levels) < 3:
-        return "fewer than three levels were answered"
+        return "there were answers at fewer than three levels"
     if not yes.any():
-        return f"no participant noticed anything up to {levels.max():g}: the threshold lies above it, or does not exist"
+        return f"no participant noticed anything up to {levels.max():g}, so the threshold is higher or does not exist"
     return "all participants noticed something at every level" if (yes == asked).all() else ""
 
 
@@ -220,31 +220,28 @@ def _outside(levels: Array, threshold: float, lower: float | None, upper: float 
     """Return the reason if the threshold is outside the presented levels, or ""."""
     low, high = float(levels[0]), float(levels[-1])
     if not low <= threshold <= high:
-        return f"the fitted threshold lies outside the levels that were presented ({low:g} to {high:g})"
+        return f"the fitted threshold lies outside the presented levels ({low:g} to {high:g})"
     if not any(end is not None and low <= end <= high for end in (lower, upper)):
-        return f"both ends of the threshold's interval lie outside the levels presented ({low:g} to {high:g})"
+        return f"both ends of the threshold's interval lie outside the presented levels ({low:g} to {high:g})"
     return ""
 
 
 def _remarks(levels: Array, lower: float | None, upper: float | None, people: int, dispersion: float) -> Iterator[str]:
     """Yield remarks that must accompany a threshold."""
     if any(end is not None and not levels[0] <= end <= levels[-1] for end in (lower, upper)):
-        yield (
-            "the interval reaches beyond the levels that were presented, where it depends only on the shape "
-            "of the function"
-        )
+        yield ("the interval extends beyond the presented levels, where it depends only on the shape of the function")
     if people == 1:
         yield "the answers come from one participant, so the interval applies only to this person"
     else:
         yield (
-            "answers of all participants are pooled, and the interval includes differences between "
-            f"participants (they vary {dispersion:.1f} times as much as independent answers)"
+            "the answers from all participants are pooled, and the interval allows for differences between "
+            f"participants (the answers vary {dispersion:.1f} times as much as independent answers would)"
         )
 
 
 def _open(lower: float | None, upper: float | None) -> str:
-    side = "on both sides" if lower is None and upper is None else "below" if lower is None else "above"
-    return f"no interval: the answers leave it open {side}"
+    end = "either end" if lower is None and upper is None else "its lower end" if lower is None else "its upper end"
+    return f"no interval: the answers do not determine {end}"
 
 
 SETS: Final = 999
@@ -325,7 +322,7 @@ def group_mean(
     """
     y, n = np.asarray(estimates, float), len(estimates)
     if n == 0:
-        raise ValueError("a mean needs an estimate")
+        raise ValueError("a mean requires at least one estimate")
     weights, between = random_effects_weights(y, np.asarray(variances, float))
     mean = float((weights * y).sum() / weights.sum())
     if n < FEWEST:

@@ -136,7 +136,8 @@ def step_down(
     array = checked_values(values, "participants, delays")
     if len(delays_ms) != array.shape[1] or any(a >= b for a, b in pairwise(delays_ms)):
         raise AnalysisError(
-            f"delays {list(delays_ms)} ms must be {array.shape[1]} increasing values, one for each column of answers"
+            f"the delays {list(delays_ms)} ms must be {array.shape[1]} increasing values, one for each column of "
+            "answers"
         )
     rows, dropped = complete_rows(array, at_least=2, why=" for a trend")
     steps: list[Step] = []
@@ -154,11 +155,11 @@ def _note(first: Step, lowest: float | None) -> str:
     if lowest is None:
         return (
             f"no trend was shown up to {first.longest_ms:g} ms with {counted(first.trend.n, 'participant')}; "
-            "this does not show that there is none"
+            "this is not evidence that there is none"
         )
     return (
-        f"{lowest:g} ms is an upper bound: the lowest delay at which the answers of "
-        f"{counted(first.trend.n, 'participant')} show a trend; participants may also notice shorter delays"
+        f"{lowest:g} ms is the lowest delay at which the answers from {counted(first.trend.n, 'participant')} show a "
+        "trend; it is an upper bound, because participants may also notice shorter delays"
     )
 
 

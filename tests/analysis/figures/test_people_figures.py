@@ -47,7 +47,7 @@ def test_numbers_can_be_pasted_into_a_table() -> None:
     assert rows[0] == ["participant", "Heavy Light oil 0"]
     assert rows[1:5] == [[person, str(value)] for person, value in PEOPLE.items()]
     assert rows[5] == ["mean", "3.0"]
-    assert [row[0] for row in rows[6:]] == ["95 % interval, lower end", "95 % interval, upper end"]
+    assert [row[0] for row in rows[6:]] == ["lower end of the 95 % interval", "upper end of the 95 % interval"]
 
 
 @pytest.mark.parametrize("panels", [1, 2, 5, 9])

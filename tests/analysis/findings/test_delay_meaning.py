@@ -53,7 +53,7 @@ def found(block: BlockResult) -> Found:
 
 UNCLEAR = "neither support nor refute “delays up to 50 ms do not matter”"
 BEYOND = "speak against “delays up to 50 ms do not matter”: at 50 ms “Different” differs by more than the bound."
-WITHIN = "Mean answers to these statements stay within the bound"
+WITHIN = "Mean answers to these statements stay within the bounds"
 
 
 @pytest.mark.parametrize(

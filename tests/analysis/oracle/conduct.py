@@ -78,7 +78,10 @@ def compare_captions(compared: Compared, trials: pd.DataFrame) -> None:
         for pattern, *own in (
             (rf"(?:n = |people; |of )(\d+|{'|'.join(SMALL)}) participants", [people], *compared_people),
             (r"Cannot judge: (\d+); not answered: (\d+)\.", [sums.get("cannot_judge"), sums.get("missing")]),
-            (r"by (\S+) ms on average \(trials: (\S+) to (\S+) ms", [errors.mean(), errors.min(), errors.max()]),
+            (
+                r"by (\S+) ms on average \(range across trials: (\S+) to (\S+) ms",
+                [errors.mean(), errors.min(), errors.max()],
+            ),
             (r"Correct: (\d+); (\S+) expected .* p = (\S+)\)", *hits),
         ):
             for reported in (found.groups() for found in re.finditer(pattern, path.read_text("utf-8"))):

@@ -58,7 +58,7 @@ def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
     committed(answered)
     assert evaluate_block(answered) == ()
     text = " ".join(map(str, deviations_section(load_study(answered.folder))))
-    assert "There was no difference" in text
+    assert "do not differ from the preregistration" in text
     assert HASH in text
 
 
@@ -78,7 +78,7 @@ def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
     content = json.loads(first.receipt.read_text(encoding="utf-8"))
     first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8", newline="\n")
     (line,) = evaluate_block(answered)
-    assert line.startswith("1 session ran under a protocol (version 2) that differs from the preregistered one")
+    assert line.startswith("1 session used a protocol (version 2) that differs from the preregistered one")
     assert line.endswith("P001/1")
 
 
@@ -87,7 +87,7 @@ def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answe
     committed(answered)
     answered.exclude("P001", trial=2, reason="sneezed")
     (line,) = evaluate_block(answered)
-    assert line.startswith("an exclusion without a preregistered rule (")
+    assert line.startswith("there is an exclusion without a preregistered rule (")
     assert line.endswith("; sneezed; AB)")
     by_rule = Exclusion(
         participant="P002",
@@ -121,7 +121,7 @@ def test_where_only_the_protocol_plans_participants_they_are_compared(answered: 
 @pytest.mark.parametrize("content", ["# nothing\n", "```json\n{}\n```\n", "```json\n{broken}\n```\n"])
 def test_a_damaged_preregistration_is_one_line(answered: Results, content: str) -> None:
     (answered.folder / FILE).write_text(content, encoding="utf-8", newline="\n")
-    with pytest.raises(AnalysisError, match="does not end with what `liquid-study preregister` writes"):
+    with pytest.raises(AnalysisError, match="does not end with the block that `liquid-study preregister` writes"):
         deviations(load_study(answered.folder))
 
 

@@ -50,15 +50,15 @@ def test_every_shipped_study_has_all_sections_and_its_hash(name: str, tmp_path: 
 @pytest.mark.slow
 def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> None:
     text = preregistration(load("viscosityjnd"), "0" * 64)
-    assert "Weber fraction of damping at the hand at 4, 8, 16 and 32 N·s/m?" in text
+    assert "Weber fraction for damping at the hand at 4, 8, 16 and 32 N·s/m?" in text
     assert "exponent 1, Weber's law" in text
     assert "weber 0.19, at 71 % correct, n = 10" in text
-    assert "We plan 20 participants. The study ends when this number of valid sessions is complete" in text
-    assert "the data tested. The goal is a 95 % interval of the group mean within ±15 %." in text
+    assert "We plan to include 20 participants. The study ends when this number of valid sessions is complete" in text
+    assert "the data tested. The goal is a 95 % interval for the group mean no wider than ±15 %." in text
     assert "we simulated 50 trials per standard" in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "presented again, up to 3 times" in text
-    assert "Hartung–Knapp 95 % interval, if there are at least 3 participants" in text
+    assert "Hartung–Knapp 95 % interval if there are at least 3 participants" in text
     assert "Power was not computed" not in preregistration(load("thickness"), "0" * 64)
 
 
@@ -66,7 +66,7 @@ def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() ->
     more = FIVE_POINTS + '\n[blocks.rate]\ntask = "stir"\nstimulus = "value"\ndesign = "rated"\nmethod = "few"\n'
     edits = [('sequence = ["viscosity"]', 'sequence = ["viscosity", "rate"]'), ("[0.2, 0.4, 0.8]", "[0.5, 0.6, 0.8]")]
     text = preregistration(study(*edits, ("part = 1\n", ""), ('code_prefix = "V"\n', ""), more=more), "0" * 64)
-    assert "- Block rate: d_a of each level relative to the lowest, from the area under the ROC curve." in text
+    assert "- Block rate: we report d_a for each level relative to the lowest, calculated from the area" in text
     assert "Block viscosity: d_a" not in text
     assert "at d_a = 1: ±" in text
 
@@ -77,7 +77,7 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     assert "(comfortable) falls with the delay." in text
     assert "within ±1 point?" in text
     assert "above chance (water by like_water, honey by like_honey and light_oil by like_oil)?" in text
-    assert "α = 0.05. p values of primary statements (all) are Holm-adjusted" in text
+    assert "Alpha is 0.05. The p values of primary statements (all) are Holm-adjusted" in text
     assert "exploratory tests of means require at least 10 participants." in text
     assert "The number of participants has not been decided, and there is no stopping rule." in text
     assert "`liquid-study power rek2024 --to DIR`" in text

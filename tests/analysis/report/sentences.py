@@ -171,7 +171,7 @@ def trend_is_shown(match: re.Match[str], told: Told) -> bool:
     if float(at) != min(lowest[item] for item in of) or float(shortest) != short_delay(told):
         return False
     falling = told.results["decided"]["falling"]
-    for side, item, number in re.findall(rf"(higher|lower) in “(\w+)” \(mean rank correlation {R}\)", rated):
+    for side, item, number in re.findall(rf"(higher|lower) on “(\w+)” \(mean rank correlation {R}\)", rated):
         (row,) = (
             row
             for row in told.asked("answers change with the delay, step-down test")
@@ -361,7 +361,7 @@ def bayes_factor(match: re.Match[str], told: Told) -> bool:
     return (
         one["verdict"] not in DECIDED
         and math.isclose(float(match[1]), max(factor, 1 / factor), rel_tol=6e-3)
-        and (match[2], match[3]) == (("with", "without") if factor > 1 else ("without", "with"))
+        and (match[2], match[3]) == (("a", "none") if factor > 1 else ("no", "one"))
     )
 
 
@@ -527,8 +527,8 @@ def hypothesis(match: re.Match[str], told: Told) -> bool:
     place = int(match[1] or 1) - 1
     contrast = told.contrasts[place]["contrast"]
     return (
-        ("groups" in match[3]) == (contrast["groups"] is not None)
-        and (match[4] == "two-sided") == (contrast["expected"] is None)
+        ("two-sample" in match[4]) == (contrast["groups"] is not None)
+        and (match[3] == "two-sided") == (contrast["expected"] is None)
         and contrast["measure"] in match[2]
     )
 
@@ -622,100 +622,102 @@ def when(holds: Callable[[Told], bool]) -> Check:
 LOOKS: Final = r"(?P<looks>\d+(?:, \d+)* and \d+) participants"
 TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # First page: delays
-    (rf"Over delays of {R} to {R} ms participants already tend to rate longer delays (.*)\.", trend_is_shown),
-    (r"Participants may also notice shorter delays\.", always),
+    (rf"Over delays of {R} to {R} ms, participants already tended to rate longer delays (.*)\.", trend_is_shown),
+    (r"They may also notice shorter delays\.", always),
     (r"A trend does not imply that mean ratings change\.", always),
-    (r"Agreement increases with the delay, but no single delay is shown to be noticed\.",
+    (r"Agreement increases with the delay, but no particular delay was shown to be noticed\.",
      when(lambda told: told.block["threshold"]["effect"] is not None)),
-    (r"No delay is shown to be noticed\.", nothing_noticed),
-    (r"This does not show that there is no difference\.", always),
-    (r"No answer: [a-z].*\.", when(lambda told: not told.against)),
+    (r"No delay was shown to be noticed\.", nothing_noticed),
+    (r"This is not evidence that there is no difference\.", always),
+    (r"There is no answer, because [a-z].*\.", when(lambda told: not told.against)),
     (rf"We could not show for any delay that the mean answers to all statements stay within ±{R} points? of those at "
      rf"{R} ms\.", nothing_equivalent),
-    (r"This does not show that they change\.", when(lambda told: beyond(told) == 0)),
-    (r"In (\d+) of (\d+) comparisons? the whole interval lies beyond the bound \(not equivalent; not corrected for the "
-     r"number of comparisons\)\.",
+    (r"This is not evidence that they change\.", when(lambda told: beyond(told) == 0)),
+    (r"In (\d+) of (\d+) comparisons?, the whole confidence interval lies outside the equivalence bounds \(not "
+     r"equivalent; not corrected for the number of comparisons\)\.",
      lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))),
-    (rf"Up to {R} ms mean answers to (all \w+ statements|both statements|the one statement) stay within ±{R} points? "
-     rf"of those at {R} ms; the data do not exclude that up to {R} % of people differ by more\.", all_equivalent),
-    (rf"The detection threshold is {R} ms \((.*), n = (\d+)\), where (?:> )?{R} % of answers agree with ({ITEM})\.",
-     threshold_is_told),
-    (rf"The largest mean difference is {R} points \(({ITEM}) at {R} ms, (?:> )?{R} % interval {ENDS}, n = (\d+)\)\.",
-     largest_difference),
+    (rf"Up to {R} ms, mean answers to (all \w+ statements|both statements|the one statement) stay within ±{R} points? "
+     rf"of those at {R} ms, but the data do not rule out that up to {R} % of people differ by more\.", all_equivalent),
+    (rf"The detection threshold is {R} ms \((.*), n = (\d+)\); at this delay, (?:> )?{R} % of the answers agree with "
+     rf"({ITEM})\.", threshold_is_told),
+    (rf"The largest mean difference is {R} points \(({ITEM}) at {R} ms, (?:> )?{R} % confidence interval {ENDS}, "
+     r"n = (\d+)\)\.", largest_difference),
     # First page: liquids
     (rf"Participants named (\d+) of (\d+) liquids correctly \({R} expected by chance, {P}\)\.", names_are_counted),
     (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
     (r"No liquid was shown to be recognised above chance\.", when(lambda told: not recognised(told))),
     (r"Rated differently: (.*)\.", pairs_differ),
-    (r"The liquids were rated differently in (.*); the tests do not show which ones\.", statements_differ),
+    (r"The liquids were rated differently on (.*), but the tests do not show which ones\.", statements_differ),
     (r"No statement showed a difference between any two liquids\.", no_statement_differs),
     # Hypotheses
     (rf"Agreement with {ITEM} was (?:(?P<shown>higher|lower) in .* than in .*|not shown to (?:differ between .* and .*"
      rf"|be (?P<lower>higher|lower) in .* than in .*)) \(means (?P<means>{R} and {R}); mean difference (?P<effect>{R})"
-     rf", 95 % interval \[(?P<low>{R}), (?P<high>{R})\], (?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
+     rf", 95 % confidence interval \[(?P<low>{R}), (?P<high>{R})\], (?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
      r"p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
     (r"It was higher in (\S+) for (\d+) of (\d+) participants\.", higher_for_so_many),
-    (r"The data are ([\d.]+) times as likely (with|without) a difference as (with|without) one \(JZS Bayes factor, "
-     r"Cauchy prior with scale 0\.707\)\.", bayes_factor),
-    (r"Standardised effects weight participants equally: d_z is .*\.", when(lambda told: bool(told.contrasts))),
-    (r"Bayes factors are two-sided JZS factors \(Rouder et al\., 2009\) for a difference against no difference, with "
-     r"a Cauchy prior of scale 0\.707\.", when(lambda told: bool(told.contrasts))),
-    (r"Cliff's delta is the probability of a larger answer minus the probability of a smaller one; within participants "
-     r"it is .*\.", when(lambda told: bool(told.contrasts))),
-    (r"The mean lies within the bound \(equivalent\); the data do not exclude that up to (\d+) % of (people differ by "
-     r"more|a group are not in the sample)\.", bound_of_a_contrast("within")),
-    (r"(The whole interval lies|All differences lie) beyond the bound \(not equivalent\)\.",
+    (r"The data are ([\d.]+) times as likely if there is (a|no) difference as if there is (one|none) \(JZS Bayes "
+     r"factor, Cauchy prior with scale 0\.707\)\.", bayes_factor),
+    (r"Standardised effects give all participants equal weight: d_z is .*\.", when(lambda told: bool(told.contrasts))),
+    (r"Their 95 % confidence intervals are calculated from the noncentral t distribution\.",
+     when(lambda told: bool(told.contrasts))),
+    (r"Bayes factors are two-sided JZS Bayes factors \(Rouder et al\., 2009\) that compare a difference with no "
+     r"difference, using a Cauchy prior with scale 0\.707\.", when(lambda told: bool(told.contrasts))),
+    (r"Cliff's delta is the probability that an answer in the first group is larger than one in the second, minus the "
+     r"probability that it is smaller; within participants, it is .*\.", when(lambda told: bool(told.contrasts))),
+    (r"The mean lies within the equivalence bounds \(equivalent\), but the data do not rule out that up to (\d+) % of "
+     r"(people differ by more than the bound|a group are not represented in the sample)\.",
+     bound_of_a_contrast("within")),
+    (r"(The whole confidence interval lies|All differences lie) outside the equivalence bounds \(not equivalent\)\.",
      bound_of_a_contrast("beyond")),
-    (r"The mean is not shown to lie within the bound\.", bound_of_a_contrast("neither")),
-    (r"Not tested: (fewer than two participants have both numbers|the numbers do not vary between participants, so a "
+    (r"The mean was not shown to lie within the equivalence bounds\.", bound_of_a_contrast("neither")),
+    (r"Not tested: (fewer than two participants have both values|the values do not vary between participants, so a "
      r"t test is not possible)\.", contrast_is_untested),
     (r"Excluded: .*\.", when(lambda told: any(one["left_out"] for one in told.contrasts))),
     # Looks
-    (rf"Looks are planned at {LOOKS}; none has been reached, so all results are exploratory\.",
+    (rf"Looks are planned at {LOOKS}; none has been reached yet, so all results are exploratory\.",
      look(lambda told: people(told) < told.results["decided"]["looks"][0])),
     (rf"This is look (?P<look>\d+) of \d+, planned at {LOOKS}\.",
      look(lambda told: people(told) in told.results["decided"]["looks"])),
     (rf"This look at \d+ participants is unplanned: looks are planned at {LOOKS}\.",
      look(lambda told: people(told) not in told.results["decided"]["looks"])),
-    (rf"An adjusted p ≤ {R} is significant( \(alpha is shared by .* spending\)|, as at the last planned look)\.",
-     alpha_here),
-    (rf"A study without an effect that is tested at every number of participants in this way makes a false claim in "
-     rf"{R} "
-     rf"% of cases instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
-    (r"At the planned looks, adjusted p values up to (.*) are significant \((O'Brien–Fleming|Pocock) spending of alpha "
-     r"= [\d.]+, Lan & DeMets 1983\)\.", alphas_of_looks),
+    (rf"An adjusted p value is significant if it is at most {R}( \(.* alpha spending\)|, as at the last planned look)"
+     r"\.", alpha_here),
+    (r"If there were no effect and the study were tested in this way after every participant, it would make a false "
+     rf"claim in {R} % of cases instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
+    (r"At the planned looks, adjusted p values of up to (.*) are significant \((O'Brien–Fleming|Pocock) alpha spending "
+     r"with alpha = [\d.]+, Lan & DeMets 1983\)\.", alphas_of_looks),
     # Limits
     (rf"In (\d+) simulated studies with (\d+) participants, three liquids, seven delays and no true effect, {R} % of "
-     rf"the reports claimed a difference or a noticed delay \((\d+) reports, 95 % interval {R} to {R} %; liquid-study "
-     r"validate-report\)\.", claims),
+     rf"the reports claimed a difference or a noticed delay \((\d+) reports, 95 % confidence interval {R} to {R} %; "
+     r"liquid-study validate-report\)\.", claims),
     (r"No answers are included yet\.", when(lambda told: told.block["n"] == 0)),
     (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
-    (r"The participants were SIMULATED: this report is not evidence about people\.",
+    (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
-    (r"The protocol does not state decisions about the analysis \(the table \[analysis\] is missing\), so all "
+    (r"The protocol does not state decisions about the analysis \(the \[analysis\] table is missing\), so all "
      r"results are exploratory\.", when(lambda told: not told.results["decided"]["made"])),
-    (r"The decisions about the analysis changed between sessions, so all results are exploratory; those of the first "
-     r"session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
-    (r"There is only one participant: the results do not generalise to other people\.",
+    (r"The decisions about the analysis changed between sessions, so all results are exploratory; the decisions from "
+     r"the first session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
+    (r"There is only one participant, so the results do not generalise to other people\.",
      when(lambda told: people(told) == 1)),
-    (rf"{N} participants?: intervals of mean rank correlations and exploratory tests of means need at least 10\.",
-     lambda match, told: count(match[1]) == people(told) < 10),
+    (r"Intervals for mean rank correlations and exploratory tests of means need at least 10 participants; this study "
+     r"has (\d+)\.", lambda match, told: int(match[1]) == people(told) < 10),
     (r"Interactions between groups and blocks or conditions are not tested\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Effects that are not shown here may still exist\.", always),
-    (rf"{LEAD}(the .*) (?:was|were) not computed: (.*)\.", not_computed),
-    (rf"{LEAD}the tests of (.*) could not have been significant with so few participants: no rearrangement of the "
-     r"answers within participants gives an adjusted p that is small enough\.", out_of_reach),
+    (rf"{LEAD}(the .*?) (?:was|were) not computed because (.*)\.", not_computed),
+    (rf"{LEAD}the tests for (.*) could not have been significant with so few participants, because no rearrangement of "
+     r"the answers within participants gives a small enough adjusted p value\.", out_of_reach),
     (rf"{LEAD}(.*) could not be tested \((.*)\)\.", not_testable),
     (rf"{LEAD}(.*) was in position (\d+) for all participants, so its effect cannot be distinguished from the effect "
      rf"of "
      r"that position\.", same_position),
     (rf"{LEAD}a comparison can count as equivalent only with at least (\d+) participants, because a smaller sample has "
      rf"more than a (?:< )?{R} % chance of including nobody from a minority \({R} % of all people\) whose "
-     rf"answers differ by {R} points, enough to shift the mean by the bound\.", too_few_for_equivalence),
+     rf"answers differ by {R} points, which is enough to shift the mean by the bound\.", too_few_for_equivalence),
     (r"This study has (\d+)\.", lambda match, told: int(match[1]) == told.block["n"]),
-    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) undecided: the mean difference is not shown to lie "
-     r"within the equivalence bound, nor beyond it\.", nobody_is_left),
+    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) inconclusive, because the mean difference was not "
+     r"shown to lie either within the equivalence bounds or outside them\.", nobody_is_left),
     # Methods
     (rf"{N} participants?(?: \(SIMULATED, not people\))? took part in “Made up” \(protocol made_up, version 1\)(, "
      rf"each in "
@@ -724,97 +726,96 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      groups),
     (rf"In “Block”, (?P<n>\w+) (?P<noun>visual delay|liquid|view)s? \((?P<names>.*?)(?: ms)?\)(?: in \w+)? "
      rf"(?:was|were) "
-     rf"presented(?: in an order drawn for each participant)?; participants rated (?P<statements>{N}) statements? "
+     rf"presented(?: in a random order for each participant)?; participants rated (?P<statements>{N}) statements? "
      rf"after "
      r"each\.", settings_presented),
     (r"Several conditions have a delay of .*; they are treated as repeated presentations of one delay\.",
      when(lambda told: bool(told.block["replicated_ms"]))),
     (r"Each participant rated each \w+ (\d+(?: to \d+)?) times; the tests use the median of these answers(; the "
      r"detection threshold uses each single answer)?\.", presentations),
-    (r"The answers of sessions (.*) are compared with each other, and pooled in all other tests\.",
+    (r"The answers from sessions (.*) are compared with each other, and are pooled in all other tests\.",
      lambda match, told: listed_in(match[1]) == {str(one) for one in told.block["sessions"]}),
     (r"Conditions were known only by codes until the key was opened\.", when(lambda told: told.study.revealed)),
-    (r"The delays achieved in “Block” were not measured\.",
+    (r"The achieved delays in “Block” were not measured\.",
      when(lambda told: all(one["measured"] == 0 for one in told.results["delivered"]))),
-    (r"(?:Hypothesis (\d+)|The hypothesis) \((.*)\) was tested by a (.*), (one-sided|two-sided)\.", hypothesis),
-    (r"Between groups, t has the degrees of freedom of the smaller group \(Hsu 1938\)\.",
+    (r"(?:Hypothesis (\d+)|The hypothesis) \((.*)\) was tested with a (one-sided|two-sided) (.*)\.", hypothesis),
+    (r"Comparisons between groups use the smaller group's degrees of freedom for t \(Hsu 1938\)\.",
      when(lambda told: any(one["contrast"]["groups"] for one in told.contrasts))),
-    (r"Each participant had one number in each comparison\.", when(lambda told: bool(told.contrasts))),
-    (r"A bootstrap that adds a participant like the most extreme one \(Gaffke 2005\) and t corrected for skewness "
-     r"\(Hall 1992\) had to agree: p is the largest of the three(?:, Holm-adjusted across (\d+) hypotheses)?\.",
+    (r"Each participant contributed one value to each comparison\.", when(lambda told: bool(told.contrasts))),
+    (r"A bootstrap that adds a participant as extreme as the most extreme one \(Gaffke 2005\) and a t test corrected "
+     r"for skewness \(Hall 1992\) had to agree with the t test: the p value is the largest of the three(?:, "
+     r"Holm-adjusted across (\d+) hypotheses)?\.",
      lambda match, told: int(match[1] or 1) == len(told.contrasts)),
-    (r"Equivalence was tested by two one-sided t tests with which the same bootstrap had to agree(?:, "
-     r"Holm-adjusted across (\d+) bounds)?, and requires that the sample is large enough to contain a member of a "
-     r"minority that shifts the mean by the bound\.",
+    (r"Equivalence was tested with two one-sided t tests and the same bootstrap, which had to agree(?:, "
+     r"Holm-adjusted across (\d+) bounds)?\.",
      lambda match, told: int(match[1] or 1)
      == sum(one["contrast"]["bound"] is not None for one in told.contrasts)),
+    (r"It also requires a sample that is large enough to include somebody from a minority that could shift the mean by "
+     r"the bound\.", when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
     (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
-    (r"Some participants were excluded from a hypothesis because a number is missing \(.*\)\.",
+    (r"Some participants were excluded from a test because a value was missing \(.*\)\.",
      when(lambda told: any(one["left_out"] for one in told.contrasts))),
-    (r"Statements were rated on seven-point scales and treated as ordinal: answers are summarised by medians and "
-     r"quartiles \(linear, Hyndman & Fan type 7\)\.", always),
-    (r"Mean differences from the first setting are shown with Student's 95 % intervals\.",
+    (r"Statements were rated on seven-point scales and treated as ordinal; answers are summarised by medians and "
+     r"quartiles \(linear interpolation, Hyndman & Fan type 7\)\.", always),
+    (r"Mean differences from the first setting are shown with 95 % confidence intervals \(Student's t\)\.",
      when(lambda told: bool(told.block["effects"]))),
     (r"Means were tested in (.*)\.", tested_means),
     (r"Means were not tested\.", no_tested_means),
-    (r"First, the (?:liquids|delays) were compared over both statements together by permutation within participants; "
-     r"the "
-     r"statistic was the sum of the statements' Friedman statistics\.",
+    (r"First, the (?:liquids|delays) were compared across both statements together with a within-participant "
+     r"permutation test; the statistic was the sum of the statements' Friedman statistics\.",
      when(lambda told: told.block["overall"] is not None)),
-    (r"Each statement was tested by (?:Friedman's test|Wilcoxon's signed-rank test) \(.*\), with p adjusted (by .*); "
-     r"the effect size is .*\.", family),
-    (r"If a statement showed a difference, pairs were compared by Wilcoxon's signed-rank test \(exact; equal pairs "
-     r"left "
-     r"out\), with p Holm-adjusted across all pairs of all such statements; the effect size is the matched "
-     r"rank-biserial correlation\.", when(lambda told: bool(told.block["pairs"]))),
-    (r"Participants were taken to have named the liquid whose statement they rated highest; answers with equal highest "
+    (r"Each statement was tested with (?:Friedman's test|Wilcoxon's signed-rank test) \(.*\), with p values adjusted "
+     r"(by .*); the effect size is .*\.", family),
+    (r"If a statement showed a difference, pairs were compared with Wilcoxon's signed-rank test \(exact; equal pairs "
+     r"were dropped\), with p values Holm-adjusted across all pairs for all such statements; the effect size is the "
+     r"matched-pairs rank-biserial correlation\.", when(lambda told: bool(told.block["pairs"]))),
+    (r"Participants were taken to have named the liquid whose statement they rated highest; answers with tied highest "
      r"ratings are undecided and count as incorrect\.", when(lambda told: told.block["named"] is not None)),
     (r"The number of correct names was tested by permuting the liquids within participants \(exact, one-sided\)\.",
      when(lambda told: told.block["named"] is not None)),
-    (r"In addition, a liquid was called recognised only if its name was used for it more often than for each other "
-     r"liquid "
-     r"\(McNemar's exact test within participants, one-sided, with p Holm-adjusted across the liquids\)\.",
-     when(lambda told: told.block["named"] is not None)),
-    (r"Trends over the delay were tested by a sign-flip permutation test on the participants' rank correlations of "
-     r"answers and delays \(.*\), (one-sided in the direction stated (?:before the first session|by the protocol)|"
-     r"two-sided|one-sided if a direction was stated (?:before the first session|by the protocol), otherwise "
-     r"two-sided), "
-     r"with p adjusted (by .*)\.", trends_tested),
-    (r"If a statement showed a trend, the longest delay was dropped and its rank correlations were tested again "
-     r"until no "
-     r"trend remained\.", when(lambda told: bool(told.block["trends"]))),
+    (r"In addition, a liquid was called recognised only if its name was used more often for it than for each other "
+     r"liquid \(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the liquids\)"
+     r"\.", when(lambda told: told.block["named"] is not None)),
+    (r"Trends over the delay were tested with a sign-flip permutation test on the participants' rank correlations "
+     r"between answers and delays \(.*\) \((one-sided in the direction stated (?:before the first session|by the "
+     r"protocol)|two-sided|one-sided if a direction was stated (?:before the first session|by the protocol), otherwise "
+     r"two-sided)\), with p values adjusted (by .*)\.", trends_tested),
+    (r"If a statement showed a trend, the longest delay was dropped and the rank correlations were tested again, "
+     r"until no trend remained\.", when(lambda told: bool(told.block["trends"]))),
     (r"The shortest delay with a trend requires p ≤ alpha divided by the number of statements at every step, and is an "
-     r"upper bound of the delay that participants notice\.", when(lambda told: bool(told.block["trends"]))),
-    (rf"Each delay was compared with {R} ms by two one-sided t tests on paired differences, with an equivalence "
-     rf"bound of "
-     rf"±{R} points?(?:, stated before the first session)?, and (> )?{R} % intervals\.",
+     r"upper bound for the delay that participants notice\.", when(lambda told: bool(told.block["trends"]))),
+    (rf"Each delay was compared with {R} ms using two one-sided t tests on paired differences, with equivalence "
+     rf"bounds of ±{R} points?(?: \(stated before the first session\))? and (> )?{R} % confidence intervals\.",
      equivalence_tests),
-    (r"A delay was called equivalent only if a bootstrap that adds a participant like the most extreme one \(Gaffke "
-     r"2005\) agreed, and only with at least (\d+) participants; not equivalent if its whole interval was beyond the "
-     r"bound\.",
+    (r"A delay was called equivalent only if a bootstrap that adds a participant as extreme as the most extreme one "
+     r"\(Gaffke 2005\) agreed, and only with at least (\d+) participants\.",
      lambda match, told: int(match[1])
      == fewest(told.against[0]["found"]["alpha"], min(1 / 5, told.against[0]["found"]["bound"] / 6))),
+    (r"It was called not equivalent if the whole confidence interval was outside the bounds\.",
+     when(lambda told: bool(told.against))),
     (r"The detection threshold is the delay at which a logistic function, fitted to agreement \(5 to 7\) in single "
      r"answers pooled over participants, lies halfway between the guess rate and one minus the lapse rate \(posterior "
      r"median\)\.", when(lambda told: told.block["threshold"] is not None)),
     (r"Its 95 % interval is widened to allow for differences between participants\.", always),
-    (r"It is reported only if the statement shows a trend and if the threshold lies within the presented delays\.",
-     when(lambda told: told.block["threshold"] is not None)),
-    (r"An adjusted p value of a statement is at least the p value of the test over all statements of its block\.",
+    (r"The threshold is reported only if the statement shows a trend and the threshold lies within the range of "
+     r"presented delays\.", when(lambda told: told.block["threshold"] is not None)),
+    (r"A statement's adjusted p value is never smaller than the p value of the test over all statements in its block"
+     r"\.",
      when(lambda told: all(float(row["p_adjusted"] or 1) >= told.p_over_all - 1e-9 for row in told.of_statements))),
-    (r"Alpha \(([\d.]+)(?: over all looks, [\d.]+ at this one)?\) and the primary statements \((.*)\) were stated "
+    (r"Alpha \(([\d.]+)(?: across all looks, [\d.]+ at this look)?\) and the primary statements \((.*)\) were stated "
      r"before "
      r"the first session\.", decided_beforehand),
-    (r"No decisions were made beforehand: all results are exploratory, with alpha = ([\d.]+)\.",
+    (r"No decisions were made beforehand, so all results are exploratory \(alpha = ([\d.]+)\)\.",
      lambda match, told: not told.results["decided"]["made"] and float(match[1]) == told.alpha),
     (r"In an exploratory analysis, the answers were treated as numbers: (?:differences between the settings were "
      r"tested "
-     r"by Hotelling's T²|the participants' own slopes were tested by Student's t), in the participants who answered "
-     r"in all conditions; the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
+     r"with Hotelling's T²|the participants' slopes were tested with Student's t test), for the participants who "
+     r"answered in all conditions; the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
      when(lambda told: any(one["outcome"]["p"] is not None for one in told.block["mixed"]))),
-    (r"Missing answers were not replaced: (\d+) participants? with a missing answer to a statement were excluded "
-     r"from its tests over all conditions, and from comparisons of two conditions that involve the missing answer\.",
+    (r"Missing answers were not replaced; (\d+) participants? with a missing answer to a statement (?:was|were) "
+     r"excluded from that statement's tests over all conditions, and from comparisons of two conditions that involve "
+     r"the missing answer\.",
      left_out),
     (rf"The sessions were run and analysed with liquid-study {re.escape(__version__)}\.", always),
 )  # fmt: skip

@@ -123,7 +123,7 @@ def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
         assert codebook["doubts"] == [{"file": name, "what": what}]
     else:
         caption = (tmp_path / "out" / "liquids.txt").read_text(encoding="utf-8")
-        assert f"1 file is used although changed since recording: {name}." in caption
+        assert f"1 file is used although it has changed since recording: {name}." in caption
 
 
 @pytest.mark.slow

@@ -128,7 +128,7 @@ def test_the_measured_rate_is_that_of_the_nearest_size(participants: int, n: int
     assert f"with {n} participants" in told
     claims, studies = CLAIMS[n]
     assert f"In {studies} simulated studies" in told
-    assert f"({claims} reports, 95 % interval" in told
+    assert f"({claims} reports, 95 % confidence interval" in told
 
 
 def test_a_claim_needs_the_test_over_all_statements_corrected_over_the_blocks() -> None:

@@ -76,11 +76,12 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     report(small.folder, tmp_path / "report")
     told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "in 2 different files); 1 participant lacks a condition, because individual trials were excluded. The "
-        "analysis does not include 1 excluded session and two excluded trials." in told
+        "from 2 different files); 1 participant lacks at least one condition because individual trials were excluded. "
+        "The analysis does not include 1 excluded session and two excluded trials." in told
     )
     assert (
-        f"Decisions after the key was opened: 1 exclusion of {len(gone) + 1} and the reversal of 1 exclusion."
+        f"Some decisions were made after the key was opened: 1 of {len(gone) + 1} exclusions and the reversal of "
+        "1 exclusion."
     ) in told
     rows = json.loads((tmp_path / "report" / "report.json").read_text("utf-8"))["exclusions"]
     assert [row["participant"] for row in rows if row["after_unblinding"]] == ["B"]
@@ -93,13 +94,13 @@ def test_another_study_mixed_in_or_an_empty_folder_is_one_clear_error(
     foreign = small.add("P077", lambda _condition, _item: 4)
     shutil.copytree(foreign.path.parent, rek.folder / "data" / "sub-P077")
     for _ in ("sealed", "opened"):
-        with pytest.raises(AnalysisError, match=r"belongs to study 'small', .* keep each study in a separate folder"):
+        with pytest.raises(AnalysisError, match=r"belongs to the study 'small', .* keep each study in a separate"):
             report(rek.folder, tmp_path / "report")
         shutil.move(rek.folder / "data" / "sub-P077", tmp_path / "sub-P077")
         rek.open()
         shutil.move(tmp_path / "sub-P077", rek.folder / "data" / "sub-P077")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(AnalysisError, match="does not contain sessions"):
+    with pytest.raises(AnalysisError, match="does not contain any sessions"):
         report(tmp_path / "empty", tmp_path / "report")
     assert not (tmp_path / "report").exists()
 
@@ -147,9 +148,9 @@ def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp
     assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}, "dealt in turn"
     report(study, tmp_path / "sealed")
     methods = (tmp_path / "sealed" / "methods.txt").read_text("utf-8")
-    assert "belonged to the groups first_thin (n = 3) and first_thick (n = 2) by an existing attribute" in methods
+    assert "to the groups first_thin (n = 3) and first_thick (n = 2) because of an existing attribute" in methods
     assert "groups were not randomised" in methods
-    assert "Groups were not randomised, so a difference may have other causes" in (
+    assert "The groups were not randomised, so a difference may have other causes" in (
         tmp_path / "sealed" / "report.html"
     ).read_text("utf-8")
     unblind(study, "AB", "a test")

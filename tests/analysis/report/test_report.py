@@ -18,7 +18,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 def test_the_caption_of_delays_says_what_is_dashed(of_twelve: Path) -> None:
-    assert "Dashed: lowest delay with a trend (step-down test" in read(of_twelve)
+    assert "Dashed line: lowest delay with a trend (step-down test" in read(of_twelve)
 
 
 def test_every_answer_stands_beside_its_figure_and_the_page_is_small(of_twelve: Path) -> None:
@@ -28,8 +28,8 @@ def test_every_answer_stands_beside_its_figure_and_the_page_is_small(of_twelve: 
     cards = first.split('<article class="card')[1:]
     assert [re.search(r"<h2>(.*?) <span", card)[1].partition(": ")[2] for card in cards] == [  # type: ignore[index]
         "Which liquids were distinguished?",
-        "From which delay do participants notice a difference?",
-        "Up to which delay do answers not change by a relevant amount?",
+        "At what delay do participants begin to notice a difference?",
+        "Up to what delay do answers not change by a relevant amount?",
     ]
     for card in cards:
         drawing = card[card.index("<svg") :]
@@ -45,10 +45,10 @@ def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_pa
         small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 2)
     report(small.folder, tmp_path / "report")
     told = read(tmp_path / "report")
-    assert "Blinded: conditions as codes" in told
+    assert "Blinded: conditions appear as codes" in told
     assert "after unblinding" in told
     assert re.search(r" all +sealed +sealed +sealed +sealed +28 +28 of 28 ", " ".join(told.split()))
-    assert "Delay error and force held back are sealed, and not checked, until unblinding." in told
+    assert "Until unblinding, the delay error and the force held back are sealed and not checked." in told
     (delivered,) = numbers(tmp_path / "report")["results"]["delivered"]
     assert (delivered["error_mean_ms"], delivered["error_worst_ms"], delivered["achieved_ms"]) == (None, None, None)
     for path in (tmp_path / "report").iterdir():

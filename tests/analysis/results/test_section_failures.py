@@ -17,11 +17,11 @@ from tests.analysis.conftest import Results, make_results, twelve
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TESTS = {
-    "findings.statement_tests.friedman": ("liquids", "test of settings"),
+    "findings.statement_tests.friedman": ("liquids", "test of differences between settings"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
-    "findings.recognition.recognition": ("liquids", "test of recognition"),
+    "findings.recognition.recognition": ("liquids", "recognition test"),
     "findings.statement_tests.slope_tests": ("liquids", "test of means"),
-    "findings.statement_tests.trend": ("delays", "test of a trend"),
+    "findings.statement_tests.trend": ("delays", "trend test"),
     "findings.delays.step_down": ("delays", "lowest delay with a trend"),
     "findings.delays.tost": ("delays", "equivalence test"),
     "findings.delays.noticed": ("delays", "detection threshold"),
@@ -33,7 +33,7 @@ WRITING = {
     "report.write_report.r_script": "report.R",
     "report.write_report.motion_csv": "motion.csv",
     "findings.delays.LowestDelay.section": "lowest delay with a trend",
-    "report.write_report.sections.conduct": "section “How it was run”",
+    "report.write_report.sections.conduct": "section “How the study was run”",
 }
 
 
@@ -86,7 +86,7 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
     for title in (
         "Do answers change with the delay?",
         "Lowest delay",
-        "How it was run",
+        "How the study was run",
         "Not there: its computation failed",
     ):
         assert title in page

@@ -111,7 +111,7 @@ def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tm
 
     assert said(B=one) == (f"site A does not have {FILE}",)
     assert said(A=replace(one, precision=0.1)) == (
-        "the preregistration of site B differs from the preregistration of the first site, which is used here",
+        "the preregistration at site B differs from the one at the first site, which is used here",
     )
     assert said(A=one) == ()
 

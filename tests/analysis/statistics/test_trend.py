@@ -101,7 +101,7 @@ def test_step_down_stops_at_the_first_failure_even_if_a_later_one_would_do() -> 
     assert result.lowest_ms is None
     assert len(result.steps) == 1
     assert trend(values[:, :3]).p < 0.001  # type: ignore[operator]
-    assert "this does not show that there is none" in result.note
+    assert "this is not evidence that there is none" in result.note
 
 
 def test_the_step_down_hardly_ever_finds_a_delay_where_there_is_none() -> None:

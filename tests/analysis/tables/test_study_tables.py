@@ -134,7 +134,7 @@ def test_a_list_of_exclusions_that_makes_no_sense_is_refused(rek: Results) -> No
 
 def test_an_empty_or_foreign_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "holiday.txt").write_text("x", encoding="utf-8", newline="\n")
-    assert "does not contain sessions" in refusal(tmp_path)
+    assert "does not contain any sessions" in refusal(tmp_path)
 
 
 def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
@@ -166,7 +166,7 @@ def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
         (",immersive,statement,2,4,4,", ",immersive,statement,2,4,4,,", "cells, not"),
         (",immersive,statement,2,4,4,", "\n,immersive,statement,2,4,4,", "cells, not"),
         (",immersive,statement,2,4,4,", ',"immersive"x,statement,2,4,4,', "is not CSV in UTF-8"),
-        (",immersive,statement,2,4,4,", ",imersive,statement,2,4,4,", "does not contain statement 'imersive'"),
+        (",immersive,statement,2,4,4,", ",imersive,statement,2,4,4,", "does not contain the statement 'imersive'"),
         (",L1,immersive,", ",L9,immersive,", "for code 'L9'"),
         (",L1,immersive,", ",L1,feels_liquid,", "occurs twice"),
         ("study,participant", "study,person", "does not begin with the columns"),

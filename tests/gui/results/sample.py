@@ -55,7 +55,10 @@ def view(**changes: Any) -> ResultsView:
                 name="liquids", title="Agreement for each setting", caption="Agreement with nine statements.", svg=SVG
             ),
             FigureDrawn(
-                name="delays", title="Answers by delay setting", caption="Agreement with five statements.", svg=SVG
+                name="delays",
+                title="Answers for each delay setting",
+                caption="Agreement with five statements.",
+                svg=SVG,
             ),
         ),
         "colours": COLOURS,

@@ -120,7 +120,7 @@ def shown(qtbot: QtBot, results: Path) -> Iterator[Opened]:
 
 def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorded(shown: Opened, results: Path) -> None:
     assert shown.chips == ["Simulated participants", "Blinded: shown by code"]
-    assert shown.titles == ["Agreement for each setting", "Answers by delay setting"]
+    assert shown.titles == ["Agreement for each setting", "Answers for each delay setting"]
     drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
     assert b">L1<" in drawn
     assert b">Thick<" not in drawn
@@ -131,7 +131,7 @@ def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorde
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
     assert shown.chips[1].endswith("by AK: collection closed")
     assert not shown.place.unblind.isVisible()
-    assert shown.titles[:2] == ["Every participant's answers", "Answers against added delay"]  # of the first page
+    assert shown.titles[:2] == ["Every participant's answers", "Answers as a function of added delay"]  # first page
     assert "Agreement for each liquid" in shown.titles
     questions = [card.question.text() for card in shown.place.figures.cards]
     assert questions[0].endswith("Which liquids were distinguished?")
@@ -205,7 +205,7 @@ def test_a_report_by_processes_of_its_own_is_cancelled_then_written_and_none_is_
     qtbot: QtBot, results: Path, tmp_path: Path
 ) -> None:
     opened = Opened(qtbot, results, start_analysis_worker)
-    assert opened.titles == ["Agreement for each setting", "Answers by delay setting"]
+    assert opened.titles == ["Agreement for each setting", "Answers for each delay setting"]
     assert not nobody_left()
     opened.click(opened.place.report)
     dialog: Any = opened.place.writing

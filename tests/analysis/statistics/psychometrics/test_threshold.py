@@ -74,7 +74,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     assert (result.n, result.dropped) == (2, 1)
     five = noticed(np.vstack([values, values, values]), DELAYS)
     assert (
-        "answers of all participants are pooled, and the interval includes differences between participants"
+        "answers from all participants are pooled, and the interval allows for differences between participants"
         in five.note
     )
     assert five.effect == pytest.approx(125, abs=25)
@@ -85,7 +85,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
     [
         ([0] * 7, "no participant noticed anything up to 300"),
         ([5] * 7, "all participants noticed something at every level"),
-        ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the levels"),
+        ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the presented levels"),
     ],
 )
 def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None:
@@ -107,11 +107,11 @@ def test_an_open_interval_says_which_end_is_open() -> None:
     assert result.interval is None
     assert result.lower is not None
     assert result.upper is None
-    assert result.no_interval == "no interval: the answers leave it open above"
+    assert result.no_interval == "no interval: the answers do not determine its upper end"
     far = noticed(pooled([0, 0, 0, 0, 1, 2, 8], 20), DELAYS)
     assert far.upper is not None
     assert far.upper > 300
-    assert "the interval reaches beyond the levels that were presented" in far.note
+    assert "the interval extends beyond the presented levels" in far.note
 
 
 PSI = np.array([0.55, 0.7, 0.85, 0.95])
