@@ -77,13 +77,13 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
 @pytest.mark.parametrize(
     ("harm", "says"),
     [
-        (lambda session: session.journal.unlink(), "is missing, but receipt, tables"),
-        (lambda session: change(session.journal, b"\n", b"garbage\n"), "line 1: damaged"),
+        (lambda session: session.journal.unlink(), "is missing, but the receipt, tables"),
+        (lambda session: change(session.journal, b"\n", b"garbage\n"), "line 1 is damaged"),
         (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "line 2 has n 3, so lines are missing"),
-        (lambda session: session.journal.write_bytes(b""), "does not contain a complete line, but receipt"),
+        (lambda session: session.journal.write_bytes(b""), "does not contain a complete line, but the receipt"),
         (lambda session: cut_last_line(session.journal), "but the end is missing from the journal"),
         (lambda session: change(session.receipt, b'"version"', b'"version" '), "has changed since the session ended"),
-        (lambda session: session.checksums.unlink(), "is missing: was the program killed"),
+        (lambda session: session.checksums.unlink(), "is missing: the program may have been killed"),
     ],
 )
 def test_every_damage_behind_the_numbers_is_a_line_of_its_file(
