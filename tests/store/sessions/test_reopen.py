@@ -103,7 +103,7 @@ def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(start: Start, ag
     whole = path.read_bytes()
     for wrong in (b"0001-01-01T00:00:00.000+01:00", b"9999-12-31T23:59:59.000-01:00"):
         path.write_bytes(whole.replace(at.encode(), wrong))
-        with pytest.raises(StoreError, match=r"holds at .* expected: time"):
+        with pytest.raises(StoreError, match=r"has at .*; expected: time"):
             again()
     path.write_bytes(whole)
     now = datetime.fromisoformat(at)

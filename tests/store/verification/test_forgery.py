@@ -120,7 +120,7 @@ def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:
     [
         (None, "is not a file: specify a copy"),
         (b"", "does not contain fingerprints"),
-        (b"\xff\n", "line 1 is not a fingerprint: a line must be such as"),
+        (b"\xff\n", "line 1 is not a fingerprint: a line must look like"),
         (b"k3vq-7m2p-xw4d data/sub-P007/ses-01\nx\n", "line 2 is not a fingerprint"),
     ],
 )

@@ -101,7 +101,7 @@ def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_
     words = ("withdraw", str(study), "--participant", "P002", "--by", "AK", "--reason", "asked")
     said = CliRunner().invoke(commands, words).stdout.splitlines()
     told = "\n".join(map(str, verify_study(study, kept).errors))
-    line = next(words for words in said if words.startswith("keep, with")).partition(":  ")[2]
+    line = next(words for words in said if words.startswith("keep this line")).partition(":  ")[2]
     assert f"the withdrawal of P002 is not in {kept}: if P002 requested it, add the line: {line}" in told
     kept.write_text(f"{kept.read_text('utf-8')}{line}\n", encoding="utf-8", newline="\n")
     assert "P002" not in "\n".join(map(str, verify_study(study, kept).errors))
