@@ -196,7 +196,7 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
     about, requested_hz = "assumed, because the device does not measure its delay", protocol.device.rate_hz
     if facts.dynamics.delay_s is not None:
-        about = f"the device measured a delay of {1e3 * facts.dynamics.delay_s:.2f} ms until a force acts"
+        about = f"a force acts after {1e3 * facts.dynamics.delay_s:.2f} ms, as measured by the device"
         if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
             about += " when it was opened; it has measured a longer delay since"
     well = facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS
