@@ -145,8 +145,8 @@ def _level_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
     """Draw the answers of a block against level."""
     bands = _bands(study, result, tracked)
     own = len(people(result)) - _MOST_PEOPLE
-    more = counted(own, "further participant is", "further participants are")
-    left_out = f" {more} shown only in the table." if own > 0 else ""
+    are = "is" if own == 1 else "are"
+    left_out = f" {counted(own, 'further participant')} {are} shown only in the table." if own > 0 else ""
     chance = "" if result.guess_rate is None else f" Dashed line: chance ({100 * result.guess_rate:.0f} %)."
     caption = (
         f"{result.title}: {summary_words(result)} at each level. {_panels(result, bool(bands))}{chance}{left_out} "
@@ -375,7 +375,7 @@ def _track_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
     block = next(block for block in study.levels if block.id == result.block)
     shown = list(courses(block, tracked(), _MOST_PANELS))
     rest = len(Thresholds.own(result)) - len(shown)
-    left_out = f" {counted(rest, 'further panel is', 'further panels are')} not shown." if rest > 0 else ""
+    left_out = f" {counted(rest, 'further panel')} {'is' if rest == 1 else 'are'} not shown." if rest > 0 else ""
     success = "correct" if result.counts == "correct" else f"“{result.counts}”"
     marks = " Colours: tracks." if any(course.tracks.max() > 1 for course in shown) else ""
     marks += " Rings: reversals." if any(course.reversals.any() for course in shown) else ""
@@ -450,7 +450,7 @@ def _settings_picture(
 ) -> Picture:
     """Draw the settings of an adjustment block, once the key is open."""
     rest = len(Settings.own(result)) - _MOST_PANELS
-    left_out = f" {counted(rest, 'further panel is', 'further panels are')} not shown." if rest > 0 else ""
+    left_out = f" {counted(rest, 'further panel')} {'is' if rest == 1 else 'are'} not shown." if rest > 0 else ""
     compared = any(setting.constant_error is not None for setting in Settings.own(result))
     standard = " Dashed line: standard." if compared else ""
     caption = (

@@ -52,7 +52,7 @@ def found(block: BlockResult) -> Found:
 
 
 UNCLEAR = "neither support nor refute “delays up to 50 ms do not matter”"
-BEYOND = "speak against “delays up to 50 ms do not matter”: at 50 ms “Different” differs by more than the bound."
+BEYOND = "speak against “delays up to 50 ms do not matter”: at 50 ms, “Different” differs by more than the bound."
 WITHIN = "Mean answers to these statements stay within the bounds"
 
 
@@ -82,15 +82,15 @@ def test_what_only_t_calls_equivalent_is_told_as_inconclusive(rek: Results) -> N
     assert told == ["50 ms", "–", "–", "Different", "–"]
     assert UNCLEAR in said
     rek.add("P001", lambda *_: 4)
-    undecided = "1 of 1 comparison with 0 ms is undecided"
-    assert any(undecided in line for line in limits(load_study(rek.folder), found(block)))
+    inconclusive = "1 of 1 comparison with 0 ms is inconclusive"
+    assert any(inconclusive in line for line in limits(load_study(rek.folder), found(block)))
 
 
-def test_limits_do_not_call_an_interval_beyond_the_bound_undecided(rek: Results) -> None:
+def test_limits_do_not_call_an_interval_beyond_the_bound_inconclusive(rek: Results) -> None:
     rek.add("P001", lambda *_: 4)
     lines = limits(load_study(rek.folder), found(delays({50: DOUBTED, 150: [2] * 17})))
-    assert any("1 of 2 comparisons with 0 ms is undecided" in line for line in lines)
-    assert not any("undecided" in line for line in limits(load_study(rek.folder), found(delays({150: AWAY}))))
+    assert any("1 of 2 comparisons with 0 ms is inconclusive" in line for line in lines)
+    assert not any("inconclusive" in line for line in limits(load_study(rek.folder), found(delays({150: AWAY}))))
     (row,) = by_delay(delays({150: AWAY}))
     assert row[:-1] == ["150 ms", "–", "Different", "–", "–"]
 

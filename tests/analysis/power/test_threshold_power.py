@@ -133,7 +133,7 @@ def test_trials_are_rounded_to_what_the_method_divides_them_into() -> None:
 @pytest.mark.parametrize(
     ("words", "line"),
     [
-        (("rek2024", "--trials", "30"), "rek2024 does not have a main block of thresholds"),
+        (("rek2024", "--trials", "30"), "rek2024 does not measure thresholds"),
         (("viscosityjnd", "--trials", "0"), "specify numbers of trials from 1 to 1000"),
         (("viscosityjnd", "--trials", "30,few"), "is not a list of numbers"),
     ],

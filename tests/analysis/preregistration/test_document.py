@@ -74,7 +74,7 @@ def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() ->
 def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     text = preregistration(load("rek2024"), "0" * 64)
     assert "Hypothesis, block delays: agreement with" in text
-    assert "(comfortable) falls with the delay." in text
+    assert "(comfortable) decreases with the delay." in text
     assert "within ±1 point?" in text
     assert "above chance (water by like_water, honey by like_honey and light_oil by like_oil)?" in text
     assert "Alpha is 0.05. The p values of primary statements (all) are Holm-adjusted" in text
@@ -85,15 +85,15 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
 
 def test_the_tables_of_power_are_included(tmp_path: Path) -> None:
     (tmp_path / "power.md").write_text(
-        "# Power of Feeling (rek2024 1.0)\n\n## Delays\n\n| n |\n", encoding="utf-8", newline="\n"
+        "# Power for Feeling (rek2024 1.0)\n\n## Delays\n\n| n |\n", encoding="utf-8", newline="\n"
     )
     text = written("rek2024", "--power", str(tmp_path))
-    assert "\n### Power of Feeling (rek2024 1.0)\n\n#### Delays\n\n| n |\n\n## Exclusions\n" in text
+    assert "\n### Power for Feeling (rek2024 1.0)\n\n#### Delays\n\n| n |\n\n## Exclusions\n" in text
     assert "Power was not computed" not in text
 
 
 @pytest.mark.parametrize(
-    ("content", "line"), [(None, "power.md cannot be read"), ("# Power of x (y 1)", "does not belong to rek2024 1.0")]
+    ("content", "line"), [(None, "power.md cannot be read"), ("# Power for x (y 1)", "was not written for rek2024 1.0")]
 )
 def test_a_folder_without_this_studys_power_is_a_usage_error(content: str | None, line: str, tmp_path: Path) -> None:
     if content is not None:

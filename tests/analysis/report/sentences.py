@@ -139,7 +139,7 @@ def beyond(told: Told) -> int:
     return sum(position(one) == "beyond" for one in told.against)
 
 
-def undecided(told: Told) -> int:
+def inconclusive(told: Told) -> int:
     """Return how many comparisons are neither equivalent nor beyond the bound."""
     return sum(one["found"]["verdict"] != "equivalent" and position(one) != "beyond" for one in told.against)
 
@@ -459,8 +459,8 @@ def too_few_for_equivalence(match: re.Match[str], told: Told) -> bool:
 
 
 def nobody_is_left(match: re.Match[str], told: Told) -> bool:
-    """Check that so many comparisons are undecided."""
-    return (int(match[1]), int(match[2])) == (undecided(told), len(told.against))
+    """Check that so many comparisons are inconclusive."""
+    return (int(match[1]), int(match[2])) == (inconclusive(told), len(told.against))
 
 
 def out_of_reach(match: re.Match[str], told: Told) -> bool:

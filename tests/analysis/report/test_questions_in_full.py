@@ -62,6 +62,6 @@ def test_the_report_has_every_wording_in_every_language_and_says_what_changed(re
     texts = [text for form in before.values() for item in form["items"] for text in item["text"].values()]
     assert len(texts) > 20
     assert [text for text in (*texts, NEW) if str(escape(text)) not in appendix] == []
-    assert "Changed in version 1.1 (first session: P002, 2026-01-06; saved by AK)" in appendix
+    assert "Changes in version 1.1 (first session: P002, 2026-01-06; saved by AK)" in appendix
     assert "Reworded in version 1.1 (first session: P002, 2026-01-06; saved by AK): liquid.like_honey." in page
-    assert "Changed in version 1.0" not in page
+    assert "Changes in version 1.0" not in page
