@@ -14,7 +14,13 @@ from study_app.protocol.warnings.study_warnings import warnings
         ("delaydetect", "[conditions.water]", "[conditions.water]", "Mouse", ""),
         ("forcedelay", "format = 2", "format = 2", "Mouse", "stimuli.delay.vary: Mouse does not produce force"),
         ("forcedelay", "damping_nspm = 4", "damping_nspm = 0.01", "", "stimuli.delay.vary: the condition does not"),
-        ("demo", "format = 2", "format = 2", "Mouse", "blocks.liquids: Mouse does not produce force, so participants see"),
+        (
+            "demo",
+            "format = 2",
+            "format = 2",
+            "Mouse",
+            "blocks.liquids: Mouse does not produce force, so participants see",
+        ),
         (
             "viscosityjnd",
             "format = 2",
