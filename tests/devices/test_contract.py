@@ -492,7 +492,7 @@ def test_every_finding_of_a_doctor_has_a_cause_a_cure_and_how_it_is_known(name: 
         assert one.state in {"not checked", "ok"}
         assert all((one.tested, one.symptom, one.cause, one.known_by))
         assert "\n" not in one.tested + one.symptom + one.cause + one.cure
-    with pytest.raises(DeviceError, match="emulated can"):
+    with pytest.raises(DeviceError, match="faults can be simulated only with"):
         doctor.examine(name, options={}, faults=["nan"], progress=str)
     with pytest.raises(DeviceError, match="fault 'thirst' is not known; choose from: "):
         doctor.examine(f"{name}-emulated", options={}, faults=["thirst"], progress=str)

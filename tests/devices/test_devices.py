@@ -28,7 +28,7 @@ def test_a_device_without_the_parts_of_a_device_is_closed_and_named(monkeypatch:
 
     bare: Any = Bare()
     monkeypatch.setattr(registry, "descriptor_of", lambda _: replace(descriptor_of("mouse"), open=lambda _: bare))
-    with pytest.raises(DeviceError, match="device 'mouse' does not have 'read': let Bare inherit"):
+    with pytest.raises(DeviceError, match="device 'mouse' does not have 'read': derive Bare from"):
         open_device("mouse")
     assert bare.closed
 

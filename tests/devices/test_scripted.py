@@ -82,7 +82,7 @@ def test_an_order_that_is_half_written_is_left_for_later():
         ([], np.zeros((0, 3)), "n > 0"),
         ([0, 1], np.zeros((3, 3)), r"\(2,\) and \(3, 3\)"),
         ([0, 1], np.zeros((2, 2)), r"\(2, 2\)"),
-        ([0, 1, 1], np.zeros((3, 3)), "row 2 is at 1.0 s, after 1.0 s"),
+        ([0, 1, 1], np.zeros((3, 3)), "row 2 is at 1.0 s, but the row before is at 1.0 s"),
         ([0, np.nan], np.zeros((2, 3)), "finite"),
         ([0, 1], np.full((2, 3), np.inf), "finite"),
     ],

@@ -66,7 +66,7 @@ def _order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
     if order == "fixed":
         return ("neutral", "ring", "same for everyone"), "The effects of condition and position cannot be separated."
     if not isinstance(order, str) or order not in _SQUARES:
-        drawn = "The order is drawn anew in every session, so positions are balanced only on average."
+        drawn = "A new order is drawn in every session, so positions are balanced only on average."
         return ("neutral", "ring", "balanced on average"), drawn
     square, repetitions = _SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)

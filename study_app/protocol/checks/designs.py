@@ -233,7 +233,7 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
         message = f"has {len(liquids)} liquids: only one can be varied"
         yield Fault((*place, "condition"), message, "choose a condition with one liquid")
     elif protocol.liquids[liquids[0]].effects == "auto":
-        message = f'the effects of "{liquids[0]}" would be selected anew at every level'
+        message = f'the effects of "{liquids[0]}" would be selected separately at every level'
         yield Fault((*place, "vary"), message, 'list them: effects = ["drag"]')
     else:
         try:

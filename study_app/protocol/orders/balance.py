@@ -279,7 +279,7 @@ def _advice(block: _BlockBalance) -> Iterator[str]:
             yield "Everyone gets the same order, so effects of condition and position cannot be separated."
         case "shuffled" | "constrained":
             yield (
-                "Orders are drawn anew in every session, so they are balanced only on average; each seed gives "
+                "New orders are drawn in every session, so they are balanced only on average; each seed gives "
                 "different tables."
             )
             if repetitions == 1:

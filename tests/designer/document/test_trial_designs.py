@@ -153,7 +153,10 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert added.document["scene"] == {"scale": 3}
     assert "slime_2 is clipped" not in warned(added)
     clipped = warned(after(added, SetValue(("scene", "scale"), 10)))
-    assert "to 17.36 N, a reduction beyond limits.withheld_percent; with scene.scale = 3 it is not clipped" in clipped
+    assert (
+        "its 17.36 N to 5.30 N, a reduction beyond limits.withheld_percent; with scene.scale = 3 it is not clipped"
+        in clipped
+    )
     table = added.document["liquids"]["slime_2"]
     assert dict(table) == dict(shipped_liquids()["slime", "slime"])
     assert added.document["conditions"]["slime_2"] == {"liquid": "slime_2"}

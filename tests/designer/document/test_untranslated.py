@@ -63,14 +63,16 @@ def test_every_english_text_of_a_study_in_another_language_alone_is_to_be_transl
 
 def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
     study = with_answers(template("rate-realism"), Answers("Ça fait vrai ?", ("fr",)))
-    assert lines_of(study) == ["study.languages: 16 texts are still in English but the study's only language is French"]
+    assert lines_of(study) == [
+        "study.languages: 16 texts are still in English, but the study's only language is French"
+    ]
     study, _ = study.with_edits(Set(("pages", "welcome", "title", "fr"), "Bienvenue"))
     assert copied_texts(study) == {"fr": 15}
     done = translated(study, "fr")
     assert (copied_texts(done), lines_of(done)) == ({}, [])
     check_translated(done.document)
     almost, _ = done.with_edits(Set(("pages", "thanks", "button", "fr"), "Finish"))
-    told = "study.languages: 1 text is still in English but the study's only language is French: pages.thanks.button"
+    told = "study.languages: 1 text is still in English, but the study's only language is French: pages.thanks.button"
     assert list(describe_untranslated(almost.document, lists_places=True)) == [told]
     with pytest.raises(SessionError, match=r"1 text on French pages is still in English: pages\.thanks\.button;"):
         check_translated(almost.document)
@@ -89,7 +91,7 @@ def test_dutch_texts_in_a_study_that_states_english_are_recognised_too() -> None
         study_named("slime").text.replace('"en", "nl"', '"nl", "en"').encode(), shipped_file("slime").parent
     )
     swapped = with_answers(with_answers(dutch, Answers(languages=("nl",))), Answers(languages=("fr",)))
-    assert lines_of(swapped)[0].endswith("texts are still in Dutch but the study's only language is French")
+    assert lines_of(swapped)[0].endswith("texts are still in Dutch, but the study's only language is French")
 
 
 def test_texts_typed_by_hand_without_a_language_are_compared_too() -> None:

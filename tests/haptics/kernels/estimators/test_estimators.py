@@ -1,4 +1,4 @@
-"""Lag and noise of estimators, and those that was removed from the program."""
+"""Lag and noise of estimators, and those that were removed from the program."""
 
 import numpy as np
 import pytest
@@ -53,5 +53,7 @@ def test_lag_and_noise_on_a_quantised_sinusoid(velocity, lag_ms, noise_mmps):
 
 @pytest.mark.parametrize("kind", ["line", "foaw", "lead"])
 def test_an_estimator_of_earlier_versions_computes_no_force_and_says_what_to_write(kind):
-    with pytest.raises(StudyError, match=f'"{kind}" was removed from the program: write "ewma", "kalman" or "raw"'):
+    with pytest.raises(
+        StudyError, match=f'"{kind}" has been removed from the program: write "ewma", "kalman" or "raw"'
+    ):
         pack(scene(velocity=Withdrawn(kind=kind)))
