@@ -47,7 +47,9 @@ def test_a_receipt_that_does_not_say_what_a_block_compares_differs_in_nothing():
         ([("repetitions = 2", "repetitions = 3")], ["blocks.feel.repetitions: previously 2, now 3"]),
         ([("force_limit_n = 8", "force_limit_n = 7.5")], ["device.force_limit_n: previously 8, now 7.5"]),
         ([("dwell_s = 0.5", "dwell_s = 0.5000001")], ["tasks.reach.dwell_s: a different text or number"]),
-        ([('en = "Read this."', 'en = "Read that."')], ['pages.hello.body.en: previously "Read this.", now "Read that."'],
+        (
+            [('en = "Read this."', 'en = "Read that."')],
+            ['pages.hello.body.en: previously "Read this.", now "Read that."'],
         ),
         (
             [(ORDER, 'order = "constrained"\nmax_repeats = 1\nrepetitions = 2')],
