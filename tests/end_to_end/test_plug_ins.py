@@ -324,7 +324,7 @@ def test_a_fault_in_a_session_or_a_report_is_one_line_and_nothing_is_lost(
             "its kind does not have a default: set the default to the value of the Literal",
         ),
         ("Toy = 3", "toy_plug:Toy is not a subclass of Question"),
-        (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': call it 'toy-plug:' and"),
+        (QUESTION.replace("toy-plug:toy", "mood"), "its kind is 'mood': use 'toy-plug:' followed"),
         (QUESTION.replace('"toy_plug:MEASURE"', "LATER"), "NameError: name 'LATER' is not defined"),
         (QUESTION.replace("def problem", "x: slice\n\n        def problem"), "PydanticSchemaGenerationError"),
     ],

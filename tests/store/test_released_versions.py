@@ -167,10 +167,10 @@ def test_it_is_resumed_with_a_chain_that_covers_the_lines_before(study: Path, tm
     resumed = next(line["n"] for line in lines if line["event"] == "session_resumed")
     assert [line["n"] for line in lines if "previous" in line] == list(range(resumed, len(lines) + 1))
     assert len(StudyFolder(study).fingerprints.read_text("utf-8").splitlines()) == 1
-    assert "data: 1 journal is of format 1" in warned(study)
+    assert "data: 1 journal is in format 1" in warned(study)
     content = folder.journal.read_bytes()
     folder.journal.write_bytes(content.replace(b'"value":4', b'"value":5', 1))  # in a line of format 1
     damage = journal.scan(folder.journal).damage
     assert damage is not None
-    assert "does not continue the previous line" in damage
+    assert "does not match the previous line" in damage
     folder.journal.write_bytes(content)
