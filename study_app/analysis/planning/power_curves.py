@@ -445,9 +445,9 @@ _SOURCES: Final = (
     "The values for consistent, typical and noisy people come from published ratings, in points on a seven-point "
     "scale. Consistent: a trained panel (data set TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen "
     "2017; medians across 15 attributes). Typical: panelists who rated chocolates (data set sensochoc, R package "
-    "SensoMineR, Lê and Husson 2008; medians across 14 descriptors). Noisy: the largest of these 14 values. The SD of "
-    "noise is the SD between identical trials; the SD of slopes is the between-person SD of effects, relative to the "
-    "mean effect."
+    "SensoMineR, Lê and Husson 2008; medians across 14 descriptors). Noisy: the largest of these 14 values. The noise "
+    "SD is the SD between identical trials; the slope SD is the between-person SD of effects, relative to the mean "
+    "effect."
 )
 """Where the values of `raters.PUBLISHED` come from."""
 BEYOND: Final = "beyond"
