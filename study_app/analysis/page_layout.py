@@ -20,6 +20,7 @@ from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.results import BlockResult, Failure, Failures, Results
 from study_app.analysis.wording import counted
+from study_app.number_text import capitalised
 
 MARGIN_PT = 4.0
 SMALL = 7.2
@@ -236,7 +237,7 @@ def picture_of(
 
 def sample_words(study: Study, n: int) -> str:
     """Return the last sentence of a caption: who took part."""
-    return f"{counted(n, 'participant')}{' (SIMULATED, not people)' if study.simulated else ''}."
+    return f"{capitalised(counted(n, 'participant'))}{' (SIMULATED, not people)' if study.simulated else ''}."
 
 
 @dataclass(frozen=True, slots=True)

@@ -877,12 +877,13 @@ class Exponents(LevelStatistic[ExponentEstimate]):
         return measure == "exponent"
 
     def sentences(self) -> Iterator[str]:
-        of_what = f" for {self.found.quantity}"
-        meaning = "; 1 is Weber’s law, 0 is a constant JND" if Thresholds.of(self.found) else of_what
+        weber = bool(Thresholds.of(self.found))
+        name = self.name if weber else f"{self.name} for {self.found.quantity}"
+        meaning = "; 1 is Weber’s law, 0 is a constant JND" if weber else ""
         for row in self.rows:
             if row.participant is None:
                 yield (
-                    f"{self.found.title}: {self.name} {number(row.exponent)} ({interval_words(row, number)}; "
+                    f"{self.found.title}: {name} {number(row.exponent)} ({interval_words(row, number)}; "
                     f"{counted(row.n, 'participant')}){meaning}."
                 )
 

@@ -89,7 +89,7 @@ def complete_rows(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array,
     """Return the participants (rows) with answers in all settings (columns), and the number of others."""
     array = checked_values(values, "participants, settings")
     if array.shape[1] < at_least:
-        raise AnalysisError(f"at least {at_least} settings are needed{why}, not {array.shape[1]}")
+        raise AnalysisError(f"too few settings ({array.shape[1]}): at least {at_least} are needed{why}")
     whole = ~np.isnan(array).any(axis=1)
     return array[whole], int((~whole).sum())
 

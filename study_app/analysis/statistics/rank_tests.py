@@ -199,9 +199,7 @@ def friedman(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) -> Friedma
 
     ``draws`` and ``seed`` are for random permutations, if the exact distribution would take too long.
     """
-    rows, dropped = complete_rows(
-        values, at_least=3, why=" for Friedman's test; compare two by the signed ranks of pairs"
-    )
+    rows, dropped = complete_rows(values, at_least=3, why=" for Friedman's test (use the signed-rank test for two)")
     n, k = rows.shape
     ranks = doubled_ranks(rows)
     spread = _tied_spread(ranks)
@@ -351,7 +349,7 @@ def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) 
     array = checked_values(values, "items, participants, settings")
     k = array.shape[2]
     if k < 2:
-        raise AnalysisError(f"{k} settings: at least 2 are needed for a test of settings")
+        raise AnalysisError(f"too few settings ({k}): at least 2 are needed for a comparison")
     whole = np.asarray(~np.isnan(array).any(axis=2))
     used = whole.any(axis=0)
     array, whole = array[:, used], whole[:, used]
