@@ -1,7 +1,7 @@
-"""Accuracy over computation time as CSV, Markdown and a figure for one column of a page, also in grey.
+"""Accuracy over computation time as CSV, Markdown and a figure for the width of a page, also in grey.
 
-Above in the figure are ways to compute one definition, below models of a real liquid. Errors that are nothing but
-rounding are in a strip of their own, so that fifteen decades of nothing do not squeeze the rest.
+The panels show ways to compute one definition, models of a real liquid, and the force on the hand. Mere
+rounding errors are in a separate strip, so that the other errors keep their resolution.
 """
 
 import math
@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 
 from study_app import figure_style as style
@@ -52,22 +52,22 @@ _LOOKS: Final[dict[str, dict[str, Any]]] = {
 
 @style.own_settings(style.PLOT_SETTINGS)
 def draw(accuracy: Accuracy) -> Figure:
-    """Draw one panel for each kind of reference, with a legend below."""
+    """Draw one panel for each kind of reference and one for the force on the hand, with a legend below."""
     kinds: tuple[Kind, ...] = ("numerical", "physical")
     panels = [_Panel(accuracy, kind) for kind in kinds if accuracy.of(kind)]
-    key = textwrap.wrap(_KEY + " ".join(f"{note[0].upper()}{note[1:]}." for note in accuracy.notes), _LETTERS)
-    acting_pt = _ACTING_TOP_PT + _PANEL_PT + _FOOT_PT + 6 if accuracy.acting else 0.0
-    height_pt = sum(panel.height_pt for panel in panels) + _FOOT_PT + acting_pt + _LINE_PT * len(key)
-    figure = Figure(figsize=(_WIDTH_PT / 72, height_pt / 72), facecolor="white")
+    columns = len(panels) + bool(accuracy.acting)
+    notes = " ".join(f"{note[0].upper()}{note[1:]}." for note in accuracy.notes)
+    key = textwrap.wrap(_KEY + notes, columns * _LETTERS)
+    height_pt = max(panel.height_pt for panel in panels) + _FOOT_PT + _LINE_PT * len(key)
+    figure = Figure(figsize=(columns * _WIDTH_PT / 72, height_pt / 72), facecolor="white")
+    places = np.atleast_1d(figure.subfigures(1, columns, wspace=0))
     least, most = _span(accuracy)
-    down_pt = 0.0
-    for panel in panels:
-        panel.draw(figure, down_pt, height_pt, (least, most), last=panel is panels[-1])
-        down_pt += panel.height_pt
+    for panel, place in zip(panels, places, strict=False):
+        panel.draw(place, height_pt, (least, most))
     if accuracy.acting:
-        _draw_acting(figure, accuracy, down_pt + _FOOT_PT - 6, height_pt)
+        _draw_acting(places[-1], accuracy, height_pt)
     figure.text(
-        4 / _WIDTH_PT,
+        4 / (columns * _WIDTH_PT),
         (_LINE_PT * len(key) + 4) / height_pt,
         "\n".join(key),
         va="top",
@@ -97,17 +97,16 @@ _SAME_LABEL: Final = 1.3
 """Points within this factor share a label."""
 
 
-def _draw_acting(figure: Figure, accuracy: Accuracy, down_pt: float, height_pt: float) -> None:
+def _draw_acting(figure: FigureBase, accuracy: Accuracy, height_pt: float) -> None:
     """Draw the error of the force on the hand against the time of a tick, by estimator and delay."""
     _write_heading(
         figure,
-        "Error of the force that acts on the hand, including the delay",
+        "Error of the force on the hand, including the delay",
         f"{accuracy.acting_liquid}; a middle hand moves a 0.2 kg handle randomly, at about 1.6 Hz and with the power "
         "of a ±20 mm oscillation. Numbers: ticks of delay. Bars: smallest error of any linear estimator.",
-        down_pt,
         height_pt,
     )
-    axes = _axes_at(figure, down_pt + _ACTING_TOP_PT, _PANEL_PT, height_pt)
+    axes = _axes_at(figure, _ACTING_TOP_PT, _PANEL_PT, height_pt)
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(FixedLocator([1, 2, 5, 10, 20, 50, 100, 200, 500]))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -118,7 +117,7 @@ def _draw_acting(figure: Figure, accuracy: Accuracy, down_pt: float, height_pt: 
     estimators = tuple(dict.fromkeys(it.estimator for it in accuracy.acting))  # cheapest first
     times = [it.ns for it in accuracy.acting]
     margin_ns = 0.25 * (max(times) - min(times)) + 5
-    axes.set_xlim(min(times) - margin_ns, max(times) + 2 * margin_ns)
+    axes.set_xlim(min(times) - 2 * margin_ns, max(times) + 2 * margin_ns)
     offset: dict[str, Any] = {"textcoords": "offset points", "fontsize": _SMALL}
     for k, name in enumerate(estimators):
         points = sorted((it for it in accuracy.acting if it.estimator == name), key=lambda it: it.error)
@@ -136,8 +135,8 @@ def _draw_acting(figure: Figure, accuracy: Accuracy, down_pt: float, height_pt: 
             text = ", ".join(map(str, sorted(it.delay for it in group)))
             height = math.sqrt(group[0].error * group[-1].error)
             axes.annotate(text, (ns, height), (5, 0), va="center", **offset)
-        side = "right" if k == 0 else "left"
-        axes.annotate(name, (ns, points[-1].error), (3, 6), ha=side, va="bottom", fontweight="bold", **offset)
+        height = math.sqrt(points[0].error * points[-1].error)
+        axes.annotate(name, (ns, height), (-6, 0), ha="right", va="center", fontweight="bold", **offset)
     axes.set_ylim(*_acting_range(accuracy))
 
 
@@ -153,16 +152,16 @@ _ESTIMATOR_LOOKS: Final[tuple[dict[str, Any], ...]] = (
 )
 
 
-def _write_heading(figure: Figure, heading: str, text: str, down_pt: float, height_pt: float) -> None:
+def _write_heading(figure: FigureBase, heading: str, text: str, height_pt: float) -> None:
     """Write a panel's heading, and its text in lines below."""
     lines = "\n".join(textwrap.wrap(text, _LETTERS))
-    figure.text(4 / _WIDTH_PT, 1 - (down_pt + 6) / height_pt, heading, va="top", fontweight="bold")
-    below = 1 - (down_pt + 6 + _HEADING_PT) / height_pt
+    figure.text(4 / _WIDTH_PT, 1 - 6 / height_pt, heading, va="top", fontweight="bold")
+    below = 1 - (6 + _HEADING_PT) / height_pt
     figure.text(4 / _WIDTH_PT, below, lines, va="top", fontsize=_SMALL, color=style.TEXT_SOFT)
 
 
-def _axes_at(figure: Figure, top_pt: float, tall_pt: float, height_pt: float) -> Axes:
-    """Return axes of the page's width, ``top_pt`` below its upper edge."""
+def _axes_at(figure: FigureBase, top_pt: float, tall_pt: float, height_pt: float) -> Axes:
+    """Return axes of a column's width, ``top_pt`` below its upper edge."""
     width = (_WIDTH_PT - _LEFT_PT - _RIGHT_PT) / _WIDTH_PT
     return figure.add_axes((_LEFT_PT / _WIDTH_PT, 1 - (top_pt + tall_pt) / height_pt, width, tall_pt / height_pt))
 
@@ -192,20 +191,20 @@ class _Panel:
     def height_pt(self) -> float:
         return self._top_pt + _PANEL_PT + (_STRIP_PT + _BREAK_PT if self._strip else 0.0) + 12
 
-    def draw(self, figure: Figure, down_pt: float, height_pt: float, span: tuple[float, float], *, last: bool) -> None:
-        _write_heading(figure, self._heading, self._text, down_pt, height_pt)
-        top_pt = down_pt + self._top_pt
+    def draw(self, figure: FigureBase, height_pt: float, span: tuple[float, float]) -> None:
+        _write_heading(figure, self._heading, self._text, height_pt)
+        top_pt = self._top_pt
         main = _axes_at(figure, top_pt, _PANEL_PT, height_pt)
         axes = [main]
         if self._strip:
             axes.append(_axes_at(figure, top_pt + _PANEL_PT + _BREAK_PT, _STRIP_PT, height_pt))
         for it in axes:
-            self._axes(it, span, lowest=it is axes[-1], last=last)
+            self._axes(it, span, lowest=it is axes[-1])
         self._main(main)
         if self._strip:
             self._rounding(axes[1], main)
 
-    def _axes(self, axes: Axes, span: tuple[float, float], *, lowest: bool, last: bool) -> None:
+    def _axes(self, axes: Axes, span: tuple[float, float], *, lowest: bool) -> None:
         axes.set_xscale("log")
         axes.set_yscale("log")
         axes.set_xlim(*span)
@@ -216,7 +215,7 @@ class _Panel:
         axes.tick_params(labelsize=_SMALL, axis="y", pad=1)
         axes.spines["bottom"].set_visible(lowest)
         axes.axvline(_BUDGET_NS, color=style.TEXT, linewidth=0.8, linestyle=(0, (1, 1.5)))
-        if lowest and last:
+        if lowest:
             label = "Time taken to compute 1 ms of motion (one tick at 1 kHz)"
             axes.set_xlabel(label, fontsize=_SMALL + 0.4, labelpad=2)
         for row, other in zip(self._front, self._front[1:], strict=False):
