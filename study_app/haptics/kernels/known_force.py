@@ -17,7 +17,7 @@ sent, so that a force that safety withholds does not count as a change.
 
 A hand that lets go changes the acceleration faster than the filter learns of it, and θ would take the change for an
 effect of the force. Such a surprise resets the motion. For a second, and after accelerations above a limit, inertial
-forces are smoothed and limited as at shorter delays; then the share of the known force returns within another second.
+forces are smoothed and limited as without the known force, which then returns within another second.
 """
 
 from __future__ import annotations

@@ -38,6 +38,7 @@ KINDS: Final[tuple[Rows, ...]] = tuple(rows for effect in EFFECTS for rows in ef
 _EXPLICIT: Final = history.BIT | current.BIT | wake.BIT | local_wake.BIT
 _ELASTIC: Final = (non_newtonian.KIND_HERSCHEL_BULKLEY, non_newtonian.KIND_MAXWELL)
 _ARRAYS: Final = tuple(name for kind in KINDS for name in kind.arrays)
+_NEVER_TICKS: Final = MOST_DELAY + 1
 EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
 EffectRows.__doc__ = "The arrays of a model that effects own, by name."
 _Counts: TypeAlias = Mapping[str, int]
@@ -301,7 +302,6 @@ def _fill_constants(
     parameters.count_m = dynamics.count_m
     parameters.mass_kg = dynamics.mass_kg
     parameters.smoothing_lead = rules.smoothing_lead if isinstance(scene.velocity, Kalman) else 0.0
-    parameters.known_force_ticks = rules.known_force_ticks
     parameters.link.acts = scene.link.acts
     parameters.link.delay_ticks, parameters.link.jitter_ticks = scene.link.ticks(scene.rate_hz)
     parameters.link.loss, parameters.link.seed = scene.link.loss, scene.link.seed
@@ -314,6 +314,7 @@ def _fill_constants(
         record.smoothing_rate, record.inertia_share = zip(*fits, strict=True)
         first = _rows_after(first, liquid, scene.rate_hz)
         parameters.effects |= record.effects
+    parameters.known_force_ticks = rules.known_force_ticks if model.liquids.known_force.any() else _NEVER_TICKS
 
 
 def _known_force(
