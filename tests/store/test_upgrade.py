@@ -112,7 +112,7 @@ def test_earlier_results_are_refused_until_they_are_upgraded(results: Path, tmp_
     ]
     for command in refused:
         with pytest.raises(
-            StoreError, match=r"has tables of an earlier version.*: run liquid-study upgrade \S+rek2024$"
+            StoreError, match=r"has tables from an earlier version.*: run liquid-study upgrade \S+rek2024$"
         ):
             command()
     assert contents(results) == before
