@@ -96,7 +96,7 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     first = page[page.index('class="first"') :]
     asked = "Threshold is higher in Late than in Prompt; equivalent within 1.25"
     assert first.index(asked) < first.index("Prompt: ")
-    assert f"; mean ratio {found.effect:.2f}, 95 % interval" in first
+    assert f"; mean ratio {found.effect:.2f}, 95 % confidence interval" in first
     for side, own in zip(found.sides, (late, prompt), strict=True):
         assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
 
@@ -111,7 +111,7 @@ def test_methods_name_all_compared_conditions_with_their_delays(tmp_path: Path) 
     unblind(folder, "AB", "to analyse")
     made = load_study(folder)
     words = methods(made, evaluate(made))
-    assert "damper and damper with a visual delay of 60 ms were compared by two-interval forced choice" in words
+    assert "damper and damper with a visual delay of 60 ms were compared using two-interval forced choice" in words
 
 
 def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_block(tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> N
     [
         ('"late", "load"]', '"late"]', "load is not asked after every block that is compared"),
         ('measure = "raw"', 'measure = "raws"', '"load" does not have a numeric question or score raws'),
-        ('measure = "raw"', 'measure = "threshold"', "compare a question or score of the form"),
+        ('measure = "raw"', 'measure = "threshold"', "compare one of its questions or scores"),
     ],
 )
 def test_a_form_that_blocks_do_not_have_in_common_is_refused(before: str, after: str, words: str) -> None:

@@ -376,14 +376,14 @@ def _track_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
     shown = list(courses(block, tracked(), _MOST_PANELS))
     rest = len(Thresholds.own(result)) - len(shown)
     left_out = f" {counted(rest, 'further panel')} {'is' if rest == 1 else 'are'} not shown." if rest > 0 else ""
-    success = "correct" if result.counts == "correct" else f"“{result.counts}”"
+    success = "correctly" if result.counts == "correct" else f"“{result.counts}”"
     marks = " Colours: tracks." if any(course.tracks.max() > 1 for course in shown) else ""
     marks += " Rings: reversals." if any(course.reversals.any() for course in shown) else ""
     if any(course.catches.any() for course in shown):
         marks += " ×: catch trial answered correctly; +: catch trial answered incorrectly."
     caption = (
-        f"{result.title}: the level of each trial. Filled: answered {success}; hollow: not.{marks} Band: 95 % "
-        f"interval for the threshold, given the answers up to that trial.{left_out} "
+        f"{result.title}: the level of each trial. Filled: answered {success}; hollow: other answers.{marks} Band: 95 "
+        f"% interval for the threshold, given the answers up to that trial.{left_out} "
         f"{sample_words(study, len(people(result)))}"
     )
     return picture_of(

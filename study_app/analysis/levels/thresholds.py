@@ -612,7 +612,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 yield f"{title}: {words} ({_named_people(own, some)})."
         if some := [estimate for estimate in own if estimate.open_end]:
             yield (
-                f"{title}: the answers do not determine one end of the 95 % interval, which is marked “<” or “>” "
+                f"{title}: the answers do not determine one or both ends of the 95 % interval, marked “<” or “>” "
                 f"({_named_people(own, some)})."
             )
         for row in self.rows:

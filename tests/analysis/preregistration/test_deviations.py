@@ -65,9 +65,9 @@ def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
 @pytest.mark.slow
 def test_fewer_participants_and_another_number_than_the_protocols_are_deviations(answered: Results) -> None:
     committed(answered, 12)
-    assert evaluate_block(answered) == ("fewer participants: 3 are analysed, 12 were planned",)
+    assert evaluate_block(answered) == ("there are fewer participants than planned (3 instead of 12)",)
     committed(answered, 2)
-    assert evaluate_block(answered) == ("more participants: 3 are analysed, 2 were planned",)
+    assert evaluate_block(answered) == ("there are more participants than planned (3 instead of 2)",)
     committed(answered, None)
     assert evaluate_block(answered) == ()
 
@@ -100,7 +100,7 @@ def test_exclusions_by_other_rules_are_listed_and_those_by_its_own_are_not(answe
     listed = (*exclusions(answered.folder), by_rule)
     StudyFolder(answered.folder).exclusions.write_bytes(exclusion_bytes(listed))
     lines = evaluate_block(answered)
-    assert lines[0] == "fewer participants: 2 are analysed, 3 were planned"
+    assert lines[0] == "there are fewer participants than planned (2 instead of 3)"
     assert len(lines) == 2
     assert "sneezed" in lines[1]
 
@@ -114,7 +114,7 @@ def test_where_only_the_protocol_plans_participants_they_are_compared(answered: 
     }  # fmt: skip
     receipts(answered, protocol=protocol | {"analysis": analysis})
     assert deviations(load_study(answered.folder)) == Deviations(
-        None, ("fewer participants: 3 are analysed, 20 were planned",)
+        None, ("there are fewer participants than planned (3 instead of 20)",)
     )
 
 
@@ -132,9 +132,9 @@ def test_the_report_lists_deviations_and_hashes_the_file(answered: Results, tmp_
     written_to = tmp_path / "report"
     report(answered.folder, written_to)
     page = (written_to / "report.html").read_text(encoding="utf-8")
-    assert "fewer participants: 3 are analysed, 12 were planned" in page
+    assert "there are fewer participants than planned (3 instead of 12)" in page
     content = json.loads((written_to / "report.json").read_text(encoding="utf-8"))
-    assert content["preregistration"]["found"] == ["fewer participants: 3 are analysed, 12 were planned"]
+    assert content["preregistration"]["found"] == ["there are fewer participants than planned (3 instead of 12)"]
     assert content["preregistration"]["commitment"]["protocol_hash"] == HASH
     assert FILE in content["files"]
     (answered.folder / FILE).unlink()

@@ -49,9 +49,9 @@ def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
     said = {}
     for device in ("mouse", "falcon:12", "answers-only"):
         told = methods(replace(study, participants=study.participants.assign(device=device)), results)
-        said[device] = told.partition("Participants used a ")[2].partition(" A ball of 68 mm diameter moved 10 times")[
-            0
-        ]
+        said[device] = told.partition("Participants used a ")[2].partition(
+            " A ball with a diameter of 68 mm moved 10 times"
+        )[0]
     assert said == {
         "mouse": "device without force (mouse).",
         "falcon:12": "haptic device (falcon); forces were computed at 1000 Hz and limited to 8 N.",

@@ -63,5 +63,8 @@ def test_the_report_has_every_wording_in_every_language_and_says_what_changed(re
     assert len(texts) > 20
     assert [text for text in (*texts, NEW) if str(escape(text)) not in appendix] == []
     assert "Changes in version 1.1 (first session: P002, 2026-01-06; saved by AK)" in appendix
-    assert "liquid.like_honey changed in version 1.1 (first session: P002, 2026-01-06; saved by AK)." in page
+    assert (
+        "The wording of liquid.like_honey changed in version 1.1 (first session: P002, 2026-01-06; saved by AK)."
+        in page
+    )
     assert "Changes in version 1.0" not in page
