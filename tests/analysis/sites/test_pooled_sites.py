@@ -109,7 +109,7 @@ def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tm
         assert compared is not None
         return compared.found
 
-    assert said(B=one) == (f"site A does not have {FILE}",)
+    assert said(B=one) == (f"site A does not have the file {FILE}",)
     assert said(A=replace(one, precision=0.1)) == (
         "the preregistration at site B differs from the one at the first site, which is used here",
     )

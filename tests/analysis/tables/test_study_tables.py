@@ -140,7 +140,7 @@ def test_an_empty_or_foreign_folder_is_refused(tmp_path: Path) -> None:
 def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
     rek.add("P001", lambda *_: 4)
     message = refusal(rek.folder.parent)
-    assert f"specify {rek.folder}" in message
+    assert f"specify one, such as {rek.folder}" in message
 
 
 @pytest.mark.parametrize(
