@@ -3,4 +3,4 @@
 docs/architecture.md lists the packages; an import may only point to a lower layer (``lint-imports``).
 """
 
-__version__ = "0.2.2"
+__version__ = "0.3.0"
