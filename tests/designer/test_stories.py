@@ -93,7 +93,7 @@ def banner(story: Story) -> None:
         text = designer.file.read_text("utf-8")
         write_draft(designer.file, Draft(text=f"{text}# {end}\n", base=content_hash(text.encode())))
         story.act("open a draft", designer.open)
-        story.expect("Draft of today HH:MM, not saved", undo="Restore the draft", kept="edited")
+        story.expect("Draft from today HH:MM, not saved", undo="Restore the draft", kept="edited")
         story.has(f"# {end}")
         story.ask(SetText(TITLE, "en", end))
         assert designer.place.banner.isVisible()
@@ -118,7 +118,7 @@ def never_saved(story: Story) -> None:
     story.expect("Draft kept HH:MM", kept="not saved", undo="")
     story.act("open another", designer.open)
     story.act("open it again", lambda: designer.open(str(mine)))
-    story.expect("Draft of today HH:MM, never saved", kept="not saved")
+    story.expect("Draft from today HH:MM, never saved", kept="not saved")
     story.play("[Discard the draft] [Cancel]")
     assert draft_of(mine) is not None
     story.play("[Discard the draft]")
@@ -335,7 +335,7 @@ def incomplete(story: Story) -> None:
     story.expect("Saved, but the study cannot be run yet because of 1 problem", kept="saved")
     story.play("[Show the list] @device")
     (line,) = story.designer.place.problems.lines
-    assert line.row.message == f"{count} texts are missing in Dutch; this is the first"
+    assert line.row.message == f"{count} texts are missing in Dutch; this is the first of them"
     assert "missing" not in " ".join(told(story.designer.place.form)), "no field complains before it was filled in"
     story.ask(ChangeLanguage("copy", "nl"))
     story.expect("No problems", "1 warning", undo="Fill in Dutch")
@@ -403,7 +403,7 @@ def one_instead(story: Story) -> None:
         story.act(f"in place of {key}", lambda key=key, at=at: row("tasks", "reach", key).keys.buttons[at].click())
         task = story.designer.value("tasks", "reach")
         assert (key in task, task[other]) == (False, 1)
-    story.expect(undo="Give Number of targets")
+    story.expect(undo="Specify Number of targets")
     story.play("ctrl+z ctrl+z @blocks.liquids")
     story.expect(kept="saved")
     story.has("count = 6")

@@ -140,8 +140,8 @@ class RehearsalDialog(Work):
 _FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 _HOLDS = "It will contain the folders protocols and results."
-_ROW_HINT = "the session uses that participant's order; leave empty to use its own"
-_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty to use its own"
+_ROW_HINT = "the session uses that participant's order; leave empty for its own"
+_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty for its own"
 _GROUP_HINT = "recorded as a property of the participant"
 
 

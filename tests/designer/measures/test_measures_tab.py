@@ -71,7 +71,7 @@ def test_a_failed_simulation_says_why(qtbot: Any, designer: Any, worker: Worker,
         worker.given.append((1, Crashed(1)))
         sentence = "The process ended with exit code 1; the terminal may show why."
     else:
-        sentence = "The simulation process does not start."
+        sentence = "The simulation process could not be started."
     qtbot.waitUntil(lambda: progress.text() == sentence)
     designer.controller.measures.make = lambda: worker
     designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 60))

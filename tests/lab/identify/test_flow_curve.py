@@ -202,7 +202,7 @@ def test_branches_at_other_shear_rates_are_told_by_the_way_of_the_ramp():
     curve = loop(gap=0.2)
     rates = curve.rate_per_s * np.where(np.arange(44) < 22, 1.0, 1.05)
     found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), FlowCurve(rates, curve.stress_pa))
-    assert any(it.startswith("stresses at rising and at falling shear rates differ by") for it in found.warnings)
+    assert any(it.startswith("the stresses at rising and at falling shear rates differ by") for it in found.warnings)
 
 
 def test_noise_makes_no_branches():

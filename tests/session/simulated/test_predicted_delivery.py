@@ -130,7 +130,7 @@ def test_report_and_export_say_who_lost_how_many_trials_of_which_kind(rehearsed:
     page = re.sub(r"<[^>]+>", " ", (tmp_path / "report" / "report.html").read_text(encoding="utf-8"))
     words = " ".join(page.split())
     assert "P001, session 1 4 of 4" in words
-    assert "paste: 4 the safety layer held back too much force (limit 25 %) not counted" in words
+    assert "paste: 4 the safety layer held back too much force (limit 25 %) not included" in words
     assert "1 incomplete. The analysis includes 0 participants." in words
     for path in export(rehearsed, tmp_path / "tables"):
         if path.name.endswith(("trials_data.csv", "intervals_data.csv")):
