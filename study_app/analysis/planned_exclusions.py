@@ -122,7 +122,10 @@ def _beyond_levels(study: Study, results: Results | None) -> _Rows:
         for row in block.statistics.get("thresholds", ()):
             if row.participant is not None and row.beyond is not None:
                 for session in sessions.loc[sessions["participant"] == row.participant, "session"]:
-                    yield (row.participant, session), f"the threshold in {block.block} lies {row.beyond} the levels"
+                    yield (
+                        (row.participant, session),
+                        f"the threshold in {block.block} lies {row.beyond} the range of levels",
+                    )
 
 
 def _constant(study: Study, limit: float | None) -> _Rows:
@@ -130,7 +133,7 @@ def _constant(study: Study, limit: float | None) -> _Rows:
     for session, rows in answers.groupby(SESSION):
         share = rows["response"].value_counts(normalize=True).max()
         if limit is not None and len(rows) > 1 and 100 * share > limit:
-            yield session, f"{percent(share)} of {len(rows)} answers to statements are identical"
+            yield session, f"{percent(share)} of the {len(rows)} answers to statements are identical"
 
 
 def _fast(study: Study, limit: float | None) -> _Rows:

@@ -259,7 +259,9 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
     "--table", type=click.Path(path_type=Path), metavar="FILE", help="Only measure the table of slope limits."
 )
 @click.option(
-    "--withheld", is_flag=True, help=("Only print the proportion of each liquid's force that safety holds back.")
+    "--withheld",
+    is_flag=True,
+    help="Only print the proportion of each liquid's force that the safety layer holds back.",
 )
 @click.option(
     "--delivered",

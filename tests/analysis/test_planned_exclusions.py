@@ -57,7 +57,7 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
         (first, "constant_answers", "undecided"),
         (second, "fast_answers", "undecided"),
     ]
-    assert found[0].why == f"100 % of {int((own & responses['counted']).sum())} answers to statements are identical"
+    assert found[0].why == f"100 % of the {int((own & responses['counted']).sum())} answers to statements are identical"
     assert found[1].why == f"half of the {int((hurried & answered['counted']).sum())} answers were chosen within 0.30 s"
 
 

@@ -232,9 +232,9 @@ def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, byte
     lines = [
         f"# {study.title}",
         "",
-        f"{simulated}This Psych-DS dataset contains the data of {counted(study.n, 'participant')}. {blinded} Missing "
-        "values are marked `n/a`. Statements, levels and exclusions are in `documentation/codebook.json`; the study's "
-        "texts are in `materials`.",
+        f"{simulated}This Psych-DS dataset contains data from {counted(study.n, 'participant')}. {blinded} Missing "
+        "values are marked `n/a`. Statements, levels and exclusions are in `documentation/codebook.json`; the "
+        "texts used in the study are in `materials`.",
         "",
         *(f"- `data/{name}`" for name in tables),
         *([f"- `results/report.html`: the report{script}"] if "report.html" in report else []),

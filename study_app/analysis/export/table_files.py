@@ -62,7 +62,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "study": study_head(study),
         "program": f"liquid-study {__version__}",
-        "format": "CSV in UTF-8, with commas as separators, decimal points, and quotes as in RFC 4180; a text that "
+        "format": "CSV in UTF-8, with commas as separators, decimal points, and quoting as in RFC 4180; any text that "
         f"begins with {COMPUTED} is preceded by an apostrophe",
         "missing": MISSING,
         "blinded": not study.revealed,

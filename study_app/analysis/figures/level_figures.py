@@ -172,7 +172,7 @@ def _panels(result: LevelsResult, banded: bool) -> str:
             "thresholds (stacked if there are several standards); circles: answers at each level, with an area "
             f"proportional to their number{crosses}. First panel: all participants."
         )
-    units = " after removing the individual unit" if result.own_units else ""
+    units = " after removing differences between the participants' scale units" if result.own_units else ""
     return (
         f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); thin lines "
         f"show single participants{units}. Other panels: one participant each, with 95 % intervals for the "

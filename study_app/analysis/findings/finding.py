@@ -263,7 +263,7 @@ TESTS: Final = (
     optional("members", "integer", "Number of tests in the family.", minimum=1),
     optional("correction", "text", "Method used to correct the p value."),
     optional("primary", "flag", "true if the test was planned before the study."),
-    optional("verdict", "text", "Verdict on the test."),
+    optional("verdict", "text", "Outcome of the test."),
     Column("effect_name", "text", "Name of the effect size."),
     optional("effect", "number", "Value of the effect size."),
     optional("low", "number", "Lower end of the effect's confidence interval."),

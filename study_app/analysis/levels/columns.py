@@ -131,7 +131,7 @@ _EXPONENTS: Final[tuple[Column, ...]] = (
 _THRESHOLDS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
-    optional("condition", "text", "The compared condition; n/a in a block of levels."),
+    optional("condition", "text", "The condition that is compared; n/a in a block of levels."),
     Column("n", "integer", "Number of answers included in the analysis.", minimum=0),
     optional(
         "threshold",
@@ -144,14 +144,14 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "open_end",
         "text",
-        "The end of the interval that the answers do not determine, so that the true end lies further out; n/a if both "
-        "ends are determined.",
+        "Which end of the interval the answers do not determine (the true limit lies further out); n/a if both ends "
+        "are determined.",
         levels=(("low", "the lower end"), ("high", "the upper end"), ("both", "both ends")),
     ),
     optional(
         "beyond",
         "text",
-        "Whether the threshold lies outside the levels of the stimulus; n/a if it lies within them.",
+        "Whether the threshold lies outside the range of the stimulus's levels; n/a if it lies within it.",
         levels=(("above", "above the highest level"), ("below", "below the lowest level")),
     ),
     optional(

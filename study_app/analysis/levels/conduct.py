@@ -178,7 +178,7 @@ class _Withheld(LevelStatistic[_Row]):
     key = "withheld"
     place = 8
     since = 2
-    title = "Force held back by safety"
+    title = "Force held back by the safety layer"
 
     compute = staticmethod(lambda block, _opened, study, _found: _withheld(block, study.intervals))
 

@@ -672,8 +672,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if own is None:
             return (
                 f"{result.title}: the device's own damping, friction and mass are unknown, because they were not "
-                "measured. Weber fractions refer to the force delivered by the motors; they are smaller relative to "
-                "the sum of this force and the device's own resistance."
+                "measured. Weber fractions refer to the force delivered by the motors; they would be smaller "
+                "relative to the sum of this force and the device's own resistance."
             )
         where = "" if own.sessions == own.of else f" (measured in {own.sessions} of {own.of} sessions)"
         words = (

@@ -353,7 +353,7 @@ def _design(protocol: Protocol) -> Iterator[str]:
         )
     for group, words in block_orders_by_group(protocol).items():
         yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
-    yield "Trial orders are drawn for each participant from the session's seed, as described below for each block."
+    yield "Trial orders are generated for each participant from the session's seed, as described below for each block."
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
         kind = "levels" if block.stimulus is not None else "conditions"
@@ -369,13 +369,13 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
         decided = decisions(protocol)
         planned = (
             f"We plan to include {number_text.counted(one.participants, 'participant')}. The study ends when this "
-            "number of valid sessions is complete; only then are the key opened and the data tested."
+            "number of valid sessions is complete; only then are the data unblinded and tested."
             if not decided.looks
-            else f"We plan to include {one.participants} participants. The key is opened and everything is tested when "
-            f"{listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values of up to "
-            f"{listed([significant(level) for level in decided.alphas])} are significant at these looks "
+            else f"We plan to include {one.participants} participants. The data are unblinded and all tests are run "
+            f"when {listed([str(look) for look in decided.looks])} valid sessions are complete; adjusted p values "
+            f"of up to {listed([significant(level) for level in decided.alphas])} are significant at these looks "
             f"({SPENDINGS[decided.spending]} alpha spending, Lan & DeMets 1983). The study ends at the first look at "
-            "which all primary statements and hypotheses are shown, or otherwise at the last look."
+            "which all primary statements and hypotheses are supported, or otherwise at the last look."
         )
     wanted = (
         ""
@@ -417,7 +417,7 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         if block.catch is not None:
             yield (
                 f'Rule "catch": a session with more than {100 * block.catch.wrong_most:g} % incorrect answers to the '
-                f"catch trials of block {block.id} is excluded; the program applies it when the key is opened."
+                f"catch trials of block {block.id} is excluded; the program applies it when the data are unblinded."
             )
     limits = "; ".join(f"{what} ({value})" for value, what in limit_rows(protocol))
     has_intervals = any(block.design is not None for block in protocol.main_blocks)
@@ -430,16 +430,16 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         if (permitted := protocol.limits.missing_percent) is not None:
             yield (
                 f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of its main trials '
-                "with intervals remain unanswered because no presentation was within the limits."
+                "with intervals remain unanswered because no presentation was within the limits for valid trials."
             )
     if any(block.design is None for block in protocol.main_blocks):
         trials = "Other trials" if has_intervals else "Trials"
         yield f"{trials} that exceed a limit are analysed, and their number is reported."
     for rule in () if protocol.analysis is None else protocol.analysis.exclusions:
         yield (
-            f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. Somebody decides whether to '
-            "exclude it; the report lists the session and the decision, and states the conclusions with and without "
-            "all such sessions."
+            f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. The researchers decide '
+            "whether to exclude it; the report lists the session and the decision, and states the conclusions with and "
+            "without all such sessions."
         )
     yield f"Limits: {limits}."
     yield "Any other exclusion is a deviation from this preregistration; the report lists it with its reason and date."

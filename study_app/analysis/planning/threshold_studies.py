@@ -385,7 +385,9 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         share = "" if isinstance(first, ThresholdPlan) else f", relative to a mean {what} of {first.value:g}"
         whose = f"for one participant's {what}, from the estimation error and differences between people"
         if contrast.within is not None:
-            whose = "for one participant's difference, from both estimation errors and differences between people"
+            whose = (
+                "for one participant's difference, based on the two estimation errors and on differences between people"
+            )
         yield from smallest_differences(
             contrast, precisions.sizes, alpha, members, rows,
             f"trials{first.per}",

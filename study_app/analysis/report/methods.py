@@ -29,7 +29,7 @@ _ORDERS: Final = {
 }
 _BLOCK_ORDERS: Final = {
     "fixed": "in the same order for all participants",
-    "balanced": "in orders balanced across participants (Williams design)",
+    "balanced": "in an order counterbalanced across participants (Williams design)",
     "random": "in a random order for each participant",
 }
 
@@ -277,9 +277,9 @@ def _missing_trials(study: Study) -> str:
     if not study.levels or not asked:
         return ""
     if not count:
-        return "All main trials with intervals were delivered within the limits."
+        return "All main trials with intervals were presented within the limits for valid trials."
     lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
-    return f"{lost} because no presentation was within the limits."
+    return f"{lost} because no presentation was within the limits for valid trials."
 
 
 def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:

@@ -542,7 +542,7 @@ def _first(lines: list[str]) -> list[str]:
 def _delivered(study: Study, results: Results) -> Iterator[str]:
     if not results.delivered:
         return
-    yield heading(3, "Were delays displayed as specified?")
+    yield heading(3, "Were the delays presented as specified?")
     blocks = {result.id: result for result in results.blocks}
 
     def shown(cell: Callable[[Delivered], str]) -> Callable[[Delivered], str]:

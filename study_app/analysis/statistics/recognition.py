@@ -144,8 +144,8 @@ def _names(names: ArrayLike, truth: Sequence[int | None], labels: int) -> Whole:
     given = checked_values(names, "participants, settings")
     if given.shape[1] != len(truth) or not 2 <= len(truth) <= MOST:
         raise AnalysisError(
-            f"there are {given.shape[1]} settings with names but {len(truth)} true names; specify the same number of "
-            f"each, from 2 to {MOST}"
+            f"names were given to {given.shape[1]} settings, but there are {len(truth)} true names; specify the same "
+            f"number of each, from 2 to {MOST}"
         )
     if not np.isin(given, _columns(labels)).all() or not {*truth} <= {None, *range(labels)}:
         raise AnalysisError(

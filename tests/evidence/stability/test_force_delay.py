@@ -1,4 +1,4 @@
-"""A force that a study delays: it comes so late, within its limits, and the table of what is left of it."""
+"""A delayed force: it comes so late, within its limits, and the table of what is left of it."""
 
 import numpy as np
 import pytest

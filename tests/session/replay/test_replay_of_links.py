@@ -82,7 +82,7 @@ def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed:
     assert all(0 <= one["mean_percent"] <= one["most_percent"] < 5 for one in withheld)
     assert not named.statistics["withheld"]
     sections = ["".join(level_section(one, (), None)) for one in (pairs, named)]
-    assert ["Force held back by safety" in one for one in sections] == [True, False]
+    assert ["Force held back by the safety layer" in one for one in sections] == [True, False]
     (block,) = (one for one in study.levels if one.id == "named")
     names = {one.condition: setting_name(one, block.settings) for one in block.settings}
     assert names == {"water": "Water, force delayed by 15 ms, 20 % of forces lost"}
