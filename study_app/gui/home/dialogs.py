@@ -234,13 +234,13 @@ class NewSessionDialog(QDialog):
         fields = (
             Field("participant", "Participant", aside="letters and digits, not a name"),
             Field("session", "Session", "count", limits=(1, MAX_SESSION)),
-            seed_field("determines all orders; it is recorded"),
+            seed_field("determines all orders; recorded"),
             Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
             choice_field("language", "Language of the participant's pages", languages),
             choice_field("device", "Device", {name: device_label(name) for name in devices}),
             choice_field("screen", "Participant's screen", screen_titles),
             Field("windowed", "In a window instead of full screen", "check"),
-            Field("pilot", "Pilot: marked by a frame and stored separately", "check"),
+            Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
             Field("results", "Results folder for this study", "folder"),
             choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=_GROUP_HINT),
             Field(
