@@ -207,8 +207,9 @@ class _Withheld(LevelStatistic[_Row]):
             kept = list(takewhile(lambda one: one["most_percent"] <= WITHHELD_PERCENT, rows))
             at = "" if standard is None else f" at the standard of {standard:.4g}{of}"
             yield (
-                f"In every comparison up to {kept[-1]['high']:.3g}{of}{at}, at most {WITHHELD_PERCENT:g} % was held "
-                "back."
+                f"In every comparison up to {kept[-1]['high']:.3g}{of}{at}, at most {WITHHELD_PERCENT:g} % of the "
+                "force was held back."
                 if kept
-                else f"More than {WITHHELD_PERCENT:g} % was held back in some comparison at the lowest level{at}."
+                else f"More than {WITHHELD_PERCENT:g} % of the force was held back in some comparison at the "
+                f"lowest level{at}."
             )

@@ -555,8 +555,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             "group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp interval if there are at "
             "least three participants. Each variance is replaced by its geometric mean with the median "
             f"variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated sets of answers; for "
-            "the group, the clustering of errors in standard errors above expectation, with “!” above "
-            f"{MOST_CLUSTERED:g}. Drift: correlation between trial number and deviance residual, with “!” if the "
+            "the group, how far the clustering of errors exceeds expectation, in standard errors, marked “!” if above "
+            f"{MOST_CLUSTERED:g}. Drift: correlation between trial number and deviance residual, marked “!” if the "
             f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the "
             "rise or fall of thresholds after the first trials, in standard errors. n is the number of "
             f"answers{catch}." + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")

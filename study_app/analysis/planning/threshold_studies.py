@@ -435,13 +435,17 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
         )
     group = "The group interval is a t-based confidence interval for the mean."
     if isinstance(plan, SensitivityPlan):
-        return f"Observers are unbiased and have a mean d′ of {plan.value:g}; the SD is relative to this mean. {group}"
+        return (
+            f"Simulated observers are unbiased and have a mean d′ of {plan.value:g}; the SD is stated relative to this "
+            f"mean. {group}"
+        )
     if isinstance(plan, RatingPlan):
         return (
-            f"Observers have a mean d_a of {plan.value:g} between a level and the lowest level, and use all "
-            f"{plan.points} points on the scale about equally often; the SD is relative to d_a. {group}"
+            f"Simulated observers have a mean d_a of {plan.value:g} between a level and the lowest level, and use all "
+            f"{plan.points} points on the scale about equally often; the SD is stated relative to d_a. {group}"
         )
     return (
-        f"Observers follow a power law with a mean exponent of {plan.value:g}, and their ln answers have a standard "
-        f"deviation of {ESTIMATE_NOISE:g}; the SD is relative to the exponent. {group}"
+        f"Simulated observers follow a power law with a mean exponent of {plan.value:g}, and the natural logarithms of "
+        f"their answers have a standard deviation of {ESTIMATE_NOISE:g}; the SD is stated relative to the mean "
+        f"exponent. {group}"
     )
