@@ -34,10 +34,10 @@ SHOWN = 200  # letters of a bad value that a message repeats
 def commands(context: click.Context) -> None:
     """Run, record and analyse studies of how liquids feel.
 
-    Without a command, the home window opens. FILE is a protocol or scene file, or the name of a file in the workspace
-    or of a shipped study (rek2024, physical_liquids, physical2, slime, viscosityjnd, delaydetect, delayjnd, forcedelay,
-    thickness, demo). RESULTS is a study folder, or its name in the workspace. SESSION is a ses-NN folder, or a name
-    listed by the command sessions.
+    If no command is given, the home window opens. FILE is a protocol or scene file, or the name of a file in the
+    workspace or of a shipped study (rek2024, physical_liquids, physical2, slime, viscosityjnd, delaydetect, delayjnd,
+    forcedelay, thickness, demo). RESULTS is a study folder, or its name in the workspace. SESSION is a ses-NN folder,
+    or a name listed by the sessions command.
     """
     from study_app.store.program_log import start_log
 

@@ -253,41 +253,41 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
 
 
 @click.command()
-@click.option("--to", type=Target(), metavar="DIR", help="Folder for table, map, unstable cases and summary.")
+@click.option("--to", type=Target(), metavar="DIR", help="Folder for the table, map, unstable cases and summary.")
 @click.option("--case", "line", metavar="LINE", help='Evaluate one case, such as "liquid=honey rate_hz=250 delay=4".')
 @click.option(
-    "--table", type=click.Path(path_type=Path), metavar="FILE", help="Only measure the table of slope limits."
+    "--table", type=click.Path(path_type=Path), metavar="FILE", help="Measure only the table of slope limits."
 )
 @click.option(
     "--withheld",
     is_flag=True,
-    help="Only print the proportion of each liquid's force that the safety layer holds back.",
+    help="Print only the proportion of each liquid's force that the safety layer holds back.",
 )
 @click.option(
     "--delivered",
     is_flag=True,
-    help="Only print the error of the force that acts on the hand, with limits; this takes a minute.",
+    help="Print only the error of the force that acts on the hand, with limits; this takes a minute.",
 )
 @click.option(
     "--whole",
     is_flag=True,
-    help="With --delivered: also each hand with each handle, and the liquids of all shipped studies.",
+    help="With --delivered: also evaluate every hand with every handle, and the liquids of all shipped studies.",
 )
 @click.option(
     "--velocity",
     is_flag=True,
-    help="Only print errors, noise, stable damping and computation time of the velocity estimators.",
+    help="Print only the errors, noise, stable damping and computation time of the velocity estimators.",
 )
 @click.option(
     "--delayed",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Only measure the proportion of a delayed force that is sent.",
+    help="Measure only the proportion of a delayed force that is sent.",
 )
-@click.option("--seed", help="Seed of the cases, to repeat a run; default: a new one, which is printed.")
-@click.option("--cases", type=click.IntRange(1), metavar="N", help="Only simulate N cases of each group.")
+@click.option("--seed", help="Seed for the cases, used to repeat a run; default: a new seed, which is printed.")
+@click.option("--cases", type=click.IntRange(1), metavar="N", help="Simulate only N cases from each group.")
 @click.option(
-    "--only", metavar="TEXT", help='Only simulate groups with this text in their name, such as "non-Newtonian".'
+    "--only", metavar="TEXT", help='Simulate only groups with this text in their names, such as "non-Newtonian".'
 )
 @takes_workers
 def stability(
@@ -304,7 +304,7 @@ def stability(
     only: str | None,
     workers: Workers,
 ) -> None:
-    """Simulate thousands of closed loops with the safety layer off and on, and print unstable and noisy ones.
+    """Simulate thousands of closed loops with the safety layer off and on, and print the unstable and noisy ones.
 
     Each case has a liquid, a scale, a rate, a delay, an estimator, a device and a hand; further groups have a second
     model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon

@@ -126,11 +126,11 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "viscosity-jnd": (
         "Viscosity JND",
-        "How much thicker must a liquid be to feel thicker? Trials with two intervals at adaptive levels.",
+        "How much thicker must a liquid be to feel thicker? Two-interval trials with adaptive levels.",
     ),
     "delay-detection": (
         "Delay detection",
-        "What is the shortest picture delay that participants notice? Trials with two intervals at adaptive levels.",
+        "What is the shortest picture delay that participants notice? Two-interval trials with adaptive levels.",
     ),
     "rate-realism": (
         "Rate realism",

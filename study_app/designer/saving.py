@@ -140,7 +140,10 @@ class Saving(QObject):
             self._close_notice(opened)
             return
         if action == "discard" and not opened.base:
-            lost = "has never been saved, so without its draft the whole study will be lost. This cannot be undone."
+            lost = (
+                "has never been saved, so if you discard its draft, the whole study will be lost. This cannot be "
+                "undone."
+            )
             title = f"Discard “{opened.title or opened.file.stem}”?"
             card = ConfirmCard(title, f"{opened.file.name} {lost}", "Discard the draft", "trash")
             card.answered.connect(self.discard_study)

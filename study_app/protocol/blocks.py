@@ -46,7 +46,7 @@ class Catch(Table):
 
     share: Annotated[float, within(0.01, 0.5, "between one catch trial per 100 other trials and one per 2")] = Field(
         default=0.1,
-        description="Number of catch trials per other trial in a track; one occurs at a random position in every "
+        description="Ratio of catch trials to other trials in a track; one occurs at a random position in every "
         "1/share trials.",
     )
     wrong_most: Annotated[float, within(0, 1, "a proportion of the catch trials")] = Field(
@@ -160,7 +160,7 @@ class Block(Table):
     )
     repetitions: int = Field(default=1, ge=1, le=100, description="How many times each condition is presented.")
     break_every: int | None = Field(
-        default=None, ge=1, le=10_000, description="Number of trials between two breaks; default: no breaks."
+        default=None, ge=1, le=10_000, description="Number of trials between breaks; default: no breaks."
     )
     break_page: Id | None = Field(default=None, description="The page shown during a break (a page of kind break).")
     task: Id = Field(description="What the participant does.")

@@ -389,7 +389,7 @@ class Contrast(Table):
     groups: tuple[Id, Id] | None = Field(
         default=None,
         description="The two groups to compare; if two blocks or conditions are specified, the groups are compared "
-        "in the difference between these.",
+        "on the difference between them.",
     )
     expected: Literal["higher", "lower"] | None = Field(
         default=None,
@@ -556,7 +556,7 @@ class Analysis(Table):
     looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
         default=(),
         description="Numbers of participants at which the key is opened and all hypotheses are tested; the last "
-        "number equals participants; default: once, at the end.",
+        "of these must equal the planned number of participants; default: once, at the end.",
     )
     spending: Literal["obrien-fleming", "pocock"] = later(
         default="obrien-fleming",
@@ -652,7 +652,7 @@ class Protocol(Table):
         default=None, description="Decisions about the analysis, made before the first session."
     )
     simulated_participants: SimulatedParticipants | None = later(
-        default=None, description="How simulated participants answer statements, in power analyses and rehearsals."
+        default=None, description="How simulated participants respond to statements in power analyses and rehearsals."
     )
 
     def text(self, value: str | dict[str, str], language: str) -> str:

@@ -218,10 +218,13 @@ def plain_number(value: float) -> int | float:
 def answer_problem(question: Question, answer: Value, context: Context) -> str | None:
     """Return why a value is not a valid answer, as a sentence; None if it is."""
     if isinstance(answer, bool):
-        return f"answer {answer} is neither a number nor a text: specify a number or a text"
+        return f"answer {answer} is neither a number nor text: specify a number or text"
     texts = answer if isinstance(answer, tuple) else (answer,) if isinstance(answer, str) else ()
     if (letters := sum(map(len, texts))) > _MOST_LETTERS:
-        return f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {_MOST_LETTERS:,}"
+        return (
+            f"an answer to {question.kind_id} {question.id} has {letters:,} characters: at most {_MOST_LETTERS:,} are "
+            "permitted"
+        )
     return question.problem(answer, context)
 
 

@@ -46,7 +46,7 @@ class SimulatedParticipants(Table):
     lapse_rate: Annotated[float, within(0, 0.5, "fewer than half of the answers are errors")] = Field(
         default=0.0,
         description=(
-            "Proportion of answers given in error, which are 3 points too high; used in power analyses but not in "
+            "Proportion of erroneous answers (simulated as 3 points too high); used in power analyses but not in "
             "rehearsals."
         ),
     )

@@ -43,6 +43,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal, TypeAlias, TypeVar
 
+from study_app.number_text import counted
 from study_app.protocol.streams import Draw, shuffle, study_stream
 
 
@@ -64,7 +65,7 @@ class Constraint:
         if repetitions == 1:
             return None
         if self.min_distance is not None and self.min_distance > codes:
-            possible = "one condition requires 1" if codes == 1 else f"{codes} conditions require 1 to {codes}"
+            possible = f"with {counted(codes, 'condition')} it can be at most {codes}"
             return "min_distance", f"is {self.min_distance}, but {possible}"
         if self.max_repeats is not None and codes == 1 and self.max_repeats < repetitions:
             possible = f"with one condition presented {repetitions} times it must be at least {repetitions}"

@@ -207,7 +207,8 @@ class Runner:
             self._notify_listeners()
         if isinstance(event, events.EndRequested) and stall is not None:
             raise StoreError(
-                f"{stall.reason}; the end of the session cannot be written either, so resume or end the session later"
+                f"{stall.reason}; the end of the session could not be recorded either, so resume or end the session "
+                "later"
             )
 
     def _retry_writes(self, stall: Stall) -> None:

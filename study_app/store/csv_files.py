@@ -175,7 +175,7 @@ def read_cells(table: bytes) -> list[list[str]]:
     try:
         rows = list(csv.reader(io.StringIO(table.decode("utf-8"), newline=""), strict=True)) or [[]]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise ValueError(f"is not CSV in UTF-8 ({error})") from error
+        raise ValueError(f"is not a valid UTF-8 CSV file ({error})") from error
     for number, row in enumerate(rows[1:], start=2):
         if len(row) != len(rows[0]):
             raise ValueError(f"row {number} has {len(row)} cells, not {len(rows[0])}")

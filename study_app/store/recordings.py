@@ -201,7 +201,9 @@ def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
             f"{path} is sealed until the study is unblinded: run liquid-study unblind RESULTS to open it"
         )
     if (opened := open_file(content, secret)) is None:
-        raise StoreError(f"{path} cannot be decrypted with the study's key: it was changed; restore it from a copy")
+        raise StoreError(
+            f"{path} cannot be decrypted with the study's key: it has been changed; restore it from a copy"
+        )
     return opened
 
 

@@ -75,7 +75,7 @@ class ProcessExecutor(ProcessPoolExecutor):
 
 def _lost_process() -> WorkerError:
     return WorkerError(
-        "a worker process ended unexpectedly, or could not be started (it was killed, or the memory ran out): "
+        "a worker process ended unexpectedly or could not be started (it was killed, or memory ran out): "
         "try again with fewer --workers"
     )
 

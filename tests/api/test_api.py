@@ -346,7 +346,7 @@ def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short:
     ("given", "words"),
     [
         ("third", "third"),
-        (True, "answer True is neither a number nor a text"),
+        (True, "answer True is neither a number nor text"),
         ({"which": "first"}, "'which' does not occur on this page"),
     ],
 )

@@ -445,7 +445,7 @@ def test_an_answer_of_a_plug_in_that_is_too_long_is_refused(run: Any, study_with
     )
     code, _, lines = run("rehearse", study, "--participants", 1, "--results", tmp_path / "results")
     assert code == 2
-    assert "has 5,000,000 characters: at most 5,000" in lines
+    assert "has 5,000,000 characters: at most 5,000 are permitted" in lines
     assert "toy-plug:grid" in lines
     assert run("verify", tmp_path / "results")[0] == 0
 

@@ -153,7 +153,7 @@ def test_it_verifies_with_a_note(study: Path) -> None:
     changed = StudyFolder(study).session("P001", 1).journal
     content = changed.read_bytes()
     changed.write_bytes(content.replace(b'"value":4', b'"value":5', 1))
-    assert "it was changed" in "\n".join(map(str, verify_study(study).errors))
+    assert "it has been changed" in "\n".join(map(str, verify_study(study).errors))
     changed.write_bytes(content)
 
 

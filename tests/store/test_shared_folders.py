@@ -87,7 +87,7 @@ def test_line_endings_that_git_changed_are_named(study: Path) -> None:
         if path.suffix != ".sha256":
             path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     said = [one.message for one in verify_study(study).errors]
-    assert any("line endings were changed to CR LF, as git does with core.autocrlf" in message for message in said)
+    assert any("line endings have been changed to CR LF, as git does with core.autocrlf" in message for message in said)
     assert not any("another line" in message for message in said)
 
 

@@ -187,7 +187,8 @@ def _measure_damping(
     stand.excite(_hold_excitation())
     stand.run(lasts.come_s)
     progress(
-        f"Measuring stable damping along {_AXES[axis]}: it rises to {_MOST_NSPM:g} N·s/m in {lasts.damping_s:g} s."
+        f"Measuring stable damping along {_AXES[axis]}: the damping rises to {_MOST_NSPM:g} N·s/m in "
+        f"{lasts.damping_s:g} s."
     )
     answered = ask("damping", "The measurement ends when the handle oscillates; press Enter to end it earlier.")
     stand.excite(
@@ -219,7 +220,7 @@ def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[
         "have a scale, type 'no'."
     )
     if _wait_for_answer(stand, ask("scale", request)).lower().startswith("n"):
-        progress("Force on a scale: not measured.")
+        progress("The force on a scale was not measured.")
         return None
     sent_n, shown_g = [], []
     for level_n in _LEVELS_N:

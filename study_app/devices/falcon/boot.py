@@ -338,7 +338,7 @@ def _expect_echo(line: _Line, chunk: bytes, at: int) -> None:
     if len(echo) < len(chunk):
         raise _Ended("echo", f"the bridge returned nothing from byte {at + len(echo)} of the firmware onwards")
     if len(echo) > len(chunk):
-        raise _Ended("echo", f"the bridge returned more than byte {at + len(chunk) - 1} of the firmware")
+        raise _Ended("echo", f"the bridge returned extra data after byte {at + len(chunk) - 1} of the firmware")
 
 
 def _send(transport: Transport, data: bytes, step: str) -> None:

@@ -141,8 +141,8 @@ def _solve(geometry: mechanics.Geometry, offset_rad: float, counts: Any, pulled_
         place_m[:] = mechanics.START_M
         if mechanics.forward(mechanism, theta, place_m) != mechanics.REACHED:
             raise DeviceError(
-                f"pose {row + 1}: the geometry {geometry.name!r} cannot reach the encoder counts "
-                f"{count.astype(int).tolist()}"
+                f"pose {row + 1}: the encoder counts {count.astype(int).tolist()} are impossible with the geometry "
+                f"{geometry.name!r}"
             )
         mechanics.jacobian(mechanism, theta, place_m, rates)
         pushed[row] = -rates.T @ held[row]
@@ -355,7 +355,7 @@ def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
         )
     )
     notes += _measure_round(grip, weight_n)
-    grip.wait(ask("take-off", "Take off the weight and hold the grip: its motors will now be turned off."))
+    grip.wait(ask("take-off", "Remove the weight and hold the grip: its motors will now be turned off."))
     return _as_notes(notes)
 
 
@@ -385,7 +385,7 @@ def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
         grip.wait(ask("pull", request))
         counts, units = grip.weigh()
         notes.append((counts, _read_scale(grip, ask), units))
-        grip.wait(ask("let-go", "Take off the scale and let go."))
+        grip.wait(ask("let-go", "Remove the scale and let go of the grip."))
     grip.wait(ask("take-off", "Hold the grip: its motors will now be turned off."))
     return _as_notes(notes)
 

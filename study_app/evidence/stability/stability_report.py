@@ -324,7 +324,7 @@ def in_words(verdict: Verdict) -> str:
         f"the force above 40 Hz is {verdict.fast_n:.2f} N ({verdict.played_n:.2f} N {reference})"
     )
     acted = [f"{name} {share:.1%}" for name, share in zip(LIMITER_NAMES, verdict.acted, strict=True) if share]
-    return f"{said}; limiters, in ticks: {', '.join(acted)}" if acted else said
+    return f"{said}; proportion of ticks on which each limiter was active: {', '.join(acted)}" if acted else said
 
 
 def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:

@@ -359,7 +359,7 @@ class ErrorCard(_ReadingCard):
     """The deviation of the felt setting from its reference."""
 
     def __init__(self) -> None:
-        why = "Errors would reveal the settings."
+        why = "The errors relative to the reference would reveal the settings."
         super().__init__("Error relative to the reference", label("", "small", "text2"), why)
         self.lines: list[ErrorLine] = []
         self._lines = vbox(spacing=2)

@@ -535,8 +535,8 @@ class MachinePlace(Place):
 
 def _width_sentence(settings: MachineSettings, screen: ScreenShown) -> str:
     """Return a sentence on the screen width that the system reports."""
-    known = f"The system reports {screen.width_mm:.0f} mm." if screen.width_mm > 0 else "The system does not report "
-    "the width."
+    reported = screen.width_mm > 0
+    known = f"The system reports {screen.width_mm:.0f} mm." if reported else "The system does not report the width."
     return known if settings.screen_width_mm is None else f"{known} The measured value is used instead."
 
 
@@ -545,7 +545,7 @@ def _text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: f
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:
         enlarged = f"Measure the viewing distance; text is then enlarged until an x subtends {least}."
-        return f"{enlarged} Until then, text has its default size."
+        return f"{enlarged} Until then, text is shown at its default size."
     if scale == 1.0:
         return f"Default size: an x subtends {seen:.2f}°; at least {least} is recommended."
     return f"{scale:.2f} times the default size: an x subtends {least} instead of {seen:.2f}°."

@@ -123,7 +123,9 @@ class Servo:
             The servo has stopped itself.
         """
         if not self.may_adjust(scene):
-            raise StudyError("the scene differs from the current scene in more than its numbers: load it instead")
+            raise StudyError(
+                "the scene differs from the current one in more than its numerical values: load it instead"
+            )
         return self._present(scene, goes_on=True)
 
     def may_adjust(self, scene: Scene) -> bool:

@@ -96,7 +96,8 @@ class Method(Table):
 
     order: TrackOrder = Field(
         default="interleaved",
-        description="interleaved: the tracks alternate in random order; blocked: one track follows another.",
+        description="interleaved: trials of all tracks are intermixed, in random order within each round; blocked: "
+        "each track is completed before the next one starts.",
     )
 
     tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="Number of tracks for each standard.")

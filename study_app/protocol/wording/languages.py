@@ -125,9 +125,9 @@ def _language_faults(place: str, english: Mapping[str, Any], table: Mapping[str,
         elif type(text) is not type(model) or (
             isinstance(text, list) and not all(isinstance(one, str) for one in text)
         ):
-            yield f"{place}{key} must be {'a list of texts' if isinstance(model, list) else 'a text'}"
+            yield f"{place}{key} must be {'a list of strings' if isinstance(model, list) else 'a string'}"
         elif key == "interval_coming" and len(text) != len(model):
-            yield f"{place}{key} needs {len(model)} texts"
+            yield f"{place}{key} needs {len(model)} strings"
         elif isinstance(text, str) and (wrong := _wrong_slots(text, model)):
             yield (
                 f"{place}{key} must contain the same placeholders as “{model}”; these differ: "

@@ -170,7 +170,7 @@ def allocate(
                 write_new_file(path, json.dumps(_claim_content(claim)).encode() + b"\n", waits=waits)
             except FileExistsError:  # another program claimed this entry first
                 if replaced is not None:
-                    raise StoreError(f"{path} was changed: restore it from a copy") from None
+                    raise StoreError(f"{path} has been changed: restore it from a copy") from None
                 continue
             if waits:
                 sync_folder(study.allocated)
@@ -185,7 +185,7 @@ def allocation_of(study: StudyFolder, key: Key, participant: str, entries: Entri
     entries = Entries(study) if entries is None else entries
     if (claim := entries.claim_of(participant)) is not None:
         if not is_unchanged(claim, key):
-            raise StoreError(f"{claim.path} was changed: restore it from a copy")
+            raise StoreError(f"{claim.path} has been changed: restore it from a copy")
         return _allocation(claim, key)
     if (begun := entries.begun.get(participant)) is not None:
         path = study.allocation(begun.entry, begun.group, None if begun.replaces is None else participant)

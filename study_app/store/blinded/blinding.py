@@ -458,8 +458,8 @@ def _open_event(start: events.SessionStarted, line: events.Event, key: Key) -> e
             continue
         if (measured := open_text([*_line_owner(start, line), *more], text, key.nonce, names)) is None:
             raise StoreError(
-                f"line {line.n} of the journal cannot be decrypted with the study's key: it was changed; restore it "
-                "from a copy"
+                f"line {line.n} of the journal cannot be decrypted with the study's key: it has been changed; restore "
+                "the journal from a copy"
             )
         opened |= {**measured, name: None}
     return events.read_event({**line.line(), **opened}) if opened else line

@@ -43,8 +43,8 @@ from study_app.store.journals.journal_events import EVENTS, Event, line_problem,
 
 FORMAT = 2
 _OTHER_LINE_ENDINGS = (
-    "its line endings were changed to CR LF, as git does with core.autocrlf: restore it from a copy, with the line "
-    "“* -text” in the repository's .gitattributes"
+    "its line endings have been changed to CR LF, as git does with core.autocrlf: restore it from a copy, with the "
+    "line “* -text” in the repository's .gitattributes"
 )
 """Of the journal and the receipt; since 2 the lines have ``previous``."""
 _BYTE_ORDER_MARK = "begins with a byte order mark, which an editor added: restore it from a copy"
@@ -167,7 +167,7 @@ def scan(path: Path) -> Contents:
         if wrong is None and version == study_app.__version__ and line["event"] not in EVENTS:
             wrong = f"contains the event {shorten_value(line['event'])}, which version {version} does not write"
         if wrong is not None:
-            damage = f"{path}, line {number} {wrong}: it was changed; restore it from a copy"
+            damage = f"{path}, line {number} {wrong}: it has been changed; restore the journal from a copy"
             return Contents(lines, whole_bytes, damage=damage)
         if (wrong := _chain_error(line, hashed.hexdigest(), chained=chained)) is not None:
             first = pieces[0] + b"\n"
@@ -191,14 +191,20 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
     if first and line.get("format", 1) > FORMAT:
         return f"has format {line['format']}, but this version reads {FORMAT}: use a newer version of liquid-study"
     if first and "format" not in line and "measures_sealed" in line:  # not of a version with format 1
-        return "does not contain the key format: it was changed; restore it from a copy"
+        return "does not contain the key format: it has been changed; restore the journal from a copy"
     if hash_before is None:
         needed = chained or (first and line.get("format", 1) > 1)
-        return "does not contain the key previous: it was changed; restore it from a copy" if needed else None
+        return (
+            "does not contain the key previous: it has been changed; restore the journal from a copy"
+            if needed
+            else None
+        )
     if hash_before != before:
-        return "does not match the previous line, which was changed: restore it from a copy"
+        return "does not match the previous line, which has been changed: restore the journal from a copy"
     if not (chained or first or line["event"] == "session_resumed"):
-        return "has the key previous, but earlier lines do not: they were changed; restore it from a copy"
+        return (
+            "has the key previous, but earlier lines do not, so they have been changed; restore the journal from a copy"
+        )
     return None
 
 

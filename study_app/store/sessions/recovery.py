@@ -239,7 +239,7 @@ def _refuse_truncated_journal(place: Place, lines: Sequence[events.Event]) -> No
     """Raise an error if the journal has less information than the session's other files, which would be replaced."""
     for name in events.unknown_events(lines):
         raise StoreError(
-            f"{place.folder.journal} contains events {name!r}, which this version does not know: use the "
+            f"{place.folder.journal} contains {name!r} events, which this version does not recognise: use the "
             "version that wrote them"
         )
     for path, what in (*files_beyond_journal(place, lines), *_ended_or_recorded(place, lines)):

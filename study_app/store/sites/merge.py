@@ -118,19 +118,19 @@ def merge_sites(given: Mapping[str, Path], to: Path, progress: ReportProgress | 
 
 def _check_names(given: Mapping[str, Path], merged: Merged | None) -> None:
     if not given:
-        raise StoreError("no sites were specified: specify each as A=DIR")
+        raise StoreError("no sites were specified: specify each site as A=DIR")
     used = {} if merged is None else {name.lower(): name for name in merged.names}
     for name in given:
         if not ID_PATTERN.fullmatch(name) or len(name) > _MAX_SITE_LENGTH:
             raise StoreError(
-                f"site {name!r} cannot be used as a name: use at most {_MAX_SITE_LENGTH} letters A-Z, a-z and digits "
-                "0-9, such as A or Utrecht"
+                f"{name!r} cannot be used as the name of a site: use at most {_MAX_SITE_LENGTH} letters (A-Z, a-z) and "
+                "digits (0-9), such as A or Utrecht"
             )
         if fault := file_name_fault(name):
-            raise StoreError(f"site {name!r} {fault}, so it cannot be the name of a folder: use another name")
+            raise StoreError(f"site {name!r} {fault}, so it cannot be the name of a folder: use a different name")
         if (other := used.get(name.lower())) is not None:
             held = "has already been merged" if merged is not None and other in merged.names else "is specified twice"
-            raise StoreError(f"site {name!r} {held} (case is ignored): use another name")
+            raise StoreError(f"site {name!r} {held} (case is ignored): use a different name")
         used[name.lower()] = name
 
 

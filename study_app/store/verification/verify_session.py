@@ -230,7 +230,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
             findings.error(folder.journal, f"does not contain a complete line, {_BEGUN}")
         return nothing
     for name in events.unknown_events(contents.lines):
-        findings.warning(folder.journal, f"contains events {name!r}, which this version does not know")
+        findings.warning(folder.journal, f"contains {name!r} events, which this version does not recognise")
     try:
         done = progress_of(contents.lines)
     except StoreError as error:
@@ -284,11 +284,11 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
             ),
         )
     if key is not None and not _is_protocol(held, start, key):
-        findings.error(path, "its protocol was changed: restore it from a copy")
+        findings.error(path, "its protocol has been changed: restore it from a copy")
     if receipt.has_other_format(held, start):
         findings.error(
             folder.journal,
-            f"has a different format from the one in {path.name}: it was changed; restore it from a copy",
+            f"has a different format from the one in {path.name}: it has been changed; restore the journal from a copy",
         )
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
@@ -306,7 +306,8 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     was_last = bool(steps) and steps[-1] not in breaks and left >= steps.count(steps[-1])
     if isinstance(last, events.SessionEnded) and last.status not in events.REACHED_END and was_last:
         findings.error(
-            folder.journal, (f"its status is {last.status!r}, although the last page was completed: it was changed")
+            folder.journal,
+            (f"its status is {last.status!r}, although the last page was completed: it has been changed"),
         )
 
 
@@ -379,11 +380,11 @@ def _wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
             hides = any(row.kind is not None for row in line.items)  # format 2: a question may have been hidden again
             for row in line.items:
                 if not _same_answer(row, chosen.pop(row.item, events.Answer())):
-                    wrong = "that differs from the answer chosen before: it was changed"
+                    wrong = "that differs from the answer chosen before: it has been changed"
                     yield f"{line_name} has an answer for {row.item!r} in {where} {wrong}"
             for item, answer in chosen.items():
                 if answer.given or not hides:
-                    yield f"{line_name} lacks {item!r}, answered in {where}: it was changed"
+                    yield f"{line_name} lacks {item!r}, answered in {where}: it has been changed"
         now.process_line(line)
 
 

@@ -181,15 +181,17 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
     for claim in claims(study):
         if not claim.participant:
             if claim.path.lstat().st_size:
-                findings.error(claim.path, "was changed: restore it from a copy")
+                findings.error(claim.path, "has been changed: restore it from a copy")
             else:
                 findings.warning(claim.path, "was reserved by a program that ended before writing it; it stays unused")
             continue
         if not is_unchanged(claim, key):
-            findings.error(claim.path, "was changed: restore it from a copy")
+            findings.error(claim.path, "has been changed: restore it from a copy")
         elif claim.participant in holders:
             first = holders[claim.participant].path.stem
-            findings.error(claim.path, f"is a second entry for participant {claim.participant}, who has entry {first}")
+            findings.error(
+                claim.path, f"is a second entry for participant {claim.participant}, who already has entry {first}"
+            )
         elif claim.participant not in begun and claim.participant not in withdrawn:
             findings.warning(claim.path, f"belongs to participant {claim.participant}, who does not have a session yet")
         holders.setdefault(claim.participant, claim)
@@ -225,7 +227,7 @@ def _check_withdrawals(study: StudyFolder, findings: Findings) -> tuple[dict[str
         with contextlib.suppress(StoreError):  # reported for the unreadable list
             left += unerased_files(study, participant)
         for path in left:
-            what = "is there" if path.is_dir() else f"still lists {participant}"
+            what = "still exists" if path.is_dir() else f"still lists {participant}"
             again = "the withdrawal was interrupted: run liquid-study withdraw again"
             findings.error(path, f"{what}, although {participant} withdrew; {again}")
         if not left:
@@ -317,7 +319,7 @@ def _check_copy(
             continue
         erased |= {*own, *(line for line in kept if line[1] == f"{study.exclusions.name}/sub-{participant}")}
         if (told_of := proof_of_withdrawal(tombstone)) not in kept:
-            add = "write a new proof" if proof.told else f"add the line: {checked_line(*told_of)}"
+            add = "create a new proof" if proof.told else f"add the line: {checked_line(*told_of)}"
             advice = f"if {participant} requested it, {add}"
             findings.error(study.withdrawals, f"the withdrawal of {participant} is not in {path}: {advice}")
     copy = [line for line in kept if line not in erased]
@@ -426,7 +428,8 @@ def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> N
             else:
                 findings.error(
                     study.reveals,
-                    (f"line {number} is not a record of an unblinding: it was changed; restore it from a copy"),
+                    f"line {number} is not a record of an unblinding: it has been changed; restore the file from a "
+                    "copy",
                 )
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if key is not None and record["key_hash"] != key.hash:

@@ -165,7 +165,7 @@ def test_the_folder_above_the_studies_names_them(rek: Results) -> None:
         (",immersive,statement,2,4,4,", ",immersive,", "cells, not"),
         (",immersive,statement,2,4,4,", ",immersive,statement,2,4,4,,", "cells, not"),
         (",immersive,statement,2,4,4,", "\n,immersive,statement,2,4,4,", "cells, not"),
-        (",immersive,statement,2,4,4,", ',"immersive"x,statement,2,4,4,', "is not CSV in UTF-8"),
+        (",immersive,statement,2,4,4,", ',"immersive"x,statement,2,4,4,', "is not a valid UTF-8 CSV file"),
         (",immersive,statement,2,4,4,", ",imersive,statement,2,4,4,", "does not contain the statement 'imersive'"),
         (",L1,immersive,", ",L9,immersive,", "for code 'L9'"),
         (",L1,immersive,", ",L1,feels_liquid,", "occurs twice"),

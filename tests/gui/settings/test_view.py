@@ -1,10 +1,13 @@
 """The machine's place: the display test, and what is typed."""
 
+from dataclasses import replace
+
 import pytest
 from PySide6.QtCore import Qt
 
+from study_app.gui.settings import view
 from study_app.store.workstation import MachineSettings
-from tests.gui.windows import machine, show_settings
+from tests.gui.windows import SCREENS, machine, show_settings
 
 
 @pytest.fixture
@@ -32,6 +35,12 @@ def test_what_is_being_typed_stays_if_something_else_is_set(real_place, qtbot):
     assert camera.text() == "v4l2:/dev/vid"
     qtbot.keyClick(camera, Qt.Key.Key_Escape)
     assert camera.text() == "tcp://127.0.0.1:5000"
+
+
+def test_a_screen_without_a_reported_width_is_described(real_place, monkeypatch):
+    monkeypatch.setattr(view, "screens_shown", lambda: (replace(SCREENS[0], width_mm=0.0),))
+    show_settings(real_place, MachineSettings())
+    assert real_place.editors["screen_width_mm"].below.text() == "The system does not report the width."
 
 
 @pytest.mark.parametrize(

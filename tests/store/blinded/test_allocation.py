@@ -176,7 +176,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
         begun(study.path, "P003", 2)
     third.write_text(held[2], encoding="utf-8", newline="\n")
     first.write_text(re.sub(r'(..)"}', '00"}', held[0]), encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError, match="was changed: restore it from a copy"):
+    with pytest.raises(StoreError, match="has been changed: restore it from a copy"):
         begun(study.path, "P001", 2)
     first.write_text(held[0], encoding="utf-8", newline="\n")
     key = open_or_draw_key(study.path, grouped())
@@ -189,7 +189,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert "it stays unused" in "\n".join(map(str, verify_study(study.path).warnings))
     (study.allocated / "\u00b2.json").write_text("{}", encoding="utf-8", newline="\n")  # a digit that int() refuses
     (loop := study.allocated / "006.json").symlink_to(loop)
-    assert errors() == "blinding/allocated/006.json: was changed: restore it from a copy"
+    assert errors() == "blinding/allocated/006.json: has been changed: restore it from a copy"
 
 
 def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_claimed(tmp_path: Path) -> None:

@@ -101,7 +101,7 @@ def test_a_session_that_left_its_last_page_was_not_aborted(tmp_path: Path) -> No
     forge(session / "journal.jsonl", lambda lines: lines[-1].update(status="aborted"))
     receipt.write(session / "receipt.json", receipt.read(session / "receipt.json") | {"status": "aborted"})
     cover_up(study)
-    assert "its status is 'aborted', although the last page was completed: it was changed" in told(study)
+    assert "its status is 'aborted', although the last page was completed: it has been changed" in told(study)
 
 
 def test_a_fingerprint_is_what_the_documentation_says(study: Path) -> None:

@@ -44,7 +44,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     for sentence in (
         "sub-P009/ses-01: is unfinished: you can resume it",
         "sub-P009/ses-01/journal.jsonl: it ends with an incomplete line of 5 bytes",
-        "sub-P009/ses-01/journal.jsonl: contains events 'weather', which this version does not know",
+        "sub-P009/ses-01/journal.jsonl: contains 'weather' events, which this version does not recognise",
         "sub-P009/ses-01/.receipt.json.0123abcd.tmp: is an incomplete file",
         "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
         "sub-P009/ses-01/recordings/trial-002.parquet: does not appear in the journal",
