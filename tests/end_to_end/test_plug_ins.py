@@ -422,7 +422,12 @@ VIEW = "return self._shown(GridView"
         ("task Circle", ANGLE, "angle = math.nan\n", "returned (nan, nan, 0.0), not three coordinates [m] or None"),
         ("task Circle", ANGLE, "raise SystemExit(5)\n", "SystemExit: 5"),
         ("method Limits", PRESENTED, "return 10**9", "returned 1000000000, not a whole number from 1 to 10,000"),
-        ("method Limits", LEVELS, "return ()", "levels_of of method toy-plug:limits returned (), not at least one number"),
+        (
+            "method Limits",
+            LEVELS,
+            "return ()",
+            "levels_of of method toy-plug:limits returned (), not at least one number",
+        ),
     ],
 )
 def test_a_wrong_value_is_one_line_that_names_the_plug_in(
