@@ -60,7 +60,7 @@ def draw(accuracy: Accuracy) -> Figure:
     key = textwrap.wrap(_KEY + notes, columns * _LETTERS)
     height_pt = max(panel.height_pt for panel in panels) + _FOOT_PT + _LINE_PT * len(key)
     figure = Figure(figsize=(columns * _WIDTH_PT / 72, height_pt / 72), facecolor="white")
-    places = np.atleast_1d(figure.subfigures(1, columns, wspace=0))
+    places = figure.subfigures(1, columns, wspace=0, squeeze=False)[0]
     least, most = _span(accuracy)
     for panel, place in zip(panels, places, strict=False):
         panel.draw(place, height_pt, (least, most))
