@@ -168,10 +168,10 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     with pytest.raises(StoreError, match=r"002\.json is missing, although participant P002 has entry 2"):
         begun(study.path, "P002", 2)
     second.write_text(held[0].replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
-    assert "002.json: was changed" in errors()
+    assert "002.json: has been changed" in errors()
     second.write_text(held[1], encoding="utf-8", newline="\n")
     third.write_text(held[2].replace("P003", "P004"), encoding="utf-8", newline="\n")
-    assert "was changed" in errors()
+    assert "has been changed" in errors()
     with pytest.raises(StoreError, match="restore it from a copy"):
         begun(study.path, "P003", 2)
     third.write_text(held[2], encoding="utf-8", newline="\n")

@@ -202,7 +202,7 @@ def test_verify_names_an_entry_that_was_changed(tmp_path: Path, edits: tuple[tup
     second.write_text(whole.replace('"replaces": "P001"', '"replaces": "P003"'), encoding="utf-8", newline="\n")
     assert f"{second.name}: replaces participant P003, who does not have such an entry" in _errors(study)
     second.write_text(whole.replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
-    assert f"{second.name}: was changed" in _errors(study)
+    assert f"{second.name}: has been changed" in _errors(study)
     second.unlink()
     assert f"{second.name}: is missing, although participant P002 has entry 1" in _errors(study)
     second.write_text(whole, encoding="utf-8", newline="\n")
