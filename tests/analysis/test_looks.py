@@ -123,7 +123,7 @@ def test_a_look_is_planned_and_its_alpha_is_less_than_that_of_all() -> None:
     )
     assert counts[contrast.described(), "contrast"][0, FULL] == shown > 0
     text = preregistration(protocol, "0" * 64)
-    assert "everything is tested when 6 and 12 valid sessions are complete" in text
+    assert "all tests are run when 6 and 12 valid sessions are complete" in text
     assert f"up to {first:.3g} and {last:.3g} are significant at these looks (O'Brien–Fleming alpha spending" in text
 
 
