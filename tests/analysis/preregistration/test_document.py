@@ -54,7 +54,9 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     assert "exponent 1, Weber's law" in text
     assert "weber 0.19, at 71 % correct, n = 10" in text
     assert "We plan to include 20 participants. The study ends when this number of valid sessions is complete" in text
-    assert "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±15 %." in text
+    assert (
+        "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±15 %." in text
+    )
     assert "we simulated 50 trials per standard" in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "presented again, for up to 3 presentations in total" in text
