@@ -64,7 +64,7 @@ def _take_results(camera: Camera, controller: MainController, theme: Theme) -> N
     place: Any = controller.window.place("results")
     controller.window.resize(*HOME)
     camera.until(lambda: place.view.studies, "the studies")
-    place.study_asked.emit(controller.results / STUDY)
+    place.choose_study(controller.results / STUDY)
     camera.until(
         lambda: place.view.figures and place.view.drawing is None and place.view.testing is None, "the figures"
     )

@@ -160,7 +160,7 @@ class LeaveOutDialog(Question):
             theme,
             "Exclude from the analysis",
             "The chosen session or trial is excluded from measures, figures and tests. No data are deleted: "
-            "exclusions.csv and every report state what was excluded, by whom and why.",
+            "exclusions.csv and every report state what was excluded, who excluded it and why.",
             ActionButton("minus", "Exclude", role="primary"),
             fields=(
                 choice_field(

@@ -1,4 +1,4 @@
-"""A delayed force: it comes so late, within its limits, and the table of what is left of it."""
+"""A delayed force: its lateness, its limits, and the table of the proportion that is sent."""
 
 import numpy as np
 import pytest
