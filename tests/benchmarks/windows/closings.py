@@ -49,11 +49,12 @@ from study_app.store.verification.verify_study import verify_study
 from tests.faults.support.watched_program import Person, window
 
 STUDY: Final = Path(__file__).with_suffix(".toml")
-ANSWERS: Final = 6
+ANSWERS: Final = 7
 PHASES: Final = (
     *("consent", "instructions", "trial", "questionnaire", "break", "interval", "rest of intervals", "choice"),
     *("feedback", "form", "debrief", "end"),
 )
+PAUSE: Final = "pause"
 DIALOGS: Final = {
     "end question": lambda operator: operator.ask_to_end(),
     "repeat question": lambda operator: operator.ask_to_repeat(),
@@ -84,7 +85,9 @@ def phase_of(page: Any) -> str:
             return "feedback"
         case EndPage():
             return "end"
-        case PausePage() | TroublePage():
+        case PausePage():
+            return PAUSE
+        case TroublePage():
             return ""
         case _:
             return "choice"

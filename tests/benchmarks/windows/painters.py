@@ -1,10 +1,10 @@
-"""Break each painter once, in a session in real windows or on the pages of the main window.
+"""Break each painter once, in a session in real windows, on the pages of the main window, or in a window of its own.
 
 Run as ``python -m tests.benchmarks.windows.painters``: offscreen, with the emulated Falcon. They are all painting
-methods of classes of `study_app` and of the plots that are called in a session or on a page. After an exception in one
-the force must be off where the session stopped, the exception must be in the journal or told in the main window, and
-the session must be complete once it is resumed. Prints a table and the faults, and names the painters that were not
-seen; the exit code is 1 if there are faults.
+methods of classes of `study_app` and of the plots that are called in a session or on a page; parts that appear on a
+page only in rare states are shown alone. After an exception in one the force must be off where the session stopped, the
+exception must be in the journal or told in the main window, and the session must be complete once it is resumed.
+Prints a table and the faults, and names the painters that were not seen; the exit code is 1 if there are faults.
 """
 
 import importlib
@@ -17,18 +17,31 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, Final
 
-from PySide6.QtCore import QTimer
+from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QApplication, QGraphicsItem, QStyledItemDelegate, QWidget
 
 import study_app.app.session.playing  # noqa: F401 - before `run_part` replaces the class that it derives from
+from study_app import api
+from study_app.analysis.worker_messages import FigureDrawn
 from study_app.app import main_controller
+from study_app.designer.header import NoticeCard, kept_notice
+from study_app.designer.measures.cards import _Cell
+from study_app.designer.new_study_page import _RecoveryBar, known_answers
+from study_app.designer.problems import ProblemLine, ProblemRow
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
+from study_app.gui.results.figures import _FigureView
 from study_app.gui.sessions.session_page import SessionPage
+from study_app.gui.theme.themed import remove_widget
+from study_app.gui.watch.window import _TimeLine
+from study_app.gui.widgets.cards import MaskedPanel
+from study_app.protocol.source.problems import Fault
 from study_app.session.pages import TroublePage
+from study_app.session.watch import read_watched
 from study_app.store.folders import StudyFolder
 from tests.benchmarks.windows.closings import (
+    PAUSE,
     PHASES,
     STUDY,
     Case,
@@ -42,6 +55,10 @@ from tests.benchmarks.windows.closings import (
 BROKEN: Final = "no such colour"
 PATIENCE_S: Final = 3.0
 MOST_SESSIONS: Final = 3
+PAINTED: Final = (*PHASES, PAUSE)
+SHOWN_S: Final = 0.3
+PART_PX: Final = (640, 200)
+FIGURE: Final = b'<svg xmlns="http://www.w3.org/2000/svg" width="300pt" height="150pt"><circle r="9"/></svg>'
 WINDOW_PX: Final = (1600, 1000)
 SETTLED_TICKS: Final = 60
 
@@ -97,6 +114,7 @@ class PaintersCase(Case):
         self._painting = painting
         self._painters: dict[str, list[str]] = defaultdict(list)
         self.stopped: list[str] = []  # painters after which the session stopped
+        self._paused_s = 0.0  # when the session was first paused for its own sake
         for name, phase in sorted(painters.items()):
             self._painters[phase].append(name)
 
@@ -105,6 +123,14 @@ class PaintersCase(Case):
         if self.next is None and isinstance(participant.page, TroublePage):
             self._leave(operator)  # a painter failed while the session was opened
             return True
+        if self.next is None and phase_of(participant.page) == "questionnaire" and not self._paused_s:
+            self._paused_s = time.perf_counter()
+            self._painting.phase = PAUSE  # its page may be painted before it is looked at
+            operator.ask("pause")
+            return True
+        is_shown = time.perf_counter() > self._paused_s + SHOWN_S
+        if self.next is None and phase_of(participant.page) == PAUSE and not self._due[PAUSE] and not is_shown:
+            return True  # until it is painted
         return super().look(participant, operator)
 
     def _leave(self, operator: OperatorWindow) -> None:
@@ -142,9 +168,10 @@ class PaintersCase(Case):
 
 def tour(study: Path, painting: Painting, faults: dict[str, list[str]]) -> None:
     """Visit the pages of the main window, and break each of the painters that are seen there."""
+    before = set(painting.phases)
 
     def visit(controller: main_controller.MainController) -> None:
-        steps = _tour_steps(controller, study, painting, faults)
+        steps = _tour_steps(controller, study, painting, before, faults)
         timer = QTimer(controller.window, interval=30)
         timer.timeout.connect(lambda: next(steps, None) or controller.window.close())
         timer.start()
@@ -184,12 +211,39 @@ def _views(controller: main_controller.MainController, study: Path) -> Iterator[
     controller.window.go("machine")
     controller._test_display()
     yield "display test"
+    (session,) = StudyFolder(study).sessions()
+    for part in rare_parts(session.path):
+        part.setParent(controller.window, Qt.WindowType.Window)
+        part.resize(*PART_PX)
+        part.show()
+        yield f"{type(part).__name__} alone"
+        remove_widget(part)
+
+
+def rare_parts(session: Path) -> Iterator[QWidget]:
+    """Return parts that a page has only while a problem, a notice, a known answer, or a drawn figure is shown."""
+    notice = NoticeCard(of_playing=False)
+    notice.show_notice(kept_notice("a folder"))
+    yield notice
+    fault = Fault((), "is wrong", "correct it")
+    problem = ProblemRow(
+        fault=fault, element=(), name="Study", icon="info", message=fault.message, hint=fault.hint, line=1
+    )
+    yield ProblemLine(problem, (), narrow=False)
+    yield _RecoveryBar(next(iter(known_answers().values())))
+    yield _Cell(3, "three")
+    yield _FigureView(FigureDrawn(name="figure", title="Figure", caption="", svg=FIGURE), {})
+    yield MaskedPanel("Force", "It would reveal the liquid.")
+    yield _TimeLine(read_watched(session, 1))
 
 
 def _tour_steps(
-    controller: main_controller.MainController, study: Path, painting: Painting, faults: dict[str, list[str]]
+    controller: main_controller.MainController,
+    study: Path,
+    painting: Painting,
+    before: set[str],
+    faults: dict[str, list[str]],
 ) -> Iterator[bool]:
-    before = set(painting.phases)
     for painting.phase in _views(controller, study):
         for _ in range(SETTLED_TICKS):
             yield True
@@ -210,7 +264,7 @@ def _tour_steps(
 
 def _rank(phase: str) -> int:
     """Return the order in which phases are preferred: the force is on in the trial."""
-    return 0 if phase == "trial" else PHASES.index(phase)
+    return 0 if phase == "trial" else PAINTED.index(phase)
 
 
 def run_painters(folder: Path, tell: Tell) -> None:
@@ -225,13 +279,14 @@ def run_painters(folder: Path, tell: Tell) -> None:
         case.hold()
         tell("broken while a session is opened", len(opening - painting.breaks), case.faults)
         painting.breaks.clear()
-        due = {name: phase for name, phases in seen.items() for phase in sorted(phases & set(PHASES), key=_rank)[:1]}
+        due = {name: phase for name, phases in seen.items() for phase in sorted(phases & set(PAINTED), key=_rank)[:1]}
         for number in range(MOST_SESSIONS):
             case = PaintersCase(folder / f"session-{number}", painting, due)
             case.hold()
             tell(f"broken in a session, which {len(case.stopped)} stopped", len(case.done), case.faults)
             if not (due := case.left):
                 break
+    api.unblind(folder / "dry" / "results", by="AK", reason="watching a trial again")
     toured: dict[str, list[str]] = {}
     tour(folder / "dry" / "results", painting, toured)
     tell("broken on a page of the main window", len(toured), [one for wrong in toured.values() for one in wrong])

@@ -8,6 +8,7 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QWidget
 
 from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.participant.forms.questions import SliderField
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.session.pages import ChoicePage, EndPage, QuestionnairePage, TextPage
 
@@ -20,16 +21,17 @@ def window(kind: type[W]) -> W | None:
 
 
 def answer(participant: ParticipantWindow, page: QuestionnairePage) -> None:
-    """Answer every statement, each other one with a click and those between with a digit, and confirm."""
+    """Answer every question, sliders with an arrow, every second statement with a click, the others with a digit."""
     widget: Any = participant.widget
-    points = len(page.labels)
     for number, row in enumerate(widget.fields):
         if not row.isVisible():  # on the next part of the page
             QTest.keyClick(participant.focusWidget(), Qt.Key.Key_Return)
-        if number % 2:
-            QTest.mouseClick(row.options[number % points], Qt.MouseButton.LeftButton)
+        if isinstance(row, SliderField):
+            QTest.keyClick(row.line, Qt.Key.Key_Right)
+        elif number % 2:
+            QTest.mouseClick(row.options[number % len(row.options)], Qt.MouseButton.LeftButton)
         else:
-            QTest.keyClick(row, Qt.Key(Qt.Key.Key_1 + number % points))
+            QTest.keyClick(row, Qt.Key(Qt.Key.Key_1 + number % len(row.options)))
     QTest.keyClick(widget, Qt.Key.Key_Return)
 
 
