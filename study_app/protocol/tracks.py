@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from study_app.haptics.model.overrides import value_of
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import Protocol
+from study_app.protocol.model import OF_LEVELS, Protocol
 from study_app.protocol.trials.designs import Design, default_design
 from study_app.protocol.trials.methods import Adjusting, Adjustment, Method, default_method
-from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus
+from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulus, rises
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +97,22 @@ def has_correct_answer(design: Design, stimulus: Stimulus | None) -> bool:
     """
     by_value = stimulus is not None and stimulus.level_kind == "value"
     return design.has_correct_answer and not (by_value and design.asks_for_more)
+
+
+def measures_of(protocol: Protocol, block: Block) -> tuple[str, ...]:
+    """Return the measures of `OF_LEVELS` that the answers of a block with a design determine.
+
+    An exponent needs estimates, or thresholds at two standards or more, which are on a level that is not a value.
+    """
+    design, stimulus = design_of(protocol, block), None if block.stimulus is None else stimulus_of(protocol, block)
+    measures = {"rating": {"d_prime"}, "number": {"exponent"}, "setting": {"pse"}}.get(design.reply, set())
+    if design.reply == "choice" and has_correct_answer(design, stimulus):
+        measures.add("d_prime")
+    if design.reply == "choice" and stimulus is not None and rises(stimulus, design):
+        measures.add("threshold")
+        if stimulus.level_kind != "value" and len(standards_of(protocol, block)) > 1:
+            measures.add("exponent")
+    return tuple(measure for measure in OF_LEVELS if measure in measures)
 
 
 def success_name(design: Design, stimulus: Stimulus | None) -> str:

@@ -1,6 +1,7 @@
 """Contrasts: the tests of the hypotheses that a study file states."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,13 +29,14 @@ from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import group_mean
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
-from study_app.protocol.model import Contrast, Protocol
+from study_app.protocol.model import OF_LEVELS, Contrast, Protocol
 from study_app.protocol.raters import PUBLISHED, TYPICAL
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.unblinding import unblind
 from tests.analysis.made_up import ITEMS, everybody, liquids, study
 from tests.analysis.power.test_power import felt_in
+from tests.protocol.edited_studies import text_of
 from tests.studies import quick_pdfs
 
 pytestmark = pytest.mark.slow
@@ -362,6 +364,28 @@ def grouped(text: str, measure: str, block: str, sequence: str) -> Protocol:
     contrast = f'contrasts = [{{ measure = "{measure}", blocks = ["{block}"], groups = ["a", "b"] }}]'
     groups = f"\n[groups.a]\nshare = 2\nsequence = {sequence}\n[groups.b]\nsequence = {sequence}\n"
     return parse((text.replace("[analysis]\n", f"[analysis]\n{contrast}\n") + groups).encode(), "grouped.toml")
+
+
+@pytest.mark.parametrize(
+    ("block", "measures"),
+    [
+        ("viscosity", {"threshold", "exponent", "d_prime"}),  # JNDs at two standards have a slope
+        ("detect", {"threshold", "d_prime"}),
+        ("rate", {"d_prime"}),
+        ("number", {"exponent"}),
+        ("match", {"pse"}),
+        ("pairs", {"d_prime"}),  # conditions have no levels
+    ],
+)
+def test_a_hypothesis_is_about_a_measure_that_the_design_determines(block: str, measures: set[str]) -> None:
+    _, sequence, text = re.split("sequence = (.*)", text_of("every_design"), maxsplit=1)
+    text = f"format = 2\n{text}\n[analysis]\n"
+    for measure in OF_LEVELS:
+        if measure in measures:
+            grouped(text, measure, block, sequence)
+        else:
+            with pytest.raises(ProtocolError, match=f'block "{block}" does not measure {measure}'):
+                grouped(text, measure, block, sequence)
 
 
 def test_power_tells_the_smallest_difference_between_groups() -> None:

@@ -46,6 +46,7 @@ from study_app.protocol.model import OF_LEVELS
 from study_app.protocol.orders.balance import block_orders_by_group
 from study_app.protocol.sequences import has_even_borders, row_count
 from study_app.protocol.source.document import entries, names, value_at
+from study_app.protocol.tracks import measures_of
 from study_app.protocol.trials import designs, tasks
 from study_app.protocol.wording.languages import language_name, languages_of
 
@@ -416,7 +417,7 @@ def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
     after = _form_measures(study)
     every = tuple(
         item if item.key == "conditions" else replace(item, measures=(*item.measures, *after.get(item.block, ())))
-        for item in _comparable_items(study.document)
+        for item in _comparable_items(study)
     )
     every += tuple(_interaction_sides(every))
     times = Counter(item.words for item in every)
@@ -426,14 +427,22 @@ def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
     return tuple(item for item in every if item.comparable_with(every))
 
 
-def _comparable_items(document: Mapping[str, Any]) -> Iterator[Compared]:
+def _measures_of_design(study: Study, block: str) -> tuple[tuple[str, str], ...]:
+    """Return the measures of a block with a design; all that are possible while the study has problems."""
+    formed = study.formed
+    known = OF_LEVELS if formed is None else measures_of(formed, formed.blocks[block])
+    return tuple(measure for measure in _MEASURES if measure[0] in known)
+
+
+def _comparable_items(study: Study) -> Iterator[Compared]:
+    document = study.document
     for place, block in entries(document, "blocks.*"):
         if not isinstance(block, Mapping) or block.get("phase", "main") != "main":
             continue
-        name, title, measures = str(place[1]), title_of(document, place), _MEASURES
-        if "design" in block and "stimulus" not in block:  # only blocks with levels have the others
-            measures = tuple(measure for measure in _MEASURES if measure[0] == "d_prime")
-        elif "design" not in block:
+        name, title = str(place[1]), title_of(document, place)
+        if "design" in block:
+            measures = _measures_of_design(study, name)
+        else:
             asked = entries(document, f"questionnaires.{block.get('questionnaire')}.items.*")
             items = ((item, path) for path, item in asked if isinstance(item, Mapping) and "kind" not in item)
             measures = tuple((str(item.get("id")), title_of(document, path)) for item, path in items)

@@ -13,7 +13,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
 from study_app.protocol.groups import follows
-from study_app.protocol.model import OF_LEVELS, Contrast, ExclusionRule, Protocol, Published
+from study_app.protocol.model import Contrast, ExclusionRule, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.quantities import can_vary
@@ -24,6 +24,7 @@ from study_app.protocol.tracks import (
     condition_of,
     design_of,
     has_correct_answer,
+    measures_of,
     method_of,
     present_value,
     standards_of,
@@ -188,7 +189,7 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
             yield from _check_form(protocol, contrast, contrast.form, name, place)
             continue
         items = [item.id for item in asked.statements] if asked is not None else []
-        known = OF_LEVELS if block.design is not None else items
+        known = items if block.design is None else measures_of(protocol, block)
         if contrast.measure not in known:
             yield unknown_name(
                 (*place, "measure"), f'block "{name}" does not measure {contrast.measure}', contrast.measure, known
