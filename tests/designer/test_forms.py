@@ -104,3 +104,14 @@ def test_a_field_does_not_move_while_its_row_shrinks(designer: Any) -> None:
         higher.resize(higher.width(), higher.height() + 80)
         higher.layout().activate()
         assert line.mapTo(higher, QPoint()) == before
+
+
+def test_each_trial_design_has_its_own_picture(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "toldapart")
+    (block,) = (name for name, facts in designer.study.document["blocks"].items() if "design" in facts)
+    designer.go_to("blocks", block)
+    shown = designer.field("blocks", block, "design").list
+    pictures = {shown.itemText(at).partition(" ")[0]: shown.itemIcon(at).pixmap(80, 14).toImage()
+                for at in range(shown.count()) if not shown.itemIcon(at).isNull()}  # fmt: skip
+    assert {"abx", "2ifc", "3ifc", "4ifc", "oddity", "samedifferent"} <= pictures.keys()
+    assert len({bytes(picture.constBits()) for picture in pictures.values()}) == len(pictures)

@@ -72,7 +72,7 @@ def choices_at(document: Document, place: Path) -> tuple[str, ...] | None:
 
 
 @cache
-def _designs() -> dict[str, Design]:
+def default_designs() -> dict[str, Design]:
     """Return the designs whose keys all have defaults."""
     return {
         kind: default_design(kind)
@@ -83,15 +83,15 @@ def _designs() -> dict[str, Design]:
 
 def _designs_for(block: Mapping[str, Any]) -> Iterator[str]:
     """Yield the kinds of designs that a block can have; conditions are compared with a standard."""
-    for kind, design in _designs().items():
+    for kind, design in default_designs().items():
         if "stimulus" in block or (design.has_standard and not design.adjusts):
             yield kind
 
 
 def kind_note(place: Path, kind: str) -> str:
     """Return the published name of a kind of design and its question; for a method, its rule for levels."""
-    if place[-1] == "design" and kind in _designs():
-        design = _designs()[kind]
+    if place[-1] == "design" and kind in default_designs():
+        design = default_designs()[kind]
         return f"{design.paper_name}: {LANGUAGES['en'].design_questions[design.wording]}"
     own = METHODS.own.get(kind) if place[-1] == "method" else None
     return "" if own is None else " ".join((own.__doc__ or "").split("\n\n")[0].split()).rstrip(".")

@@ -19,6 +19,7 @@ from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QPlai
 from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.document.study import Study
+from study_app.designer.form.design_list import DesignList
 from study_app.designer.form.rows import STATEMENT, FormRow, choice_label, is_right_to_left, new_element_label
 from study_app.designer.parts import FIELD_PX, Segments, cut_text, make_dense, small_button
 from study_app.gui.kit.commands import keys_of, with_key
@@ -461,7 +462,8 @@ class ChoiceField(Field):
         few = 1 < len(labels) <= MOST_SEGMENTS and sum(len(text) + 3 for text in labels) <= SEGMENT_LETTERS
         few = few and row.kind != "reference"
         self.segments = Segments(row.label) if few or row.kind == "kind" else None
-        self.list = None if few else make_dense(Choice(), row.label)
+        made = DesignList() if row.path[-1] == "design" else Choice()
+        self.list = None if few else make_dense(made, row.label)
         if self.segments is not None:
             self.segments.chosen.connect(self._choose_value)
             self.box.addWidget(self.segments)
@@ -501,6 +503,8 @@ class ChoiceField(Field):
             for at, choice in enumerate(row.choices):
                 self.list.setItemData(at, choice.sentence, Qt.ItemDataRole.ToolTipRole)
         self._values = [value for value, _ in values]
+        if isinstance(self.list, DesignList):
+            self.list.show_pictures(self._values)
         known = self._values[: len(values) - len(row.sections)]
         self.list.setCurrentIndex(known.index(shown) if shown in known else -1)
         self.list.setPlaceholderText("" if known else "There is nothing to choose yet")
