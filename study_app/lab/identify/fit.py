@@ -21,9 +21,13 @@ from study_app.haptics.model.scene import Scene
 from study_app.lab.identify.estimates import Estimates, estimate
 from study_app.lab.identify.measured_force import FlowCurve, Measured, vectors_x
 from study_app.lab.identify.parameters import Parameter, find_parameters
-from study_app.lab.identify.search import ForceProblem, Problem
+from study_app.lab.identify.search import ForceProblem, Problem, solve
 
 _FOLLOWING: Final = 0.1
+_POOR: Final = 0.5  # residual relative to the force above which the opposite sign is tried
+_CLEARLY: Final = 0.9
+_DRIVING: Final = 0.1  # noise of 10,000 rows correlates with velocity by 0.01
+_UNRELATED: Final = 0.25
 _CHANCE: Final = 5.0
 """Number of standard deviations of noise above which residuals count as correlated."""
 
@@ -56,10 +60,16 @@ class Fit(Estimates):
         """``rms_n`` relative to that of the measured force."""
         return self.rms_n / _rms(self.measured_n)
 
+    @property
+    def explained(self) -> float:
+        """The share of the measured force's mean square that the law explains, at least 0."""
+        return max(1 - self.share**2, 0.0)
+
     def summary(self) -> str:
         lasted_s = self.motion.t_s[-1] - self.motion.t_s[0]
         left = f"residual {self.rms_n:.3g} N RMS, {100 * self.share:.1f} % of the force"
-        return f"{len(self.motion.t_s)} rows over {lasted_s:.3g} s; {left}"
+        law = f"the law explains {100 * self.explained:.1f} % of its mean square"
+        return f"{len(self.motion.t_s)} rows over {lasted_s:.3g} s; {left}; {law}"
 
 
 def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, force_n: Floats) -> Fit:
@@ -80,8 +90,58 @@ def fit(scene: Scene, liquid_id: str, names: Sequence[str], motion: Motion, forc
     z, fields = estimate(problem, liquid_id, names, float(np.linalg.norm(measured.force_n)))
     fitted_n = problem.force_n(z)
     residual_n = (measured.force_n - fitted_n)[:, problem.axes]
-    fields["warnings"] += tuple(_residual_warnings(residual_n, fields["following"], measured.force_n))
+    fields["warnings"] += (
+        *_quantity_warnings(measured, problem.axes),
+        *_sign_warnings(problem, _rms(residual_n)),
+        *_residual_warnings(residual_n, fields["following"], measured.force_n),
+    )
     return Fit(**fields, motion=motion, measured_n=measured.force_n, fitted_n=fitted_n, axes=problem.axes)
+
+
+def _quantity_warnings(measured: Measured, axes: Sequence[int]) -> Iterator[str]:
+    """Yield warnings if the measured values cannot be the force of a liquid at rest on this body.
+
+    Without its constant part, such a force takes energy from the body, and it follows velocity and acceleration.
+    """
+    t_s, force_n = measured.motion.t_s, measured.force_n
+    velocity_mps = measured.motion.velocity_mps
+    if velocity_mps is None:
+        velocity_mps = np.gradient(measured.motion.position_m, t_s, axis=0)
+    varying_n = force_n - force_n.mean(axis=0)
+    size = np.linalg.norm(varying_n) * np.linalg.norm(velocity_mps)
+    along = float(np.sum(varying_n * velocity_mps)) / size if size else 0.0
+    if along > _DRIVING:
+        yield (
+            f"the measured values drive the body (their correlation with its velocity is {along:.2f}), but a liquid at "
+            "rest slows it down: specify the liquid's force on the body, not the body's force on the liquid"
+        )
+    left_n2 = 0.0
+    for axis in axes:
+        v_mps = velocity_mps[:, axis]
+        law = np.column_stack([v_mps, np.abs(v_mps) * v_mps, np.gradient(v_mps, t_s), np.ones_like(v_mps)])
+        left_n2 += float(np.sum((force_n[:, axis] - law @ np.linalg.lstsq(law, force_n[:, axis])[0]) ** 2))
+    follows = 1 - left_n2 / float(np.sum(force_n**2))
+    if follows < _UNRELATED:
+        yield (
+            f"velocity and acceleration explain only {100 * follows:.0f} % of the measured values: they may not be "
+            "the force on this body, or their times may differ from those of the motion"
+        )
+
+
+def _sign_warnings(problem: ForceProblem, rms_n: float) -> Iterator[str]:
+    """Yield a warning if the law fits a poorly fitted force better with its sign reversed."""
+    measured = problem.measured
+    size_n = _rms(measured.force_n)
+    if rms_n < _POOR * size_n:
+        return
+    mirrored = problem.with_force(-measured.force_n)
+    z, _ = solve(mirrored)
+    reversed_n = _rms(measured.force_n + mirrored.force_n(z))
+    if reversed_n < _CLEARLY * rms_n:
+        yield (
+            f"with the opposite sign of the force, the residual would be {100 * reversed_n / size_n:.0f} % of the "
+            f"force instead of {100 * rms_n / size_n:.0f} %: check the sign of the force columns"
+        )
 
 
 def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Iterator[str]:

@@ -205,6 +205,10 @@ class ForceProblem(Problem):
         if len(measured.force_n) * len(self.axes) <= len(parameters):
             raise StudyError(f"{len(measured.force_n)} rows are too few for {len(parameters)} parameters")
 
+    def with_force(self, force_n: Floats) -> "ForceProblem":
+        """Return the problem with another force (n, 3) along the same motion."""
+        return ForceProblem(self._scene, self._liquid_id, self.parameters, Measured(self.measured.motion, force_n))
+
     @property
     def columns(self) -> int:
         return len(self.axes)

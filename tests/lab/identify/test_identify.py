@@ -150,6 +150,27 @@ def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
     assert widths[0] > 20 * widths[1]
 
 
+def test_a_reversed_sign_is_noticed_and_the_explained_share_is_told():
+    force_n = noisy(OIL, REACH, 0.01)
+    right, wrong = (fit(OIL, "oil", ["viscosity_pa_s"], REACH, sign * force_n) for sign in (1, -1))
+    assert right.warnings == ()
+    assert right.explained == pytest.approx(1 - np.sum(right.residual_n**2) / np.sum(force_n**2))
+    assert right.explained > 0.99
+    assert f"the law explains {100 * right.explained:.1f} % of its mean square" in right.summary()
+    assert wrong.explained < 0.01
+    left = f"{100 * right.share:.0f} % of the force instead of {100 * wrong.share:.0f} %"
+    assert any(left in warning and "opposite sign" in warning for warning in wrong.warnings)
+    assert any("drive the body" in warning for warning in wrong.warnings)
+
+
+def test_values_that_do_not_follow_the_motion_are_no_force_on_the_body():
+    torque = np.random.default_rng(SEED).normal(0, 0.3, (len(REACH.t_s), 3))
+    found = fit(OIL, "oil", ["viscosity_pa_s"], REACH, torque)
+    assert found.explained < 0.05
+    assert any("velocity and acceleration explain only 0 %" in warning for warning in found.warnings)
+    assert not any("opposite sign" in warning for warning in found.warnings)
+
+
 def test_a_sharp_turn_that_velocities_from_places_blur_is_doubted():
     """The force is wrong for 25 ms at a turn: residuals follow one another little, but more than noise would."""
     places = measured_force.with_centred_velocity(Motion(REVERSE.t_s, REVERSE.position_m))
