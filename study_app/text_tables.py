@@ -100,9 +100,7 @@ def wrong_length(fields: Sequence[str], columns: int) -> str:
     if len(fields) < columns:
         return f"has {counted(len(fields), 'field')}, fewer than the {columns} in the header"
     if any(fields[columns:]):
-        hint = (
-            "write decimal points" if len(fields) == 2 * columns else "remove the additional fields or add column names"
-        )
+        hint = "write decimal points" if len(fields) == 2 * columns else "remove the extra fields or add column names"
         return f"has {len(fields)} fields, more than the {columns} in the header: {hint}"
     return ""
 
@@ -176,7 +174,8 @@ def rows_of(table: TextTable, places: Sequence[int]) -> list[list[float]]:
         if not any(map(readings_of, _at(first.fields, places))):
             texts = ", ".join(map(_shown, _at(first.fields, places)))
             raise ValueError(
-                f"line {first.number} does not contain a number ({texts}): remove a row of units, and use SI units"
+                f"line {first.number} does not contain a number ({texts}): if it is a row of units, remove it and use "
+                "SI units"
             )
         sign = decimal_sign_of(table.lines, places)
     return [_numbers_at(line, places, columns, sign) for line in table.lines]

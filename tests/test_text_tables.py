@@ -42,15 +42,15 @@ def test_a_table_with_one_reading_is_read(text: str) -> None:
     ("content", "said"),
     [
         (b"rate,stress\n1,5,26,7\n", "line 2: has 4 fields, more than the 2 in the header: write decimal points"),
-        (
-            b"rate,stress\n0.1,21\n2,5,28.6\n",
-            "line 3: has 3 fields, more than the 2 in the header: remove the additional",
-        ),
+        (b"rate,stress\n0.1,21\n2,5,28.6\n", "line 3: has 3 fields, more than the 2 in the header: remove the extra"),
         (b"rate;stress\n0.1;21\n\n2.5\n", "line 4: has 1 field, fewer than the 2 in the header"),
         (b"rate,stress,note\n0.1,21\n", "line 2: has 2 fields, fewer than the 3 in the header"),
         (b"rate;stress\n1,234;5,678\n", "line 2: “1,234” can be read as 1.234 or 1234: write 1.234 or 1234"),
         (b"rate;stress\n0.1;21\n2,5;28\n", "line 2: '0.1' has a decimal point, but '2,5' in line 3 has a"),
-        (b"rate,stress\n1/s,Pa\n0.1,21\n", "line 2 does not contain a number ('1/s', 'Pa'): remove a row of units"),
+        (
+            b"rate,stress\n1/s,Pa\n0.1,21\n",
+            "line 2 does not contain a number ('1/s', 'Pa'): if it is a row of units, remove it",
+        ),
         (b'rate,stress\n0.1,21\n2.5,"1,2,3"\n', "line 3: '1,2,3' is not a finite number"),
         (b"rate,stress\n0.1,21\nnan,3\n", "line 3: 'nan' is not a finite number"),
         (b"rate,stress\n0.1,21\n1_0,3\n", "line 3: '1_0' is not a finite number"),

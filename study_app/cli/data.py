@@ -48,17 +48,17 @@ from study_app.number_text import counted
     "--validator",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
     metavar="PATH",
-    help="Check that folder with this installed Psych-DS validator; the exit code is 3 if it finds faults.",
+    help="Check the Psych-DS folder with the validator at PATH; the exit code is 3 if it finds errors.",
 )
 def export(
     results: Path, to: Path, *, wide: bool, parquet: bool, sav: bool, psych_ds: bool, validator: Path | None
 ) -> None:
     """Write tidy tables for all participants, with a codebook.
 
-    The exit code is 3 if a section of the report that --psych-ds adds could not be computed.
+    The exit code is 3 if a section of the report added by --psych-ds could not be computed.
     """
     if validator is not None and not psych_ds:
-        raise click.UsageError("--validator checks the folder that --psych-ds writes: use both options")
+        raise click.UsageError("--validator checks the folder written by --psych-ds: add --psych-ds")
     from study_app.analysis.export.table_files import Extra
     from study_app.analysis.export_study import export as export_study
 
@@ -97,11 +97,11 @@ def _run_validator(validator: Path, to: Path) -> None:
 @takes_study
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write to.")
 def plot(results: Path, to: Path) -> None:
-    """Plot the responses; conditions are shown as codes until the study has been unblinded, and by name afterwards."""
+    """Plot the responses; conditions are labelled by code until the study is unblinded, and by name afterwards."""
     from study_app.analysis.report.study_figures import plot as plot_study
 
     with progress() as show:
-        show("drawing the responses")
+        show("plotting the responses")
         files = plot_study(results, to, warn=partial(click.echo, err=True))
     echo_files(files)
 
@@ -112,7 +112,7 @@ def plot(results: Path, to: Path) -> None:
 def report(results: Path, to: Path) -> None:
     """Write a study's report: tests, figures, tables, conclusions, limitations, and how to reproduce the results.
 
-    The exit code is 3 if a section could not be computed; the report names it and contains everything else.
+    The exit code is 3 if a section could not be computed; the report says which one, and contains all the others.
     """
     gc.set_threshold(50_000, 20, 100)  # collections took a tenth of the time of a report of 12
     from study_app.analysis.report.write_report import report as write_report
@@ -131,8 +131,8 @@ def report(results: Path, to: Path) -> None:
 def unblind(results: Path, by: str, reason: str) -> None:
     """Open a study's sealed key and write the sealed columns; your name, the time and the reason are recorded.
 
-    In a merged study, the command opens the key of every site; to open only one, specify that site's folder, such as
-    pooled/sites/A. If a file was left unchanged, the command states why and what to do, and the exit code is 3.
+    In a merged study, the command opens every site's key. To open only one key, specify that site's folder, such as
+    pooled/sites/A. If a file could not be changed, the command explains why and what to do, and the exit code is 3.
     """
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.unblinding import unblind_folder
@@ -174,7 +174,9 @@ def _warn_if_opened(results: Path) -> None:
     from study_app.store.unblinding import has_opened_keys
 
     if has_opened_keys(results):
-        click.echo("warning: the key is already open; the report will state that this was decided afterwards", err=True)
+        click.echo(
+            "warning: the key is open, so the report will state that this was decided after unblinding", err=True
+        )
 
 
 @click.command()
@@ -182,7 +184,7 @@ def _warn_if_opened(results: Path) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=click.IntRange(1), help="Include only this trial, if it was excluded individually.")
-@click.option("--rule", metavar="RULE", help="Keep a session that meets this rule, such as below_chance.")
+@click.option("--rule", metavar="RULE", help="Keep a session that meets this exclusion rule, such as below_chance.")
 @BY
 @REASON
 def include(
@@ -219,10 +221,10 @@ def include(
     multiple=True,
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     metavar="DIR",
-    help="Folder that contains copies of the study at any depth; the option can be repeated.",
+    help="Folder to search, with its subfolders, for copies of the study; the option can be repeated.",
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
-    """Erase a participant's data; the date, the operator, the reason and checksums remain."""
+    """Erase a participant's data; only the date, the operator, the reason and checksums are kept."""
     from study_app.store.checksums import checked_line
     from study_app.store.merged import locate_participant
     from study_app.store.withdrawals import proof_of_withdrawal
@@ -263,8 +265,8 @@ def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tu
 def merge(sites: dict[str, Path], to: Path) -> None:
     """Merge the study folders of several sites that ran the same protocol; the folders are copied unchanged.
 
-    Each site has a name, which is added in front of its IDs (A-P001), and keeps its own sealed key. Use the merged
-    folder as RESULTS in report, export, plot, verify, unblind, exclude and withdraw.
+    Each site's name is added in front of its participant IDs (A-P001), and each site keeps its own sealed key. Use the
+    merged folder as RESULTS in report, export, plot, verify, unblind, exclude and withdraw.
     """
     from study_app.store.sites.merge import merge_sites
 
@@ -373,8 +375,8 @@ def proof(
 ) -> None:
     """Print a proof of a study: one line for each session, withdrawal, unblinding and exclusion.
 
-    Keep the lines where they cannot be changed by people who can change the results; verify --fingerprints compares
-    the study with them.
+    Keep the lines where people who can change the results cannot change them; verify --fingerprints compares the study
+    with them.
     """
     from study_app.store import workstation
     from study_app.store.atomic import write_file
@@ -407,16 +409,15 @@ def replay(session: Path) -> None:
     for sentence in (*replayed.differences, *replayed.missing, *replayed.uncompared):
         click.echo(sentence)
     if not (replayed.recordings or replayed.missing or replayed.uncompared):
-        click.echo("the session did not store any recordings")
+        click.echo("no recordings were stored for this session")
     verdict = "forces differ" if replayed.differences else "all compared forces are equal"
     if not replayed.seconds:
-        verdict = "no force was compared, so the result is not confirmed"
+        verdict = "no forces could be compared, so the session has not been verified"
     if replayed.recordings:
         pace = replayed.lasted_s / replayed.computed_s if replayed.computed_s else 0.0
-        many, ran = ("1 recording", "it") if replayed.recordings == 1 else (f"{replayed.recordings} recordings", "they")
         click.echo(
-            f"{many}, {replayed.lasted_s:.1f} s, recomputed {pace:.0f} times as fast as {ran} ran "
-            f"({replayed.took_s:.1f} s in all): {verdict}"
+            f"{counted(replayed.recordings, 'recording')}, {replayed.lasted_s:.1f} s, recomputed at {pace:.0f} times "
+            f"real-time speed ({replayed.took_s:.1f} s in all): {verdict}"
         )
     else:
         click.echo(verdict)

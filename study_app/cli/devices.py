@@ -77,7 +77,13 @@ def plugins() -> None:
 
 @devices.command(cls=TakesDeviceOptions)
 @DEVICE
-@click.option("--fault", "faults", multiple=True, metavar="NAME", help="Fault of the emulated device: drop=0.01, nan …")
+@click.option(
+    "--fault",
+    "faults",
+    multiple=True,
+    metavar="NAME",
+    help="Fault to simulate with an emulated device, such as nan or drop=0.01.",
+)
 @click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for support.")
 def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: dict[str, str | Path]) -> None:
     """Examine a device: find, open and run it without force; report each fault with its cause and remedy.
@@ -154,10 +160,10 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
 def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> None:
     """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, and stable damping.
 
-    Stay within reach of the power switch: the handle moves by itself, with a force of up to 4 N. Enter, Ctrl+C and the
-    handle's stop button, if it has one, end the force. You can share the report (bench.md, bench.json); the receipts of
-    later sessions on this machine include the measurements. If somebody touched the handle, nothing is stored for
-    receipts and the exit code is 3.
+    Stay within reach of the power switch: the handle moves by itself, with a force of up to 4 N. To stop the force,
+    press Enter, Ctrl+C or the handle's stop button, if it has one. You can share the report (bench.md, bench.json); the
+    receipts of later sessions on this machine include the measurements. If somebody touched the handle, the
+    measurements are not stored for receipts, and the exit code is 3.
     """
     from study_app.devices.registry import check_options, descriptor_of
 
@@ -202,7 +208,7 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
         write_file(folder / name, content.encode())
     click.echo(f"\n{text}\nWritten: {folder / 'bench.md'}, {folder / 'bench.json'}")
     if simulated:
-        click.echo("The device is simulated: its measurements are not stored for receipts.")
+        click.echo("The device is simulated, so its measurements are not stored for receipts.")
         return
     if not results.fits:
         click.echo(
@@ -212,7 +218,9 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**workstation_results(results, day), "report": report})
     workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
-    click.echo("Saved in this machine's settings: receipts of later sessions include the results; Devices shows them.")
+    click.echo(
+        "The results were saved in this machine's settings. Receipts of later sessions and the Devices page show them."
+    )
 
 
 def _falcon_and_emulator(name: str, firmware: Path | None, grams: float | None) -> tuple[FalconDevice, Emulator | None]:
@@ -250,7 +258,7 @@ def _calibration_lines(fit: Calibration, notes: Notes) -> list[str]:
     lines += [
         "",
         f"{fit.units_per_nm:.0f} motor units per newton metre, {share:.2f} times the uncalibrated default",
-        f"offset of the arms {degrees(fit.arm_offset_rad):+.2f} degrees; weight of the grip {fit.own_weight_n:.2f} N",
+        f"arm offset {degrees(fit.arm_offset_rad):+.2f} degrees; grip weight {fit.own_weight_n:.2f} N",
         f"unexplained force {fit.residual_n:.3f} N RMS, mostly friction",
     ]
     return lines
@@ -317,7 +325,7 @@ def _ask_emulator(emulator: Emulator, weight_n: float) -> Ask:
 @click.option(
     "--samples",
     type=click.Choice((_OFF, "single-blind", "always")),
-    help="Send samples over LSL; single-blind: except in double-blind studies.",
+    help="Send samples over LSL; single-blind sends them except in double-blind studies.",
 )
 @click.option(
     "--triggers", metavar="PORT", help=("Send trigger codes to a port, such as serial:/dev/ttyUSB0; off disables them.")

@@ -80,8 +80,8 @@ _REAL = "physical2"
     "every",
     is_flag=True,
     help=(
-        "Compare the liquids in FILE (default: physical2) instead, each with its own model (force error, speed range "
-        "and computation time per tick)."
+        "Instead, print the force error, speed range and computation time per tick of each liquid in FILE (default: "
+        "physical2), with its own model."
     ),
 )
 @click.option(
@@ -90,9 +90,8 @@ _REAL = "physical2"
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, *, every: bool) -> None:
     """Compare the accuracy and computation time of a liquid's models.
 
-    FILE is a protocol or scene file; default: rek2024 and physical2.
-    Wakes are compared with their definition; models of real liquids are compared with experiments, exact solutions and
-    a solver.
+    FILE is a protocol or scene file; default: rek2024 and physical2. Wakes are compared with exact sums; models of real
+    liquids are compared with experiments, exact solutions and a fluid solver.
     """
     if every:
         exclude_each_other(liquids=every, liquid=liquid)
@@ -123,7 +122,9 @@ def _print_survey(file: str | None, to: Path | None) -> None:
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         errors = survey(load_scenes(file or _REAL), show)
     if not errors:
-        raise click.UsageError(f"{file}: none of its liquids has a viscosity, so there is no physical reference")
+        raise click.UsageError(
+            f"{file} does not specify the viscosity of any liquid, so there is no physical reference"
+        )
     _present_evidence(evidence(errors), to, with_text=False)
 
 
@@ -139,7 +140,8 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
             return thesis.get(liquid or ""), real.get(liquid or ""), ()
         known = ", ".join(dict.fromkeys([*thesis, *real]))
         raise click.UsageError(
-            f"--liquid {liquid}: the known liquids are {known}; for another one, specify the FILE that contains it"
+            f"--liquid {liquid}: the known liquids are {known}; to use another liquid, specify the FILE that contains "
+            "it"
         )
     if liquid is None:
         scenes = load_scenes(scene)
@@ -148,7 +150,7 @@ def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | N
         liquid = next(iter(scenes))
     chosen = load_scene(scene, liquid)
     if chosen.liquids[0].viscosity_pa_s is None:
-        return chosen, None, (f"{liquid} does not have a viscosity, so there is no physical reference",)
+        return chosen, None, (f"the viscosity of {liquid} is not specified, so there is no physical reference",)
     if chosen.liquids[0].drag.law == "linear":
         return chosen, None, (f"{liquid} is a linear damper, so there is no physical reference",)
     return chosen, chosen, ()
@@ -175,16 +177,16 @@ def _motion_along(path: str, scene: Scene) -> Motion:
     "--solve",
     is_flag=True,
     help=(
-        "Solve for the flow again instead of using the stored tables (20 minutes on one core, an hour if it is busy); "
-        "requires the extra cfd (NGSolve, 350 MB)."
+        "Compute the flow again instead of using the stored tables (20 minutes on an idle core, an hour on a busy "
+        "one); requires the extra cfd (NGSolve, 350 MB)."
     ),
 )
 @click.option(
     "--refit",
     is_flag=True,
     help=(
-        "Fit the constants of unsteady drag to the stored motions, and print the error for each motion, whether it "
-        "was used in the fit or not; this takes about two minutes."
+        "Fit the unsteady-drag constants to the stored motions, and print the error for every motion, including those "
+        "not used in the fit; this takes about two minutes."
     ),
 )
 @click.option(
@@ -199,8 +201,8 @@ def _motion_along(path: str, scene: Scene) -> Motion:
     "--score",
     is_flag=True,
     help=(
-        "Score the models on the benchmark for other force engines (error, time, energy supplied, tolerated delay); "
-        "this takes about five minutes."
+        "Run the benchmark for force engines (error, time, energy supplied, tolerated delay) on this program's "
+        "models; this takes about five minutes."
     ),
 )
 @takes_workers
@@ -256,7 +258,10 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the table, map, unstable cases and summary.")
 @click.option("--case", "line", metavar="LINE", help='Evaluate one case, such as "liquid=honey rate_hz=250 delay=4".')
 @click.option(
-    "--table", type=click.Path(path_type=Path), metavar="FILE", help="Measure only the table of slope limits."
+    "--table",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Measure only the slope limits, and write them to FILE.",
 )
 @click.option(
     "--withheld",
@@ -266,12 +271,12 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
 @click.option(
     "--delivered",
     is_flag=True,
-    help="Print only the error of the force that acts on the hand, with limits; this takes a minute.",
+    help="Print only the error of the force on the hand, and whether it is within its limits; this takes a minute.",
 )
 @click.option(
     "--whole",
     is_flag=True,
-    help="With --delivered: also evaluate every hand with every handle, and the liquids of all shipped studies.",
+    help="With --delivered, also evaluate all combinations of hand and handle, and the liquids of all shipped studies.",
 )
 @click.option(
     "--velocity",
@@ -282,13 +287,13 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
     "--delayed",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Measure only the proportion of a delayed force that is sent.",
+    help="Measure only the proportion of a delayed force that is sent, and write it to FILE.",
 )
-@click.option("--seed", help="Seed for the cases, used to repeat a run; default: a new seed, which is printed.")
-@click.option("--cases", type=click.IntRange(1), metavar="N", help="Simulate only N cases from each group.")
 @click.option(
-    "--only", metavar="TEXT", help='Simulate only groups with this text in their names, such as "non-Newtonian".'
+    "--seed", help="Seed for the cases. Specify a seed to repeat a run; default: a new seed, which is printed."
 )
+@click.option("--cases", type=click.IntRange(1), metavar="N", help="Simulate only N cases from each group.")
+@click.option("--only", metavar="TEXT", help='Simulate only groups whose names contain TEXT, such as "non-Newtonian".')
 @takes_workers
 def stability(
     to: Path | None,
@@ -306,10 +311,10 @@ def stability(
 ) -> None:
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable and noisy ones.
 
-    Each case has a liquid, a scale, a rate, a delay, an estimator, a device and a hand; further groups have a second
-    model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the driver of the Falcon
-    with its emulator. Ends with exit code 3 if a case is unstable with the safety layer on, or more than 1 in 10,000
-    are noisy.
+    Each case combines a liquid, a scale, a rate, a delay, an estimator, a device and a hand. Further groups test a
+    second model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the Falcon's
+    driver with an emulated Falcon. The exit code is 3 if a case is unstable with the safety layer on, or if more than 1
+    in 10,000 cases are noisy.
     """
     from study_app.evidence.stability import stability_report
     from study_app.evidence.stability.case_groups import evenly_chosen, groups, sweep
@@ -319,7 +324,7 @@ def stability(
     parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
     exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
     if whole and not delivered:
-        raise click.UsageError("--whole extends the table of --delivered: add --delivered")
+        raise click.UsageError("--whole extends the table printed by --delivered: add --delivered")
     make_output_folder(to)
     if line is not None:
         case = parse(line)
@@ -352,7 +357,7 @@ def stability(
     chosen = groups(seed, cases) if only is None else tuple(it for it in groups(seed, cases) if only in it.name)
     if not chosen:
         names = ", ".join(group.name for group in groups(seed, cases))
-        raise StudyError(f"none of the groups has {only!r} in its name; known groups: {names}")
+        raise StudyError(f"no group has a name that contains {only!r}; choose from: {names}")
     with progress() as show, executor_for(workers) as executor:
         swept = stability_report.run_sweep(
             evenly_chosen(sweep(seed), cases) if only is None else (),
@@ -369,7 +374,7 @@ def stability(
         echo_files(shown.write(to))
     for grade in (UNSTABLE, NOISY):
         if flagged := swept.of_grade(grade):
-            click.echo(f"\n{grade} with safety on; repeat a case with --case:", err=True)
+            click.echo(f"\n{grade} with safety on; to repeat a case, use --case:", err=True)
             click.echo("\n".join(str(verdict.case) for verdict in flagged), err=True)
     exit_if(swept.missed)
 
@@ -432,15 +437,15 @@ def timing(
 ) -> None:
     """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
-    The four alternate every quarter of a second, in each priority class that the system grants. Ctrl+C ends the
-    command.
+    The measurement switches between the four every quarter of a second, in each priority class that the system grants.
+    Ctrl+C ends the command.
 
     With --delays, a session presents the delays of rek2024 on 60 and 144 Hz screens, with and without load, and the
-    error of every frame's delay is computed from the session's recordings. A display is not needed.
+    error of every frame's delay is computed from the session's recordings. No display is needed.
 
     With --devices, the servo runs alternately with each emulated device and with the scripted hand. The exit code is 3
-    if, for any device, the 99th percentile of the lateness is more than 1.5 times that with the scripted hand, and the
-    whole 95 % interval for this ratio lies above 1.5.
+    if, for any device, the 99th percentile of the lateness is more than 1.5 times the value for the scripted hand, and
+    the whole 95 % interval for this ratio lies above 1.5.
 
     With --lsl, another process first receives markers and 1 kHz samples for the given time; then the servo runs
     alternately with and without both streams, for up to 300 s each. The exit code is 3 if anything is lost, if a
@@ -611,16 +616,16 @@ def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
-    """Measure how often the report's verdicts are wrong, in simulated studies with none, some or all of the effects.
+    """Measure how often the report's verdicts are wrong in simulated studies with none, some or all of the effects.
 
-    The report's own tests are applied to simulated rek2024 studies with 5, 12 and 24 participants, whose answers come
-    from the rehearsals' answer model or from an ordinal probit model with random effects. Every rate is printed with
-    its Wilson interval and with a statement of whether it meets its limit: "at most 5 %" is met if the interval ends
-    below 7.5 %, and exceeded if an interval that allows for the number of rates lies above 5 %. Hypotheses,
-    recognition, equivalence with a minority and skewed trends are tested on values drawn directly. While a rate is
-    undecided, more studies are simulated for its cell, up to four times the initial number. Ctrl+C ends the command and
-    prints the results so far. The exit code is 3 if a rate exceeds its limit; otherwise it is 4 if there are too few
-    studies to decide on every rate.
+    The report's own tests are applied to simulated rek2024 studies with 5, 12 and 24 participants. The answers come
+    from the answer model used in rehearsals or from an ordinal probit model with random effects. The command prints
+    each rate with its Wilson interval and says whether the rate meets its limit. A limit of 5 % is met if the interval
+    ends below 7.5 %, and exceeded if an interval corrected for the number of rates lies above 5 %. The tests for
+    hypotheses, recognition, equivalence with a minority and skewed trends use values drawn directly from distributions.
+    If a rate is still undecided, more studies are simulated for its cell, up to four times the initial number. Ctrl+C
+    ends the command and prints the results so far. The exit code is 3 if a rate exceeds its limit; otherwise it is 4 if
+    there are too few studies to decide on every rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.evidence.report_rates.simulation import Rate, evidence, validate
@@ -666,13 +671,13 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
-    """Recover known thresholds of simulated observers, with methods and analysis alone, then with the whole program.
+    """Recover simulated observers' known thresholds, first with methods and analysis only, then with the whole program.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
-    analyses many studies with 20 observers whose thresholds differ by a factor of 1.2; in magnitude estimation, the
-    exponent is known instead. It then rehearses three participants with the servo, files, unblinding and analysis.
-    Every value is printed with its limit; the interval in brackets allows for the number of values. The exit code is 3
-    if an interval lies beyond its limit.
+    analyses many studies with 20 observers whose thresholds differ by a factor of 1.2. For magnitude estimation, the
+    exponent is known instead. The command then rehearses three participants with the servo, files, unblinding and
+    analysis. Every value is printed with its limit; the interval in brackets is corrected for the number of values. The
+    exit code is 3 if an interval lies beyond its limit.
     """
     from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
     from study_app.evidence.thresholds.known_values import validate as validate_values

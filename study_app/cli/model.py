@@ -36,7 +36,7 @@ _INITIAL = click.option(
 def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, ...]) -> None:
     """Compute the force along a motion as the servo would, tick by tick, without a device or a clock.
 
-    Each row of the motion is one tick, so the rows must be at the scene's rate (1 kHz unless it sets rate_hz).
+    Each row of the motion is one tick, so the rows must be sampled at the scene's rate (1 kHz unless rate_hz is set).
     """
     from study_app import api
     from study_app.store import csv_files

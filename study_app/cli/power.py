@@ -25,7 +25,7 @@ def _parse_numbers(value: str, least: int, most: int, what: str) -> tuple[int, .
     except ValueError as error:
         raise click.BadParameter(f"{value!r} is not a list of numbers: specify {what}, such as 5,8,12") from error
     if not numbers or numbers[0] < least or numbers[-1] > most:
-        raise click.BadParameter(f"{value!r}: specify {what} from {least} to {most}, such as 5,8,12")
+        raise click.BadParameter(f"{value!r} is out of range: specify {what} from {least} to {most}, such as 5,8,12")
     return tuple(numbers)
 
 
@@ -69,15 +69,15 @@ def power(
     seed: int,
     to: Path | None,
 ) -> None:
-    """Estimate the power of the protocol's own tests and the smallest detectable difference from simulated studies.
+    """Simulate studies to estimate the power of the protocol's own tests and the smallest detectable difference.
 
-    Four sessions are rehearsed to obtain the features of each condition; thousands of participants are then simulated
-    with the rehearsals' answer model, which is plausible but not based on measurements. Power is printed for typical
-    participants, or for the values in [simulated_participants], with the range across consistent, typical and noisy
-    participants. For a study of thresholds, d′, ratings or magnitude estimation, the command prints, for each number of
-    participants and of trials, the standard deviation of one participant's estimate, the half-width of the group's 95 %
-    interval, and the proportion of studies that reach analysis.precision. Ctrl+C ends the command and prints the
-    results so far.
+    Four sessions are rehearsed to obtain the features of each condition. Thousands of participants are then simulated
+    with the answer model used in rehearsals, which is plausible but not based on measurements. Power is printed for
+    typical participants, or for the values in [simulated_participants], with the range across consistent, typical and
+    noisy participants. For a study of thresholds, d′, ratings or magnitude estimation, the command prints three values
+    for each number of participants and trials: the standard deviation of one participant's estimate, the half-width of
+    the group's 95 % interval, and the proportion of studies that reach analysis.precision. Ctrl+C ends the command and
+    prints the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)
@@ -100,7 +100,8 @@ def power(
     stated = click.get_current_context().get_parameter_source("sizes") is not ParameterSource.DEFAULT
     if stated and study.analysis is not None and (looks := study.analysis.looks):
         raise click.UsageError(
-            f"--sizes cannot be used, because the study plans looks at {', '.join(map(str, looks))}: omit it"
+            f"--sizes cannot be used, because the study plans interim looks at {', '.join(map(str, looks))} "
+            "participants: omit --sizes"
         )
     sizes = sizes if stated else planned_sizes(study)
     estimate: PowerEstimate | None = None
@@ -123,7 +124,7 @@ def power(
     if estimate is not None:
         _write_estimate(estimate, to)
     if cancelled:
-        click.echo("ended early" if estimate else "ended before the first studies had been completed", err=True)
+        click.echo("ended early" if estimate else "ended before the first studies were complete", err=True)
         click.get_current_context().exit(EXIT_CANCELLED)
 
 
@@ -147,7 +148,7 @@ def _write_estimate(estimate: PowerEstimate, to: Path | None) -> None:
 @click.command()
 @FILE
 @click.option(
-    "--power", "computed", type=Target(), metavar="DIR", help="Folder written by power --to, whose tables are included."
+    "--power", "computed", type=Target(), metavar="DIR", help="Folder written by power --to; its tables are included."
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for preregistration.md; default: print it.")
 def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:

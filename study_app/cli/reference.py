@@ -22,7 +22,7 @@ from study_app.protocol.warnings import delayed_force
 PROGRAM = "liquid-study"
 _LEAST_DELAY_MS = 10
 _LOOPS = (("kalman", "light"), ("ewma", "light"), ("kalman", "middle"), ("kalman", "firm"))
-_DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "simulated: its hand moves by itself"}
+_DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "simulated: the hand moves by itself"}
 
 
 def kinds_markdown() -> str:

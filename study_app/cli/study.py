@@ -39,14 +39,14 @@ _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Nam
     is_flag=False,
     flag_value="protocol",
     type=click.Choice(["protocol", "journal"]),
-    help="Print the JSON Schema for protocol files, or for the lines of a session's journal, instead.",
+    help="Instead, print the JSON Schema for protocol files, or for the lines of a session's journal.",
 )
 @click.option(
     "--delay-ticks",
     type=click.IntRange(1, MOST_DELAY),
     default=ASSUMED_TICKS,
     show_default=True,
-    help="Force delay [ticks] assumed when levels are checked; the pre-flight check uses the device's measured delay.",
+    help="Force delay [ticks] to assume when checking levels; the pre-flight check uses the device's measured delay.",
 )
 def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None:
     """Describe the study or the scenes in a file, or list every problem in it with a line number and a hint."""
@@ -95,9 +95,9 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
 def upgrade(path: Path) -> None:
     """Convert study files, liquid files and results from earlier versions to the current format.
 
-    PATH is a file or a folder. Forces and the order of trials stay the same; the original of each file is kept next to
-    it, as NAME.toml.format-1. The tables of results are rewritten with the current columns; journals and receipts are
-    not changed.
+    PATH is a file or a folder. Forces and the order of trials stay the same. Each original file is kept in the same
+    folder, as NAME.toml.format-1. Result tables are rewritten with the current columns; journals and receipts are not
+    changed.
     """
     from study_app.store.upgrade import upgrade as upgrade_files
 
@@ -170,14 +170,16 @@ def design(protocol: str, participants: int, first: str, seed: int) -> None:
 @FILE
 @click.option("--participant", metavar="ID", required=True, help="Participant ID (letters and digits), such as P007.")
 @SESSION
-@click.option("--seed", type=SEED, help="Seed for all random choices; default: drawn at random, shown and recorded.")
+@click.option(
+    "--seed", type=SEED, help="Seed for all random choices; default: a random seed, which is shown and recorded."
+)
 @click.option("--device", cls=DeviceName, default=DEFAULT_DEVICE, show_default=True, help="Haptic or input device.")
 @click.option("--language", metavar="LANG", help="Language of the pages; default: the protocol's first language.")
 @_OPERATOR
 @click.option(
     "--row-of",
     metavar="ID",
-    help="ID of the participant being replaced, whose order (and position in the group) is used.",
+    help="ID of the participant being replaced, whose trial order (and position in the group) is used again.",
 )
 @click.option("--group", metavar="GROUP", help="The participant's group, if the study has pre-existing groups.")
 @_WINDOWED
@@ -212,8 +214,8 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
     is_flag=True,
     help=(
         "Simulate thousands of participants in seconds, to try out an analysis. Four sessions are rehearsed but not "
-        "stored; each participant's answers are then derived from the features of one of them. Columns that hold "
-        "measurements contain n/a. Sessions are written without waiting for the disk."
+        "stored; each participant's answers are then derived from the features of one of them. Measurement columns "
+        "contain n/a. Sessions are written without waiting for the disk."
     ),
 )
 @click.option(
@@ -323,8 +325,8 @@ def studies() -> None:
 def language(code: str) -> None:
     """Check the translation of the participants' texts in the file WORKSPACE/languages/CODE.toml.
 
-    CODE consists of two letters, such as es. If the file does not exist, the command creates it with a line for each
-    text and the English text as a comment.
+    CODE is a two-letter language code, such as es. If the file does not exist, the command creates it with a line for
+    each text and the English text as a comment.
     """
     from study_app.errors import StudyError
     from study_app.protocol.wording.languages import SHIPPED, language_template, read_language
@@ -394,7 +396,7 @@ _SECTIONS_SHOWN: Final = 5
 def docs(search_words: tuple[str, ...]) -> None:
     """Print a documentation page, such as data-dictionary, or the section that best matches the search words.
 
-    Without an argument it prints the names of all pages.
+    Without an argument, the command lists all pages.
     """
     from study_app import documentation
 

@@ -12,10 +12,10 @@ from study_app.devices.descriptor import READY, Backend, DeviceDescriptor, Devic
 _FIRMWARE: Final = DeviceOption(
     name="firmware",
     title="Falcon's firmware",
-    help="The Falcon's firmware file, needed if the Falcon has been switched off since its last use. The Falcon's "
-    "owner has this file.",
+    help="The Falcon's firmware file, needed if the Falcon has been switched off since its last use. The file came "
+    "with the Falcon's software.",
     about="A Falcon needs its firmware each time it is turned on, and the licence does not allow us to supply it. "
-    "Choose your own firmware file; it is loaded only if the Falcon needs it.",
+    "Choose the file that came with your Falcon; it is loaded only if the Falcon needs it.",
     hint="loaded only if the Falcon needs it",
     placeholder="Not needed if the firmware is already loaded",
     file_filter="Firmware (*.bin);;All files (*)",

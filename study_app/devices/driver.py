@@ -163,7 +163,7 @@ class FramedDevice(Device):
             self.close()
         if self.exchange.inside:
             raise DeviceError(
-                f"a call to the device '{self.name}' does not return: turn the device off, and restart this program"
+                f"a call to the device '{self.name}' has not returned: turn the device off, and restart this program"
             )
         self.connection = self._connect()
         try:

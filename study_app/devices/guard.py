@@ -77,8 +77,8 @@ class Guard:
             child.wait()
             _close(child)
             raise DeviceError(
-                f"the guard process for the device '{self._name}' does not start, so forces cannot be sent: reinstall "
-                "liquid-study"
+                f"the guard process for the device '{self._name}' could not be started, so forces cannot be sent: "
+                "reinstall liquid-study"
             )
         self.child = child
         refuse_suspension(self)

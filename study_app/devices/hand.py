@@ -248,7 +248,8 @@ class HandOrders:
             raise DeviceError(f"a motion's times and positions must be numbers: {error}") from error
         if times.ndim != 1 or times.size == 0 or places.shape != (times.size, 3):
             raise DeviceError(
-                f"a motion needs times (n,) and positions (n, 3) with n > 0, not {times.shape} and {places.shape}"
+                "the times of a motion must have the shape (n,) and the positions (n, 3), with n > 0, not "
+                f"{times.shape} and {places.shape}"
             )
         if not (np.isfinite(times).all() and np.isfinite(places).all()):
             raise DeviceError("a motion's times and positions must be finite numbers")

@@ -192,4 +192,4 @@ def test_the_sizes_of_power_are_the_looks(tmp_path: Path) -> None:
     file.write_text(LOOKED, encoding="utf-8", newline="\n")
     result = CliRunner().invoke(commands, ["power", str(file), "--sizes", "5,10"])
     assert result.exit_code == 2
-    assert "the study plans looks at 6, 12: omit it" in " ".join(result.output.split())
+    assert "the study plans interim looks at 6, 12 participants: omit --sizes" in " ".join(result.output.split())

@@ -104,13 +104,13 @@ def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkey
         done = CliRunner().invoke(commands, ["replay", "ses-01"])
         return done.exit_code, done.output
 
-    nothing = "no force was compared, so the result is not confirmed\n"
-    assert replayed(0) == (3, f"the session did not store any recordings\n{nothing}")
+    nothing = "no forces could be compared, so the session has not been verified\n"
+    assert replayed(0) == (3, f"no recordings were stored for this session\n{nothing}")
     assert replayed(0, uncompared=("trial 1 is lost",)) == (3, f"trial 1 is lost\n{nothing}")
-    same = "1 recording, 10.0 s, recomputed 100 times as fast as it ran (1.5 s in all): "
+    same = "1 recording, 10.0 s, recomputed at 100 times real-time speed (1.5 s in all): "
     assert replayed(1) == (0, f"{same}all compared forces are equal\n")
     assert replayed(1, seconds=0, uncompared=("a gap",)) == (3, f"a gap\n{same}{nothing}")
-    same = same.replace("it ran", "they ran").replace("1 recording, 10.0", "2 recordings, 20.0")
+    same = same.replace("1 recording, 10.0", "2 recordings, 20.0")
     assert replayed(2, uncompared=("a gap",)) == (0, f"a gap\n{same}all compared forces are equal\n")
     assert replayed(2, missing=("a file",)) == (3, f"a file\n{same}all compared forces are equal\n")
     differ = f"trial 1 differs\ntrial 2 has a gap\n{same}forces differ\n"

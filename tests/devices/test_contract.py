@@ -373,7 +373,7 @@ def test_a_call_that_outlasts_closing_ends_the_force_when_it_returns(
     assert entered.wait(30)
     subject.device.close()
     assert not subject.is_quiet()  # what the call uses is still there
-    with pytest.raises(DeviceError, match="does not return"):
+    with pytest.raises(DeviceError, match="has not returned"):
         subject.device.open()
     release.set()
     call.join(30)

@@ -112,7 +112,7 @@ def test_it_is_installed_and_uninstalled(built: Path, tmp_path: Path) -> None:
     assert code == 2
     assert program("run", str(STUDY), "--participant", "P001", "--windowed") == (2, [first, *problems])
     assert [line.partition(": ")[2] for line in problems] == [
-        f'{place}.kind: "{PACKAGE}:{name}" is a {kind} of the plug-in {PACKAGE}, which is not installed '
+        f'{place}.kind: "{PACKAGE}:{name}" is a {kind} from the plug-in {PACKAGE}, which is not installed '
         f"(pip install {PACKAGE})"
         for place, kind, name in (
             ("methods.limits", "method", "limits"),
@@ -131,7 +131,7 @@ def test_the_designer_names_a_plug_in_that_is_not_installed(
         STUDY.read_text("utf-8").replace('name = "plugins"', 'name = "kitchen"'), encoding="utf-8", newline="\n"
     )
     designer.open("kitchen", "tasks", "circle")
-    missing = f'"{PACKAGE}:circle" is a task of the plug-in {PACKAGE}, which is not installed (pip install {PACKAGE})'
+    missing = f'"{PACKAGE}:circle" is a task from the plug-in {PACKAGE}, which is not installed (pip install {PACKAGE})'
     assert designer.form_row("tasks", "circle", "kind").row.faults == (missing,)
     designer.close()
 

@@ -357,7 +357,8 @@ class Stand:
                 if may_end:
                     break
                 raise DeviceError(
-                    f"the bench ended because {self.ended}; the force is zero: check the device, then start again"
+                    f"the bench test stopped because {self.ended}; the force is zero: check the device, then start "
+                    "again"
                 )
         return np.concatenate(taken).view(np.recarray) if taken else self._reader.read(), answer
 

@@ -52,12 +52,12 @@ _LEVELS_N: Final = (0.0, 1.0, 2.0, 3.0, 1.0)
 _PATIENCE_S: Final = 600.0
 _FORMAT: Final = 1
 _NOT_FREE: Final = (
-    f"Mass, damping and friction explain less than {100 * _LEAST_EXPLAINED:g} % of the force: somebody touched the "
-    f"handle, or it hit an end stop. Measure again."
+    f"Mass, damping and friction explain less than {100 * _LEAST_EXPLAINED:g} % of the force: somebody may have "
+    "touched the handle, or it may have hit an end stop. Measure again."
 )
 _ENDED: Final = {
     "oscillation": "it oscillated",
-    "operator": "the operator stopped it",
+    "operator": "stopped by the operator",
     "most": "stable up to the largest damping tried",
 }
 
@@ -209,18 +209,20 @@ def _measure_damping(
     if ended is None:
         return StableDamping(reached, "most" if answer is None else "operator")
     if ended != ENDED[OSCILLATES]:
-        raise DeviceError(f"the bench ended because {ended}; the force is zero: check the device, then start again")
+        raise DeviceError(
+            f"the bench test stopped because {ended}; the force is zero: check the device, then start again"
+        )
     return StableDamping(reached, "oscillation")
 
 
 def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[str], object]) -> Gain | None:
     """Push down on a scale and ask for its reading."""
     request = (
-        "Rest the handle, near the middle of its range, on a kitchen scale, and set the scale to zero. If you do not "
-        "have a scale, type 'no'."
+        "Rest the handle on a kitchen scale, near the middle of the handle's range, and set the scale to zero. If you "
+        "do not have a scale, type 'no'."
     )
     if _wait_for_answer(stand, ask("scale", request)).lower().startswith("n"):
-        progress("The force on a scale was not measured.")
+        progress("The force was not measured with a scale.")
         return None
     sent_n, shown_g = [], []
     for level_n in _LEVELS_N:
@@ -229,7 +231,7 @@ def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[
         stand.excite(Excitation(push_n=(0.0, -level_n, 0.0), reach_m=_SLIP_M))
         samples, _ = stand.run(lasts.push_s)
         answer = _wait_for_answer(
-            stand, ask("grams", f"The device pushes down with {level_n:g} N: what does the scale show, in grams?")
+            stand, ask("grams", f"The device is pushing down with {level_n:g} N. What does the scale show, in grams?")
         )
         shown_g.append(_grams(answer))
         sent_n.append(-float(samples.device_force_n[-len(samples) // 4 :, 1].mean()))
@@ -240,7 +242,7 @@ def _measure_gain(stand: Stand, lasts: Durations, ask: Ask, progress: Callable[[
 def _wait_for_answer(stand: Stand, answered: Callable[[], str | None]) -> str:
     _, answer = stand.run(_PATIENCE_S, answered=answered)
     if answer is None:
-        raise DeviceError(f"there was no answer within {_PATIENCE_S:g} s, so the bench ended; the force is zero")
+        raise DeviceError(f"there was no answer within {_PATIENCE_S:g} s, so the bench test stopped; the force is zero")
     return answer
 
 
@@ -249,7 +251,7 @@ def _grams(answer: str) -> float:
         return float(answer.replace(",", ".").removesuffix("g").strip())
     except ValueError:
         raise DeviceError(
-            f"'{answer}' is not a scale reading, so the bench ended: enter a number of grams, such as 102"
+            f"'{answer}' is not a scale reading, so the bench test stopped: enter a number of grams, such as 102"
         ) from None
 
 
@@ -297,9 +299,9 @@ def _lines(results: Found, day: str) -> Iterator[str]:
     least, most = regular.delay_ticks
     delay = f"{least}" if least == most else f"{least} to {most}"
     yield (
-        f"{regular.ticks} ticks; {100 * regular.new_share:.2f} % had a new position, and new positions were at "
-        f"most {regular.longest_gap_ms:.2f} ms apart; the driver's delay was {delay} ticks; {results.overruns} "
-        "overruns."
+        f"Of {regular.ticks} ticks, {100 * regular.new_share:.2f} % had a new position; new positions were at most "
+        f"{regular.longest_gap_ms:.2f} ms apart. The driver's delay was {delay} ticks. The servo skipped "
+        f"{results.overruns} deadlines."
     )
     yield from ("", "## At rest, without force", "", "| | x | y | z |", "| --- | ---: | ---: | ---: |")
     yield f"| standard deviation of the position [µm] | {_row(still.position_um, 2)} |"
@@ -310,8 +312,8 @@ def _lines(results: Found, day: str) -> Iterator[str]:
         ("apparent mass [kg]", "mass_kg", 3),
         ("damping [N·s/m]", "damping_nspm", 2),
         ("Coulomb friction [N]", "friction_n", 3),
-        ("delay between sending a force and motion [ms]", "delay_ms", 1),
-        ("encoder count, estimated from the noise in motion [µm]", "count_um", 1),
+        ("delay from force command to motion [ms]", "delay_ms", 1),
+        ("size of an encoder count, estimated from the noise during motion [µm]", "count_um", 1),
         ("proportion of force variance explained", "explained", 4),
     ):
         yield f"| {label} | {_row(tuple(getattr(motion, name) for motion in results.motions), digits)} |"
@@ -322,8 +324,8 @@ def _lines(results: Found, day: str) -> Iterator[str]:
         yield f"| {axis} | {damping.damping_nspm:.0f} | {_ENDED[damping.ended]} |"
     yield from (
         "",
-        "The handle was free while the damping was increased; more than "
-        f"{_SHAKE_N:g} N RMS above 20 Hz counts as oscillation.",
+        f"The handle was free while the damping was increased; a force of more than {_SHAKE_N:g} N RMS above 20 Hz "
+        "counts as oscillation.",
     )
     yield from ("", "## Force on a scale", "")
     gain = results.gain

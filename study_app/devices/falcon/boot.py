@@ -83,7 +83,7 @@ def _refuse_other_files(data: bytes) -> None:
     if begin.startswith(b"version https://git-lfs"):
         raise _refusal("it is only a Git LFS pointer: fetch the file itself with 'git lfs pull'")
     if begin.startswith(b":") or _HEX_DUMP.fullmatch(data):
-        raise _refusal("it is a hex dump, the bytes as text: use the binary file")
+        raise _refusal("it is a hex dump (bytes written as text): use the binary file")
 
 
 def _refuse_wrong_header(data: bytes) -> None:
@@ -95,7 +95,7 @@ def _refuse_wrong_header(data: bytes) -> None:
     if key != BOOT_KEY:
         raise _refusal(f"it begins with the key 0x{key:04X}, not 0x{BOOT_KEY:04X}")
     if any(reserved):
-        raise _refusal("its header contains other values where zeros are required")
+        raise _refusal("its header contains other values in fields that must be zero")
 
 
 def _blocks(data: bytes) -> tuple[Block, ...]:

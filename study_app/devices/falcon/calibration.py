@@ -84,7 +84,9 @@ def fit(
     """
     counts, pulled_n, held = (np.asarray(given, np.float64) for given in (poses, forces_n, units))
     if counts.shape != pulled_n.shape or counts.shape != held.shape or counts.ndim != 2 or counts.shape[1:] != (3,):
-        raise DeviceError("a calibration needs three encoder counts, force components and motor values for each pose")
+        raise DeviceError(
+            "a calibration needs three encoder counts, three force components and three motor values for each pose"
+        )
     if len(counts) < _LEAST_POSES:
         raise DeviceError(
             f"a calibration needs at least {_LEAST_POSES} poses, not {len(counts)}: measure at more positions"
@@ -108,7 +110,7 @@ def fit(
         raise DeviceError(
             f"these weights imply {gain:.0f} motor units per newton metre and an arm offset of "
             f"{math.degrees(offset_rad):.1f} degrees; only {_GAINS[0]:.0f} to {_GAINS[1]:.0f} units and less than 15 "
-            "degrees are plausible: check the weights, and make sure that nothing touches the grip"
+            "degrees are plausible: check the weights, and make sure that nothing is touching the grip"
         )
     residual_n = math.sqrt(float(left @ left) / len(counts))
     day = (measured or date.today()).isoformat()
@@ -323,8 +325,8 @@ class Grip:
             if still >= _STILL_TICKS:
                 return
         raise DeviceError(
-            "the grip does not come to rest: make sure that nothing touches it, hang the weight on a short string, "
-            "and start again"
+            "the grip does not come to rest: make sure that nothing is touching it, hang the weight on a short "
+            "string, and start again"
         )
 
     def weigh(self) -> tuple[Any, Any]:
@@ -355,7 +357,7 @@ def measure_with_weight(grip: Grip, weight_n: float, ask: Ask) -> Notes:
         )
     )
     notes += _measure_round(grip, weight_n)
-    grip.wait(ask("take-off", "Remove the weight and hold the grip: its motors will now be turned off."))
+    grip.wait(ask("take-off", "Remove the weight and hold the grip: the motors will now be turned off."))
     return _as_notes(notes)
 
 
@@ -386,7 +388,7 @@ def measure_with_scale(grip: Grip, ask: Ask) -> Notes:
         counts, units = grip.weigh()
         notes.append((counts, _read_scale(grip, ask), units))
         grip.wait(ask("let-go", "Remove the scale and let go of the grip."))
-    grip.wait(ask("take-off", "Hold the grip: its motors will now be turned off."))
+    grip.wait(ask("take-off", "Hold the grip: the motors will now be turned off."))
     return _as_notes(notes)
 
 
@@ -401,7 +403,7 @@ def _read_scale(grip: Grip, ask: Ask) -> float:
             load_n = -1.0
         if 0.0 < load_n <= MOST_N:
             return load_n
-        question = f"'{reading}' is not a number of grams above 0 and up to 600. What did the scale show?"
+        question = f"'{reading}' is not a number of grams between 0 and 600. What did the scale show?"
 
 
 def _as_notes(notes: list[tuple[Any, float, Any]]) -> Notes:

@@ -460,7 +460,7 @@ def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     why = ""
     if None in serials:
         cause = failures_on(platform).mode("driver" if platform == "win32" else "permission").cause
-        why = f"one of them does not report its serial number, perhaps because {cause}: run liquid-study devices doctor"
+        why = f"one Falcon does not report its serial number, perhaps because {cause}: run liquid-study devices doctor"
     return Backend(
         "falcon", by, state="connected: " + ", ".join(serial or "unnamed" for serial in serials), can=can, why=why
     )

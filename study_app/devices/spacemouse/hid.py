@@ -158,7 +158,7 @@ def choose_interface(interfaces: list[tuple[Model, dict[str, Any]]]) -> tuple[Mo
     """Return the first interface that reports motion; an interface without usage information counts as such."""
     if not interfaces:
         raise DeviceNotFound(
-            "no SpaceMouse is connected: connect one or turn it on; the known models are "
+            "no SpaceMouse is connected: connect one or turn it on; the supported models are "
             + ", ".join(m.name for m in MODELS)
         )
     usages = [(interface.get("usage_page") or 0, interface.get("usage") or 0) for _, interface in interfaces]

@@ -79,9 +79,9 @@ def draw(accuracy: Accuracy) -> Figure:
 
 
 _KEY: Final = (
-    "Points show each model's largest error across its references; a thin line extends to the smallest. "
-    "The ring marks the model that the program runs. Connected points are models for which no other model is both "
-    "faster and more accurate. The effect of fewer ticks per second on stability is not shown. "
+    "Points show each model's largest error across its references; a thin line extends to the smallest. The ring "
+    "marks the model that the program uses. No other model is both faster and more accurate than a connected one. The "
+    "effect of fewer ticks per second on stability is not shown. "
 )
 
 
@@ -102,7 +102,7 @@ def _draw_acting(figure: FigureBase, accuracy: Accuracy, height_pt: float) -> No
     _write_heading(
         figure,
         "Error of the force on the hand, including the delay",
-        f"{accuracy.acting_liquid}; a middle hand moves a 0.2 kg handle randomly, at about 1.6 Hz and with the power "
+        f"{accuracy.acting_liquid}; a typical hand moves a 0.2 kg handle randomly, at about 1.6 Hz and with the power "
         "of a ±20 mm oscillation. Numbers: ticks of delay. Bars: smallest error of any linear estimator.",
         height_pt,
     )
@@ -179,10 +179,10 @@ class _Panel:
         self._strip = [row for row in self._points.values() if row.error.rms < _ROUNDED]
         names = ", ".join(dict.fromkeys(row.truth for row in rows))
         if self._numerical:
-            self._heading = "Numerical error: compared with the exact sums"
+            self._heading = "Numerical error, relative to exact sums"
             text = f"{rows[0].liquid}, {accuracy.motion}; drag{' and wake' if self._strip[1:] else ''} summed exactly"
         else:
-            self._heading = "Physical error: compared with references"
+            self._heading = "Physical error, relative to references"
             text = f"{rows[0].liquid}; {names}"
         self._text = text
         self._top_pt = 6 + _HEADING_PT + _LINE_PT * len(textwrap.wrap(text, _LETTERS)) + 13
@@ -372,13 +372,13 @@ def evidence(accuracy: Accuracy) -> Evidence:
 
 
 _WHAT: Final = (
-    "Times are computation times of one thread, without the time taken by other programs: the median and the 99th "
-    "percentile of batches of 1,000 ticks, each as the median over the repeats of one interleaved run. RMS errors are "
-    "given in % of the RMS reference force, maximum errors in % of the maximum reference force. Direction is the RMS "
-    "angle while the reference force is perceptible. Rows with fewer ticks per second show only the error of the "
-    "force, not the effect on stability. For each motion of the fluid solver, the constants of unsteady drag were "
-    "fitted to the other motions. ●: no other model is both faster and more accurate, judged by the largest error of "
-    "each; ◎: the model that the program runs."
+    "Times are the processor time of one thread: the median and the 99th percentile of batches of 1,000 ticks. Each "
+    "is the median over the repeats of one interleaved run. RMS errors are given as a percentage of the RMS reference "
+    "force, and maximum errors as a percentage of the maximum reference force. Direction is the RMS angle while the "
+    "reference force is perceptible. Rows with fewer ticks per second show only the force error, not the effect on "
+    "stability. For each motion from the fluid solver, the unsteady-drag constants were fitted to the other motions. "
+    "●: no other model is both faster and more accurate, based on each model's largest error; ◎: the model that the "
+    "program uses."
 )
 _HEADINGS: Final = (
     "", "model", "ns per tick", "p99", "RMS error [N]", "max [N]", "RMS [%]", "max [%]", "direction [°]",

@@ -319,7 +319,7 @@ def in_words(verdict: Verdict) -> str:
         return said
     reference = "with the scripted device" if verdict.case.plant == FALCON else "without feedback"
     said += (
-        f"; the balance of hand and liquid falls to {1e3 * verdict.balance_j:.2f} mJ "
+        f"; the energy balance of hand and liquid falls to {1e3 * verdict.balance_j:.2f} mJ "
         f"({1e3 * verdict.permitted_j:.2f} mJ permitted), the handle swings at {1e3 * verdict.swing_mps:.0f} mm/s, "
         f"the force above 40 Hz is {verdict.fast_n:.2f} N ({verdict.played_n:.2f} N {reference})"
     )
@@ -334,7 +334,7 @@ def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
 
 def _counts(swept: Swept) -> Iterator[str]:
     cases, others = len(swept.on), sum(len(other.verdicts) for other in swept.others)
-    yield f"{cases} cases with safety off and on, {others} others with safety on, {swept.took_s:.0f} s"
+    yield f"{cases} cases with safety off and on, {others} other cases with safety on, {swept.took_s:.0f} s"
     yield f"{'':24} safety off   safety on"
     reasons = [collections.Counter(r for v in verdicts for r in v.reasons) for verdicts in (swept.off, swept.on)]
     grades = [collections.Counter(verdict.grade for verdict in verdicts) for verdicts in (swept.off, swept.on)]
@@ -353,17 +353,17 @@ def _grade_line(swept: Swept) -> str:
     """Return the numbers of unstable and noisy cases with safety on, and the greatest force of the noisy ones."""
     unstable, noisy = swept.of_grade(UNSTABLE), swept.of_grade(NOISY)
     judged = sum(len(group.verdicts) for group in swept.groups)
-    line = f"with safety on, of {judged} cases: {len(unstable)} unstable, {len(noisy)} noisy"
+    line = f"{judged} cases with safety on: {len(unstable)} unstable, {len(noisy)} noisy"
     if not noisy:
         return line
     force_n = max(verdict.fast_n for verdict in noisy)
     excess_n = max(verdict.fast_n - verdict.played_n for verdict in noisy)
-    return f"{line} (above 40 Hz at most {force_n:.2f} N, and at most {excess_n:.2f} N more than the control)"
+    return f"{line} (force above 40 Hz: at most {force_n:.2f} N, and at most {excess_n:.2f} N more than the control)"
 
 
 def _group_lines(swept: Swept) -> Iterator[str]:
     width = max(len(group.name) for group in swept.groups)
-    yield f"{'with safety on':{width + 2}}   cases  unstable   noisy   given out   beyond the bound, at most [mJ]"
+    yield f"{'with safety on':{width + 2}}   cases  unstable   noisy    supplied   above bound (maximum energy [mJ])"
     for group in swept.groups:
         finite = [verdict for verdict in group.verdicts if math.isfinite(verdict.balance_j)]
         given_j = max((-verdict.balance_j for verdict in finite), default=math.nan)
@@ -385,14 +385,9 @@ def _limiters(swept: Swept) -> Iterator[str]:
 
 
 def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
-    yield (
-        "difference between the force sent and the model clamped to 8 N, hand attached: RMS in % of the RMS "
-        "force, the worst"
-    )
-    yield (
-        "of twelve motions; * more than 5 % and 0.05 N. The second number is the largest number of ticks "
-        "with such a difference."
-    )
+    yield "RMS difference between the force sent and the model force clamped to 8 N, hand attached, worst of twelve"
+    yield "motions, in % of the RMS force; * more than 5 % and 0.05 N. The second number is the largest proportion of"
+    yield "ticks with such a difference."
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
     for liquid, row in itertools.groupby(fidelities, key=lambda one: one.liquid):
         cells = (f"{f'{fidelity.share:.1%}' + ' *'[not fidelity.within]} {fidelity.beyond:6.1%}" for fidelity in row)

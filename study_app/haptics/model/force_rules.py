@@ -99,7 +99,7 @@ def rules_from(described: Mapping[str, Any]) -> ForceRules:
     version = described.get("force_rules", 1)
     if version not in VERSIONS:
         raise StoreError(
-            f"the receipt uses force rules {version!r}, but this version of liquid-study knows only rules 1 to "
+            f"the receipt uses force rules {version!r}, but this version of liquid-study supports only rules 1 to "
             f"{FORCE_RULES}: use a newer version"
         )
     return VERSIONS[version]

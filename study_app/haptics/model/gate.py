@@ -266,7 +266,7 @@ def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, floa
         for name in names
     }
     return barred | dict.fromkeys(
-        _NEVER_BY_ITSELF, "not determined by density and viscosity: list it in effects to use it"
+        _NEVER_BY_ITSELF, "cannot be selected from density and viscosity: to use it, list it in effects"
     )
 
 
@@ -293,7 +293,7 @@ def _chosen_verdicts(
             left_out_n = with_it_n
             judged[effect] = False, _omission_reason(bound_of[effect], left_out_n, budget_n)
         else:
-            judged[effect] = True, f"omitting it would raise the omitted force to {with_it_n:.3g} N, above the "
+            judged[effect] = True, f"omitting it would raise the total omitted force to {with_it_n:.3g} N, above the "
             f"limit of {budget_n:.3g} N"
     for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:
         carrier = next(it for it in NAMED[name].through if it not in barred)

@@ -121,11 +121,13 @@ _FlowIndex: TypeAlias = Annotated[
     within(
         0.1,
         1,
-        'below this the drag on a sphere is unknown; above 1 use "shear-thickening"',
+        'below 0.1, the drag on a sphere is unknown; above 1, use "shear-thickening"',
         what="Flow index n; 1: no shear thinning.",
     ),
 ]
-_TimeS: TypeAlias = Annotated[float, within(1e-4, 1000, "below this a liquid is Newtonian; above this it is a solid")]
+_TimeS: TypeAlias = Annotated[
+    float, within(1e-4, 1000, ("with a shorter time a liquid is Newtonian; with a longer time it is a solid"))
+]
 _ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at rates of 0.1 to 100 per second")]
 
 

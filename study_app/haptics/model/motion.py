@@ -48,7 +48,8 @@ class Motion:
         if n == 0 or self.t_s.shape != (n,) or any(vector.shape != (n, 3) for vector in vectors):
             shapes = ", ".join(str(values.shape) for values in (self.t_s, *vectors))
             raise StudyError(
-                f"a motion consists of times (n,), positions (n, 3) and optionally velocities (n, 3), not {shapes}"
+                "a motion must contain times of shape (n,), positions of shape (n, 3) and optionally velocities of "
+                f"shape (n, 3), not {shapes}"
             )
         if not all(np.isfinite(values).all() for values in (self.t_s, *vectors)):
             raise StudyError("a motion must contain only finite numbers")
@@ -97,7 +98,7 @@ def refuse_device(path: Path) -> None:
         The system cannot determine its type.
     """
     if path.is_char_device():
-        raise StudyError(f"cannot read {path}: it is a device, which may never end; specify a CSV file")
+        raise StudyError(f"cannot read {path}: it is a device, so reading may never end; specify a CSV file")
 
 
 def _numbers(path: Path, lines: tuple[Line, ...], columns: int) -> Floats:

@@ -64,7 +64,7 @@ def value_of(scene: Scene, name: str) -> float:
     table, field = _places(_tables(_tree(scene)), name)[0]
     value = table[field]
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise StudyError(f"{_shown(name)} is not a number, but {_shown(value)}")
+        raise StudyError(f"{_shown(name)} must be a number, not {_shown(value)}")
     return float(value)
 
 

@@ -37,7 +37,7 @@ Vector: TypeAlias = tuple[float, float, float]
 Flow: TypeAlias = Annotated[float, within(-100, 100, "liquids around a hand flow at less than 100 m/s")]
 DensityKgM3: TypeAlias = Annotated[
     float,
-    within(0.01, 25_000, "hydrogen has 0.08 kg/m³, osmium, the densest element, 22 590", 1200, "Density [kg/m³]."),
+    within(0.01, 25_000, "hydrogen has 0.08 kg/m³; osmium, the densest element, has 22 590", 1200, "Density [kg/m³]."),
 ]
 ViscosityPaS: TypeAlias = Annotated[
     float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100", what="Dynamic viscosity [Pa·s].")
@@ -60,7 +60,7 @@ Alpha: TypeAlias = Annotated[
 ]
 ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "a hand feels little below 0.1 N and may be hurt above 20 N")]
 FadeS: TypeAlias = Annotated[
-    float, within(0.05, 2, ("a faster onset feels like a knock; a slower one cannot be felt as an onset"))
+    float, within(0.05, 2, ("a faster onset feels like a knock; a slower one does not feel like an onset"))
 ]
 Decay: TypeAlias = Annotated[
     float,
@@ -74,10 +74,7 @@ Decay: TypeAlias = Annotated[
 Exponent: TypeAlias = Annotated[
     float,
     within(
-        0.05,
-        10,
-        ("outside this range a wake is complete at once or never begins"),
-        what="Response exponent y of the wake.",
+        0.05, 10, ("outside this range, a wake develops at once or not at all"), what="Response exponent y of the wake."
     ),
 ]
 Smoothing: TypeAlias = Annotated[float, within(0, 1, "a hand's motion changes within a second")]

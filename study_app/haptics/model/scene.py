@@ -117,8 +117,8 @@ class _Liquid(Frozen):
 
 _DOC = """A region with a fluid, and its effects; ``"auto"`` lets ``haptics.model.gate`` choose them.
 
-    The table of an effect that is not selected is permitted, but it is ignored.
-    """
+       Tables of effects that are not selected are permitted, but they are ignored.
+       """
 
 if TYPE_CHECKING:
 

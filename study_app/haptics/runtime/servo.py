@@ -20,13 +20,17 @@ from study_app.haptics.runtime.thread import LoopThread
 _ELEMENTS = 10_000
 
 _FAULTS = {
-    STATUS_DEVICE_LOST: "stopped responding or lost its guard process; turn it off if it pushes, and reconnect it",
+    STATUS_DEVICE_LOST: (
+        "stopped responding or lost its guard process; turn it off if it is still pushing, and reconnect it"
+    ),
     STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable",
     STATUS_NON_FINITE: "would have received a non-finite force (NaN or infinite); check the scene's parameters",
 }
 
 
-_STUCK = "or the computer blocked the servo, which has not run a tick for 75 ms; turn the device off if it pushes"
+_STUCK = (
+    "or the computer blocked the servo, which has not run a tick for 75 ms; turn the device off if it is still pushing"
+)
 
 
 class Servo:

@@ -85,6 +85,6 @@ def test_a_device_that_takes_no_end_of_force_is_left_to_its_guard(unwatched: Sta
 
 def test_a_program_that_cannot_start_a_guard_is_refused(unwatched: StandIn, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    with pytest.raises(DeviceError, match="guard process for the device 'force-dimension' does not start"):
+    with pytest.raises(DeviceError, match="guard process for the device 'force-dimension' could not be started"):
         open_device("force-dimension", options={"dhd-library": unwatched.path})
     assert unwatched.state["closed"] == 1.0

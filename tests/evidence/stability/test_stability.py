@@ -164,8 +164,8 @@ def test_it_tolerates_one_noisy_case_in_10000_and_no_unstable_one():
     assert swept_with(unstable).missed
     line = stability.group_table(swept_with(noisy, unstable)).splitlines()[-1]
     assert line == (
-        "with safety on, of 20000 cases: 1 unstable, 1 noisy "
-        "(above 40 Hz at most 0.40 N, and at most 0.10 N more than the control)"
+        "20000 cases with safety on: 1 unstable, 1 noisy "
+        "(force above 40 Hz: at most 0.40 N, and at most 0.10 N more than the control)"
     )
 
 

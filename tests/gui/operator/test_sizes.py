@@ -18,7 +18,10 @@ SIZES = ((1024, 640), (1250, 705), (1366, 768), (1499, 869), (1600, 750), (1920,
 FEW = ((1024, 640), (1366, 768), (1600, 900))
 
 
-BROKEN = "the device 'falcon' stopped responding or lost its guard process; turn it off if it pushes, and reconnect it"
+BROKEN = (
+    "the device 'falcon' stopped responding or lost its guard process; turn it off if it is still pushing, and "
+    "reconnect it"
+)
 UNCONNECTED = "Not connected: the Falcon was not homed: no arm found its index: push the grip all the way in once."
 STATES: dict[str, tuple[dict[str, dict[str, Any]], dict[str, Any]]] = {
     # what happens to a session that runs, and what else the view says

@@ -95,7 +95,7 @@ def test_on_error_nothing_is_written_and_what_was_there_stays(tmp_path):
     ("t_s", "position_m", "velocity_mps", "message"),
     [
         ([], np.zeros((0, 3)), None, "not \\(0,\\)"),
-        ([0.0], np.zeros((1, 2)), None, "positions \\(n, 3\\)"),
+        ([0.0], np.zeros((1, 2)), None, "positions of shape \\(n, 3\\)"),
         ([0.0, 1.0], np.zeros((2, 3)), np.zeros((1, 3)), "not \\(2,\\), \\(2, 3\\), \\(1, 3\\)"),
         ([0.0], np.full((1, 3), math.nan), None, "finite"),
         ([0.0, 1.0, 1.0], np.zeros((3, 3)), None, "row 3"),
@@ -108,6 +108,6 @@ def test_a_motion_checks_itself(t_s, position_m, velocity_mps, message):
 
 def test_a_device_is_not_read(tmp_path):
     """One such as /dev/zero has no end; a bad value is repeated in part."""
-    with pytest.raises(StudyError, match="it is a device, which may never end"):
+    with pytest.raises(StudyError, match="it is a device, so reading may never end"):
         read_motion(Path("/dev/null"))
     assert len("".join(problems(tmp_path, "x" * 5000 + ",0,0,0"))) < 300

@@ -199,7 +199,7 @@ def test_what_cannot_be_fitted_is_said(names, said):
         fit(TANK, "tank", names, REVERSE, force_of(TANK, REVERSE))
     with pytest.raises(StudyError, match="does not contain the liquid 'lake'; its liquids are tank"):
         fit(TANK, "lake", ["drag_coefficient"], REVERSE, force_of(TANK, REVERSE))
-    with pytest.raises(StudyError, match="it is a device, which may never end"):
+    with pytest.raises(StudyError, match="it is a device, so reading may never end"):
         measured_force.read_measurement(Path("/dev/null"))  # /dev/zero would fill the memory
 
 

@@ -197,7 +197,7 @@ def test_each_part_of_a_session_is_replayed_by_the_force_rules_that_its_receipt_
     (place / "receipt.json").write_text(json.dumps(receipt), encoding="utf-8", newline="\n")
     with pytest.raises(
         StoreError,
-        match=f"force rules {FORCE_RULES + 1}, but this version of liquid-study knows only rules 1 to {FORCE_RULES}",
+        match=f"force rules {FORCE_RULES + 1}, but this version of liquid-study supports only rules 1 to {FORCE_RULES}",
     ):
         replay(place)
 

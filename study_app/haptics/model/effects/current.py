@@ -48,7 +48,7 @@ class Vortex(Frozen):
 
     kind: Literal["vortex"] = "vortex"
     centre_m: Metres = Field(default=(0.0, 0.0, 0.0), description="A point on the axis [m].")
-    core_m: Extent = Field(description="Distance from the axis where the current is fastest [m].")
+    core_m: Extent = Field(description="Distance from the axis at which the current is fastest [m].")
     peak_mps: ranges.Flow = Field(description="Speed at that distance [m/s].")
 
 

@@ -41,7 +41,9 @@ def _bars(extremes: Extremes) -> tuple[tuple[str, ...], str]:
         return tuple(
             it.name for it in _IN_PLACE_OF
         ), f"replaced by unsteady drag: {reynolds}, which does not exceed {_HIGHEST_REYNOLDS:g}"
-    return ("unsteady_drag", "history"), f"{reynolds}; above {_HIGHEST_REYNOLDS:g} no flow solution confirms it"
+    return ("unsteady_drag", "history"), (
+        f"{reynolds}; unsteady drag has not been checked against flow solutions above {_HIGHEST_REYNOLDS:g}"
+    )
 
 
 def _problem(liquid: Liquid) -> str | None:

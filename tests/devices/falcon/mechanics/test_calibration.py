@@ -55,7 +55,7 @@ class TestFit:
             (weighed(6616.0, 0.0, 1.0, weights_n=(4.9,) * 5), "two weights"),
             ((counts, forces_n * 10, units), "check the weights"),
             ((no_pose, forces_n, units), "pose 3"),
-            ((counts, forces_n[:, :2], units), "three encoder counts, force components"),
+            ((counts, forces_n[:, :2], units), "three encoder counts, three force components"),
         ):
             with pytest.raises(DeviceError, match=words):
                 fit(GEOMETRY, *given)
