@@ -83,7 +83,7 @@ def _refuse_other_files(data: bytes) -> None:
     if begin.startswith(b"version https://git-lfs"):
         raise _refusal("it is only a Git LFS pointer: fetch the file itself with 'git lfs pull'")
     if begin.startswith(b":") or _HEX_DUMP.fullmatch(data):
-        raise _refusal("it is a hex dump (bytes written as text): use the binary file")
+        raise _refusal("it is a hex dump, not binary data: use the binary file")
 
 
 def _refuse_wrong_header(data: bytes) -> None:

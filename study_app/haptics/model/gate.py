@@ -293,8 +293,8 @@ def _chosen_verdicts(
             left_out_n = with_it_n
             judged[effect] = False, _omission_reason(bound_of[effect], left_out_n, budget_n)
         else:
-            judged[effect] = True, f"omitting it would raise the total omitted force to {with_it_n:.3g} N, above the "
-            f"limit of {budget_n:.3g} N"
+            omitted = f"omitting it would raise the omitted force to {with_it_n:.3g} N"
+            judged[effect] = True, f"{omitted}, above the limit of {budget_n:.3g} N"
     for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:
         carrier = next(it for it in NAMED[name].through if it not in barred)
         if not judged[carrier][0]:
