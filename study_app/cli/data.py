@@ -368,7 +368,7 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     "--always",
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     metavar="DIR",
-    help="Write the proof to this folder at the end of every session, using --server; both settings are remembered.",
+    help="Write the proof to this folder after every session, time-stamped by --server; both settings are remembered.",
 )
 def proof(
     results: Path, to: Path | None, *, sign: bool, server: str | None, root: Path | None, always: Path | None

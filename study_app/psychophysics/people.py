@@ -68,19 +68,19 @@ class Person(NamedTuple):
 ASSUMED: Final = Person()
 KINDS: Final = {
     "as assumed": ASSUMED,
-    "half as wide": Person(width=0.5),
-    "1.5 times as wide": Person(width=1.5),
-    "2.5 times as wide": Person(width=2.5),
+    "function half as wide": Person(width=0.5),
+    "function 1.5 times as wide": Person(width=1.5),
+    "function 2.5 times as wide": Person(width=2.5),
     "5 % at random": Person(lapse=0.05),
     "criterion of 0.5": Person(criterion=0.5),
-    "last answer again": Person(repeats=0.5),
+    "repeats of the last answer": Person(repeats=0.5),
     "learning": Person(change=1 / 1.5),
     "fatigue": Person(change=1.5),
 }
 """People who differ in one respect each."""
 ALONE: Final = {name: person for name, person in KINDS.items() if not person.criterion and not person.repeats}
 """Those without a preference: where there are not two intervals, one of them correct."""
-MIXED: Final = "all of these"
+MIXED: Final = "a mix of these"
 """Of a group of people drawn at random."""
 
 

@@ -141,7 +141,7 @@ class EmulatedBackend(usb.backend.IBackend):  # type: ignore[misc]
 
     def get_interface_descriptor(self, dev: Emulator, intf: int, alt: int, config: int) -> Any:
         if (intf, alt) != (0, 0):
-            raise IndexError(f"a Falcon has only interface 0 with alternate setting 0, not {intf} with {alt}")
+            raise IndexError(f"a Falcon has only interface 0, setting 0, not interface {intf}, setting {alt}")
         return SimpleNamespace(**_INTERFACE)
 
     def get_endpoint_descriptor(self, dev: Emulator, ep: int, intf: int, alt: int, config: int) -> Any:

@@ -245,7 +245,7 @@ def test_studies_of_all_seeds_count_together_and_each_seed_once(
         )
     assert "small: 4 of 4 studies" in told
     assert said[0] == "small: 4 studies and 3 rehearsed participants"
-    assert said[-1].startswith("people, all of these: ")
+    assert said[-1].startswith("people, a mix of these: ")
     found = [threshold.simulate(number, seed) for seed in (1, 2) for number in range(2)]
     own = [*threshold.measures(found), *coverage("small", found)]
     assert rows[: len(own)] == [one.judged(1 - 0.05 / len(rows)) for one in own]
