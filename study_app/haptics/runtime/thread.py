@@ -218,10 +218,9 @@ class LoopThread:
         delay_ticks = driver.dynamics.delay_ticks(self._rate_hz)
         if delay_ticks > MOST_DELAY:
             raise DeviceError(
-                f"the device '{driver.name}' answers {delay_ticks} ticks late at {self._rate_hz:g} Hz, but "
-                f"forces are unstable beyond {MOST_DELAY} ticks: connect the device without a hub, close other "
-                "programs "
-                "that use the bus, and restart"
+                f"the device '{driver.name}' responds {delay_ticks} ticks late at {self._rate_hz:g} Hz, but forces "
+                f"are unstable beyond {MOST_DELAY} ticks: connect the device without a hub, close other programs that "
+                "use the bus, and restart"
             )
         return new_safety(driver.force_limit_n, delay_ticks)
 

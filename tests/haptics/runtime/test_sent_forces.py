@@ -97,7 +97,7 @@ def test_the_believed_delay_is_the_measured_one_in_whole_ticks(delay_s, expected
 
 
 def test_a_device_too_slow_for_any_stable_force_is_refused():
-    with pytest.raises(DeviceError, match="answers 5 ticks late at 1000 Hz"):
+    with pytest.raises(DeviceError, match="responds 5 ticks late at 1000 Hz"):
         Servo(Probe(dynamics=Dynamics(4.2e-3)), clock=VirtualClock())
 
 
