@@ -278,7 +278,7 @@ def test_command_writes_its_report_and_keeps_what_it_found_of_a_real_device_alon
     done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "report").iterdir()} == {"bench.md", "bench.json"}
-    assert "its measurements are not kept" in done.output
+    assert "its measurements are not stored" in done.output
     assert workstation.load_settings().benches == ()
     real = replace(descriptor_of("scripted"), kind="felt")
     monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)
