@@ -276,8 +276,8 @@ def flush_entry(path: Path) -> None:
         sync_folder(path.parent)
     except OSError as error:
         raise StoreError(
-            f"{path} was written, but the disk did not confirm it ({system_message(error)}): check the disk; after a "
-            "power failure the file may be in its earlier state"
+            f"{path} was written, but the disk did not confirm it ({system_message(error)}): check the disk, because "
+            "a power failure could restore the previous version of the file"
         ) from error
 
 
@@ -287,7 +287,7 @@ def cannot_write(path: Path, error: OSError) -> StoreError:
     why = "there is a file where a folder is needed" if blocked else system_message(error)
     return StoreError(
         f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "
-        "that uses it, or choose another folder"
+        "that is using it, or choose another folder"
     )
 
 
@@ -326,7 +326,7 @@ def refuse_special_files(path: Path) -> None:
 def cannot_read(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     return StoreError(
-        f"{path} cannot be read ({system_message(error)}): correct its permissions, or restore it from a copy"
+        f"{path} cannot be read ({system_message(error)}): correct its permissions, or restore it from a back-up"
     )
 
 
@@ -362,7 +362,7 @@ def read_own(path: Path, root: Path) -> bytes:
         real = Path(os.path.realpath(path, strict=True))  # raises OSError for a loop of links, with every Python
         if not real.is_relative_to(root.resolve()):
             raise StoreError(
-                f"{path} leads out of {root} through a link, to {real}: replace the link with the file itself"
+                f"{path} contains a link to {real}, which is outside {root}: replace the link with the file itself"
             )
         return read_regular(real)
     except OSError as error:

@@ -72,7 +72,7 @@ def renew_checksums(session: SessionFolder, rewritten: Collection[Path]) -> bool
         listed = read_checksums(session)
     except StoreError:
         gone = "was damaged" if session.checksums.exists() else "was missing"
-        note_rebuilt(session, f"the list of checksums {gone} and was created from the existing files")
+        note_rebuilt(session, f"the list of checksums {gone} and has been recreated from the existing files")
         write_checksums(session)
         return True
     ours = [path.relative_to(session.path).as_posix() for path in rewritten if path.is_relative_to(session.path)]
@@ -122,10 +122,10 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
     for line in text.splitlines():
         match = _LINE.fullmatch(line)
         if match is None:
-            raise StoreError(f"{session.checksums} has a line that is not a checksum: restore it from a copy")
+            raise StoreError(f"{session.checksums} has a line that is not a checksum: restore it from a back-up")
         checksums[match[2]] = match[1]
     if not checksums:
-        raise StoreError(f"{session.checksums} is empty: restore it from a copy")
+        raise StoreError(f"{session.checksums} is empty: restore it from a back-up")
     return checksums
 
 
@@ -239,7 +239,7 @@ def parse_copy(path: Path, text: str) -> Proofs:
             )
         if match[2] not in (None, _check_characters(match[1], match[3])):
             raise StoreError(
-                f"{path}, line {number} was misread: its last two characters do not match the rest of the line"
+                f"{path}, line {number} was copied incorrectly: its last two characters do not match the rest"
             )
         proofs.append((match[1], match[3]))
     if not proofs:

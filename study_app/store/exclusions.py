@@ -98,7 +98,7 @@ def exclude(
         There is no such session or trial, it is excluded already, ``by`` or ``reason`` is empty, or the list cannot be
         read or written.
     """
-    by, reason = check_name_and_reason(by, reason, "an exclusion needs a rule or name, and a reason")
+    by, reason = check_name_and_reason(by, reason, "an exclusion requires a rule or name, and a reason")
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
@@ -115,9 +115,7 @@ def exclude(
         rows = exclusions(folder)
         for row in rows:
             if row.what in (new.what, (participant, session, None)):
-                raise StoreError(
-                    f"{describe_exclusion(new)} is already excluded, since {row.excluded_at} ({row.reason})"
-                )
+                raise StoreError(f"{describe_exclusion(new)} has been excluded since {row.excluded_at} ({row.reason})")
         write_file(study.exclusions, exclusion_bytes((*rows, new)))
     return new
 
@@ -156,7 +154,7 @@ def include(
     StoreError
         The session or trial is not excluded, ``by`` or ``reason`` is empty, or a file cannot be read or written.
     """
-    by, reason = check_name_and_reason(by, reason, "reversing an exclusion needs a name and a reason")
+    by, reason = check_name_and_reason(by, reason, "reversing an exclusion requires a name and a reason")
     study = StudyFolder(folder)
     with lock_folder(folder):
         rows = exclusions(folder)
@@ -189,7 +187,7 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
     """
     if rule not in RULES:
         raise StoreError(f"there is no exclusion rule {rule!r} ({did_you_mean(rule, RULES)})")
-    by, reason = check_name_and_reason(by, reason, "keeping a session needs a name and a reason")
+    by, reason = check_name_and_reason(by, reason, "keeping a session requires a name and a reason")
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, None)
     at = datetime.now().astimezone().isoformat(timespec="milliseconds")
@@ -260,7 +258,7 @@ def _parse_reversal(path: Path, number: int, line: bytes) -> Reversal:
         ):
             key_open = record.get("key_open")
             return Reversal(taken, str(record.get("at", "")), key_open if isinstance(key_open, bool) else None)
-    raise StoreError(f"{path}, line {number} is not a reversed exclusion: restore it from a copy, or remove the line")
+    raise StoreError(f"{path}, line {number} is not a reversed exclusion: remove it, or restore it from a back-up")
 
 
 def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:
@@ -305,7 +303,7 @@ def _check_recorded(study: StudyFolder, participant: str, session: int, trial: i
     if trial not in presented:
         listed = ", ".join(map(str, sorted(presented))) or "none"
         raise StoreError(
-            f"session {session} of participant {participant} does not contain trial {trial}; its trials: {listed}"
+            f"session {session} of participant {participant} does not contain trial {trial}; its trials are {listed}"
         )
 
 

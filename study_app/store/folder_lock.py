@@ -194,7 +194,7 @@ def remove_abandoned_claims(participant: Path) -> None:
 def _open_elsewhere(marker: Path, holder: dict[str, Any]) -> StoreError:
     return StoreError(
         f"{marker.parent} is open in another program (process {holder.get('pid')} on {holder.get('host')}, since "
-        f"{holder.get('at')}): wait for it, or end it there; if that program is no longer running, delete {marker}"
+        f"{holder.get('at')}): wait for it, or close it there; if that program is no longer running, delete {marker}"
     )
 
 

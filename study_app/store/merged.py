@@ -93,8 +93,8 @@ def read_merged(folder: Path) -> Merged | None:
         if held["format"] not in (1, _FORMAT):
             shown = shorten_value(held["format"])
             raise StoreError(
-                f"{path} has format {shown}, but this version reads 1 and {_FORMAT}: use a newer version of "
-                "liquid-study"
+                f"{path} has format {shown}, but this version reads only formats 1 and {_FORMAT}: install a newer "
+                "version"
             )
         sites = tuple(Site(**site) for site in held["sites"])
         if sites and all(map(_is_site, sites)) and is_valid_value("protocol_hash", held["protocol_hash"]):
@@ -107,7 +107,7 @@ def read_merged(folder: Path) -> Merged | None:
         raise cannot_read(path, error) from error
     except (ValueError, KeyError, TypeError):
         pass
-    raise StoreError(f"{path} does not list the sites of a merged study: restore it from a copy")
+    raise StoreError(f"{path} does not list the sites of a merged study: restore it from a back-up")
 
 
 def _is_site(site: Site) -> bool:
@@ -126,8 +126,7 @@ def _refuse_links(merged: Merged) -> None:
     for folder in map(merged.folder, merged.names):
         if not (real := _resolved_path(folder)).is_relative_to(_resolved_path(merged.path)):
             raise StoreError(
-                f"{folder} leads out of {merged.path} through a link, to {real}: replace the link with the folder "
-                "itself"
+                f"{folder} is a link to {real}, which is outside {merged.path}: replace the link with the folder itself"
             )
 
 
@@ -163,8 +162,8 @@ def locate_participant(folder: Path, participant: str) -> tuple[Path, str]:
     if (place := folders.get(f"{site}{dash}")) is None or not own:
         known = ", ".join(name.removesuffix(DASH) for name in folders)
         raise StoreError(
-            f"{folder} contains several sites ({known}), but {participant!r} does not state the site: specify SITE-ID, "
-            f"such as {next(iter(folders))}P007"
+            f"{folder} contains several sites ({known}), but {participant!r} does not include the site: specify "
+            f"SITE-ID, such as {next(iter(folders))}P007"
         )
     return place, own
 

@@ -119,7 +119,7 @@ def _file_parts(copied: FileCopy) -> Iterator[bytes]:
     except OSError as error:
         raise AnalysisError(
             f"{copied.source} cannot be read ({system_message(error)}): nothing was written; correct its permissions, "
-            "or restore it from a copy"
+            "or restore it from a back-up"
         ) from error
     if digest.hexdigest() != copied.sha256:
         raise AnalysisError(
@@ -163,7 +163,7 @@ def write_output(
         if warn is not None:
             warn(
                 f"the output in {to} could not be added to the list of outputs ({error}), so withdraw will not list "
-                "it: make a note of it"
+                "it: keep a note of the folder"
             )
     return written
 

@@ -181,7 +181,7 @@ def _locked_file(file: Path) -> Iterator[None]:
     try:
         opening = lock_folder(folder)
     except StoreError as error:
-        raise StoreError(f"{file} cannot be saved while another program saves it: try again ({error})") from error
+        raise StoreError(f"{file} cannot be saved while another program is saving it: try again ({error})") from error
     try:
         yield
     finally:

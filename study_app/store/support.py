@@ -26,16 +26,16 @@ _PLACE: Final = re.compile(r'^ *(File "[^"]*", line \d+ in \S+|<no Python frame>
 _HEADING: Final = re.compile(
     r"^(Fatal Python error: [\w \-]+|(Current thread|Thread) 0x[0-9a-f]+ \(most recent call first\):)$"
 )
-_ABOUT: Final = """What liquid-study knows about this machine, for support.
+_ABOUT: Final = """Information about this machine and liquid-study, for support.
 
 versions.json    versions of the program, Python, the system and libraries
-settings.json    this machine's settings, without initials, folders and the camera's address
+settings.json    this machine's settings, without initials, folders or the camera's address
 log.txt          the program's log: messages, source lines, device failures
 last-error.txt   the last error in the log
 diagnosis.txt    findings about the device, if it was examined
-crash-N.txt      source lines at the time of a crash, the newest crash first
+crash-N.txt      source lines at the time of a crash, newest crash first
 
-It does not contain participant IDs, answers, liquids' parameters or keys.
+These files do not contain participant IDs, answers, liquid parameters or keys.
 """
 
 

@@ -112,7 +112,7 @@ def unblind(folder: Path, by: str, reason: str, progress: ReportProgress | None 
     try:
         excluded = exclude_inattentive(folder)
     except (StoreError, ValueError, KeyError, TypeError) as error:
-        left.append(f"the rule catch was not applied ({error}); then unblind again")
+        left.append(f"the rule “catch” was not applied ({error}): correct this, then unblind again")
     return Unblinded(codes, tuple(left), excluded)
 
 
@@ -234,7 +234,7 @@ def _missed_catch_trials(session: SessionFolder, key: Key) -> Iterator[str]:
         wrong = sum(not result.correct for result in answered)
         if block.catch is not None and answered and wrong / len(answered) > block.catch.wrong_most:
             yield (
-                f'block "{block.id}": {wrong} of {len(answered)} catch trials answered incorrectly, '
+                f'block "{block.id}": {wrong} of {len(answered)} catch trials were answered incorrectly; '
                 f"at most {100 * block.catch.wrong_most:g} % are permitted"
             )
 
@@ -264,8 +264,7 @@ def _open_files(place: Place, lines: list[Event], key: Key) -> list[str]:
         held, sealed = read_if_there(path) or b"", before[path]
         if held not in (sealed, content) and not _is_behind(held, path, place, lines, key):
             left.append(
-                f"{path} differs from the journal, so it was not changed: "
-                f"rebuild it with liquid-study rebuild {place.folder.path}"
+                f"{path} differs from the journal, so it was not changed: run liquid-study rebuild {place.folder.path}"
             )
             continue
         if held != content:
@@ -309,6 +308,6 @@ def _open_recording(path: Path, hashes: tuple[str, str], key: Key) -> None:
     content = read_own(path, study_root(path.parent))
     content_hash = hashlib.sha256(content).hexdigest()
     if content_hash not in hashes:
-        raise StoreError(f"{path} has changed since it was recorded, so it was not opened: restore it from a copy")
+        raise StoreError(f"{path} has changed since it was recorded, so it was not opened: restore it from a back-up")
     if content_hash == hashes[0]:
         write_file(path, opened_content(path, content, key.nonce))

@@ -67,7 +67,7 @@ def upgrade(path: Path) -> list[Path]:
                 write_file(copy, original)
             if read_regular(copy) != original:
                 raise StoreError(
-                    f"{copy} is not a copy of {file.name}, so {file.name} was not changed: rename the copy and try "
+                    f"{copy} is not a copy of {file.name}, so {file.name} was not changed: rename {copy.name} and try "
                     "again"
                 )
             write_file(file, content)
@@ -108,6 +108,6 @@ def _earlier_tables(
             if isinstance(lines[-1], SessionEnded) and not has_same_cells(held, content):
                 raise StoreError(
                     f"{table} differs from its journal, so nothing was upgraded: run liquid-study rebuild "
-                    f"{session.path} to create it again"
+                    f"{session.path} to recreate it"
                 )
             yield session, table, held, content

@@ -123,7 +123,7 @@ def withdraw(
         There is no such participant, a session of theirs runs, ``by`` or ``reason`` is empty, or a file cannot be
         written or deleted; what was erased by then stays erased.
     """
-    by, reason = check_name_and_reason(by, reason, "a withdrawal needs initials and a reason")
+    by, reason = check_name_and_reason(by, reason, "a withdrawal requires initials and a reason")
     study = StudyFolder(folder)
     if not folder.is_dir():
         raise StoreError(f"{folder} is not a folder: specify a study's folder, such as results/rek2024")
@@ -250,7 +250,7 @@ def _parse_tombstone(path: Path, number: int, line: bytes) -> Tombstone:
     except (ValueError, KeyError, TypeError, AttributeError):
         pass
     raise StoreError(
-        f"{path}, line {number} is not a withdrawal: restore it from a copy; if it is an incomplete last line, "
+        f"{path}, line {number} is not a withdrawal: restore it from a back-up; if it is an incomplete last line, "
         "remove it and withdraw again"
     )
 

@@ -177,7 +177,7 @@ def test_of_two_programs_that_do_not_see_each_others_lock_the_first_writes_no_li
     with hide(marker):
         second = reopen_store(first.folder.path, small.protocol(), b"small", operator="AB", device={}, screens={})
     second.append(journal_events.Note(kind="note", text="of the second"))
-    with pytest.raises(StoreError, match=r"journal\.jsonl was written by another program"):
+    with pytest.raises(StoreError, match=r"journal\.jsonl was changed by another program"):
         first.append(journal_events.Note(kind="note", text="of the first"))
     second.finish("completed")
     first.close()

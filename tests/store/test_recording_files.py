@@ -92,10 +92,12 @@ def test_recordings_of_format_2_are_read_and_one_that_lacks_a_column_is_damaged(
     assert not read["measured"].any()
     assert np.array_equal(read["position_m"], samples_of(100)["position_m"])
     rewrite(whole.drop_columns("gripper_m"), facts)
-    with pytest.raises(StoreError, match="its columns do not match a recording of samples"):
+    with pytest.raises(StoreError, match="it does not have the columns of samples"):
         read_samples(path)
     rewrite(whole, facts | {"format": 5})
-    with pytest.raises(StoreError, match="has format 5, but this version reads 1 to 4: use a newer version"):
+    with pytest.raises(
+        StoreError, match="has format 5, but this version reads only formats 1 to 4: install a newer version"
+    ):
         read_samples(path)
 
 
@@ -178,7 +180,7 @@ def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None
         (read_frames, samples, "contains samples, not frames"),
         (read_samples, frames, "contains frames, not samples"),
         (read_checks, frames, "contains frames, not samples"),
-        (read_samples, other, "is not a recording of this program"),
+        (read_samples, other, "is not a recording made by this program"),
         (read_samples, torn, "is damaged"),
         (read_facts, torn, "is damaged"),
         (read_samples, tmp_path / "none.parquet", "cannot be read"),

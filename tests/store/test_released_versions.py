@@ -148,8 +148,8 @@ def warned(study: Path) -> str:
 
 def test_it_verifies_with_a_note(study: Path) -> None:
     found = warned(study)
-    assert "data: 2 journals are in format 1, whose lines cannot show whether an earlier line was changed" in found
-    assert f"{KILLED}: is unfinished: you can resume it" in found
+    assert "data: 2 journals are in format 1, which cannot show whether an earlier line was changed" in found
+    assert f"{KILLED}: is unfinished but can be resumed" in found
     changed = StudyFolder(study).session("P001", 1).journal
     content = changed.read_bytes()
     changed.write_bytes(content.replace(b'"value":4', b'"value":5', 1))

@@ -170,7 +170,7 @@ def allocate(
                 write_new_file(path, json.dumps(_claim_content(claim)).encode() + b"\n", waits=waits)
             except FileExistsError:  # another program claimed this entry first
                 if replaced is not None:
-                    raise StoreError(f"{path} has been changed: restore it from a copy") from None
+                    raise StoreError(f"{path} has been changed: restore it from a back-up") from None
                 continue
             if waits:
                 sync_folder(study.allocated)
@@ -185,12 +185,12 @@ def allocation_of(study: StudyFolder, key: Key, participant: str, entries: Entri
     entries = Entries(study) if entries is None else entries
     if (claim := entries.claim_of(participant)) is not None:
         if not is_unchanged(claim, key):
-            raise StoreError(f"{claim.path} has been changed: restore it from a copy")
+            raise StoreError(f"{claim.path} has been changed: restore it from a back-up")
         return _allocation(claim, key)
     if (begun := entries.begun.get(participant)) is not None:
         path = study.allocation(begun.entry, begun.group, None if begun.replaces is None else participant)
         raise StoreError(
-            f"{path} is missing, although participant {participant} has entry {begun.entry}: restore it from a copy"
+            f"{path} is missing, although participant {participant} has entry {begun.entry}: restore it from a back-up"
         )
     return None
 
@@ -254,22 +254,21 @@ def _check_replaced(
     if not _has_counted_places(held):
         if enrolment_number(row_of) is None:
             raise StudyError(
-                f"row of {row_of!r}: this folder was begun by an earlier version, in which the number in an ID assigns "
-                "the row; specify an ID with a number, such as P007"
+                f"participant {row_of!r} cannot be replaced: this folder is from an earlier version, which assigns "
+                "rows by the number in the ID; specify an ID with a number, such as P007"
             )
     elif own is not None:
         if own.replaces != row_of:
             now = "nobody" if own.replaces is None else own.replaces
-            raise StudyError(f"row of {row_of!r}: participant {participant} has replaced {now} since the first session")
+            raise StudyError(f"{row_of!r} cannot be replaced: {participant} has replaced {now} since the first session")
     elif replaced is None:
         raise StudyError(
-            f"row of {row_of!r}: this ID does not exist in this folder; specify the ID of the participant to be "
-            "replaced"
+            f"participant {row_of!r} cannot be replaced: this ID does not exist in this folder; specify an existing ID"
         )
     elif replaced.group != group:
         raise StudyError(
-            f"row of {row_of!r}: {row_of} is in group {replaced.group}, but {participant} is in group {group}; replace "
-            "a participant from the same group"
+            f"participant {row_of!r} in group {replaced.group} cannot be replaced by {participant} in group {group}; "
+            "replace a participant from the same group"
         )
 
 
@@ -308,7 +307,7 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
     allocation = allocation_of(study, read_key(study.path), participant)
     if allocation is None:
         raise StoreError(
-            f"participant {participant} does not have an entry in {study.allocated}: restore it from a copy"
+            f"participant {participant} does not have an entry in {study.allocated}: restore it from a back-up"
         )
     return own_protocol(protocol, allocation.group, session)
 

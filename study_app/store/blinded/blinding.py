@@ -279,7 +279,7 @@ def verified_key(study: StudyFolder) -> Key:
         if _published_hash(session) not in {None, key.hash}:
             raise StoreError(
                 f"{study.key} is not the key of session {session.path} (its SHA-256 differs from the published one): "
-                "restore it from a copy"
+                "restore it from a back-up"
             )
     return key
 
@@ -312,8 +312,8 @@ def read_key(folder: Path) -> Key:
         content = parse_json(base64.b64decode(b"".join(sealed.split()), validate=True))
         if content["format"] not in _FORMATS:
             raise StoreError(
-                f"{path} has format {content['format']!r}, but this version reads 1 and 2: use a newer version of "
-                "liquid-study"
+                f"{path} has format {content['format']!r}, but this version reads only formats 1 and 2: install a "
+                "newer version"
             )
         _check_content(content)
         return Key(
@@ -327,7 +327,7 @@ def read_key(folder: Path) -> Key:
             groups=content.get("groups", {}),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise StoreError(f"{path} is no longer a sealed key: restore it from a copy") from error
+        raise StoreError(f"{path} is no longer a sealed key: restore it from a back-up") from error
 
 
 def _check_content(content: dict[str, Any]) -> None:
@@ -352,7 +352,7 @@ def _refuse_if_lost(study: StudyFolder) -> None:
     under = [session for session in study.sessions() if is_there(session.receipt)]
     if under and not is_there(study.key):  # checked again: another program may have drawn the key in the meantime
         raise StoreError(
-            f"{study.key} is missing, although {counted(len(under), 'session')} used it: restore it from a copy; "
+            f"{study.key} is missing, although {counted(len(under), 'session')} used it: restore it from a back-up; "
             "without it, codes cannot be assigned to conditions"
         )
 
@@ -459,7 +459,7 @@ def _open_event(start: events.SessionStarted, line: events.Event, key: Key) -> e
         if (measured := open_text([*_line_owner(start, line), *more], text, key.nonce, names)) is None:
             raise StoreError(
                 f"line {line.n} of the journal cannot be decrypted with the study's key: it has been changed; restore "
-                "the journal from a copy"
+                "the journal from a back-up"
             )
         opened |= {**measured, name: None}
     return events.read_event({**line.line(), **opened}) if opened else line
@@ -495,8 +495,8 @@ def recorded_protocol(protocol: Protocol, receipt: Mapping[str, Any], key: Key) 
         opened = open_text(whose, str(text), key.nonce, frozenset({"liquids"}))
         if not opened:
             raise StoreError(
-                f"the receipt of {receipt['participant']} cannot be decrypted with the study's key (resolved): it was "
-                "changed; restore it from a copy"
+                f"the field “resolved” in the receipt of {receipt['participant']} cannot be decrypted with the study's "
+                "key: the receipt has been changed; restore it from a back-up"
             )
         recorded = opened["liquids"]
     liquids = {
@@ -514,11 +514,11 @@ def protocol_errors(receipt: Path) -> Iterator[None]:
     try:
         yield
     except KeyError as lacking:
-        raise StoreError(f"{receipt} lacks {lacking}: restore it from a copy") from lacking
+        raise StoreError(f"{receipt} does not contain {lacking}: restore it from a back-up") from lacking
     except (AttributeError, TypeError, ValueError):  # the reason is omitted, since it could reveal conditions
         raise StoreError(
-            f"{receipt} and the study's key do not determine a protocol that this version can run: restore them "
-            "from a copy"
+            f"{receipt} and the study's key do not form a protocol that this version can run: restore them "
+            "from a back-up"
         ) from None
 
 

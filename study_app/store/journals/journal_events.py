@@ -638,7 +638,7 @@ def line_problem(line: Mapping[str, Any]) -> str | None:
         return "the event is missing"
     kind = EVENTS.get(event, _UnknownEvent)
     if lacking := [name for name in ("n", "event", "t_s", "at", *kind.required) if name not in line]:
-        return f"({event}) lacks {', '.join(lacking)}"
+        return f"({event}) does not contain {', '.join(lacking)}"
     if kind.one_of and sum(name in line for name in kind.one_of) != 1:
         return f"({event}) does not have exactly one of {', '.join(kind.one_of)}"
     for name in line:
@@ -742,6 +742,6 @@ def start_of(lines: Sequence[Event]) -> SessionStarted:
     """
     if not lines or not isinstance(start := lines[0], SessionStarted):
         raise StoreError(
-            "the journal does not begin with session_started: restore it from a copy, or use a new session number"
+            "the journal does not begin with session_started: restore it from a back-up, or use a new session number"
         )
     return start

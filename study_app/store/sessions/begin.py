@@ -376,7 +376,7 @@ def refuse_never_begun(session: SessionFolder) -> None:
     if is_abandoned(session.path):
         raise StoreError(
             f"{session.path} was created, but the program ended before the session began, so it cannot be resumed: "
-            f"begin a new session for participant {session.participant}, number {session.number} (run)"
+            f"run a new session with participant {session.participant} and session number {session.number}"
         )
 
 

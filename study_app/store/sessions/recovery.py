@@ -59,7 +59,7 @@ from study_app.store.tables.study_files import (
     write_participants,
 )
 
-RESTORE = "restore the journal from a copy"
+RESTORE = "restore the journal from a back-up"
 _SHOWN_DIFFERENCES = 6
 _MOST_GAP_S = 366 * 86400.0
 """Longest plausible gap [s]: beyond it the wall clock was or is wrong."""
@@ -258,11 +258,11 @@ def files_beyond_journal(place: Place, lines: Sequence[events.Event]) -> Iterato
     if not ended and (status := held.get("status", receipt.UNFINISHED)) != receipt.UNFINISHED:
         yield folder.receipt, f"its status is {status!r}, but the journal's is {receipt.UNFINISHED!r}"
     if len(held.get("resumed", ())) > sum(isinstance(line, events.SessionResumed) for line in lines):
-        yield folder.receipt, "contains more resumptions of the session than the journal"
+        yield folder.receipt, "records more resumptions of the session than the journal does"
     if ended:
         return
     if is_there(folder.checksums):
-        yield folder.checksums, "was written after the session ended, but the end is missing from the journal"
+        yield folder.checksums, "was written after the session ended, but the journal does not record the end"
     rows = session_tables.SessionRows(lines)
     for name, spare in (("responses", 0), ("trials", 1), ("intervals", 1)):
         path, given = folder.table(place.study, name), len(rows.table(name))
@@ -276,7 +276,7 @@ def _ended_or_recorded(place: Place, lines: Sequence[events.Event]) -> Iterator[
     if isinstance(lines[-1], events.SessionEnded):
         return
     if place_of(study, folder) in {session for _, session in read_list(study.fingerprints)}:
-        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but the end is missing from its journal"
+        yield study.fingerprints, f"lists {place_of(study, folder)} as ended, but its journal does not record the end"
     of_trials = {path for which in recordable(lines) for path in recording_files(folder.recordings, *which)}
     for path in paths_in(folder.recordings):
         if path not in of_trials and RECORDING_NAME.fullmatch(path.relative_to(folder.path).as_posix()):
@@ -311,7 +311,7 @@ def _read_interrupted(study_folder: StudyFolder, folder: SessionFolder, protocol
     place = Place(study_folder, folder, start.study)
     first = receipt.read(folder.receipt)
     if receipt.has_other_format(first, start):
-        raise StoreError(f"{folder.journal} has a different format from the one in its receipt: restore it from a copy")
+        raise StoreError(f"{folder.journal} and its receipt have different formats: restore them from a back-up")
     _refuse_truncated_journal(place, contents.lines)
     refuse_earlier_columns(study_folder)
     _same_protocol(place, first, start, protocol, source)

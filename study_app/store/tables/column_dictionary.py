@@ -58,8 +58,8 @@ def _section(title: str, file: str, row: str, lines: Sequence[str]) -> str:
 def _journal() -> str:
     head = (
         "Every line has `n` (counting from 1, without gaps), `event`, `t_s` (on the session's clock), `at` (ISO 8601) "
-        "and `previous` (SHA-256 of all bytes before it). `session_started` has `format` 2; in format 1 "
-        "`previous` is missing.",
+        "and `previous` (SHA-256 of all bytes before it). `session_started` has `format` 2; format 1 did "
+        "not have `previous`.",
         "",
         "| event | fields | meaning |",
         "| --- | --- | --- |",

@@ -54,7 +54,7 @@ def _proof_lines(study: StudyFolder) -> str:
         for proof, name in (*read_list(StudyFolder(folder).fingerprints), *record_proofs(StudyFolder(folder)))
     ]
     if not lines:
-        raise StoreError(f"{study.path} does not contain an ended session: there is nothing to prove yet")
+        raise StoreError(f"{study.path} does not contain a finished session: there is nothing to prove yet")
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -156,6 +156,6 @@ def _check_signature(path: Path, lines: str, public: str, signature: str) -> str
         raise StoreError(f"{path} was changed after it was signed") from error
     own = _signing_key(draws=False)
     if own is not None and own.public_key().public_bytes_raw() != key.public_bytes_raw():
-        raise StoreError(f"{path} is signed with a key ({public}) that is not this computer's: it was replaced")
-    signer = "this computer's key" if own is not None else f"{public}: compare it with your key"
+        raise StoreError(f"{path} is signed with another computer's key ({public}): the signature was replaced")
+    signer = "this computer's key" if own is not None else f"the key {public}: compare it with your own"
     return f"is signed with {signer}"

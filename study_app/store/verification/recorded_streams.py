@@ -42,7 +42,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
     ours = [(name, it) for name, it in streams if name in {MARKERS, SAMPLES}]
     if not ours:
         names = ", ".join(repr(name) for name, _ in streams) or "none"
-        raise StoreError(f"{file} does not contain a stream '{MARKERS}' or '{SAMPLES}'; its streams: {names}")
+        raise StoreError(f"{file} does not contain a stream named '{MARKERS}' or '{SAMPLES}'; its streams: {names}")
     merged = read_merged(folder)
     places = [folder] if merged is None else [it for it in map(merged.folder, merged.names) if it.is_dir()]
     sessions = [session for place in places for session in StudyFolder(place).sessions()]
@@ -63,7 +63,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
             said += [*of, f"clock of '{name}': {_clock_drift(stream)}"]
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             why = f"{type(error).__name__}: {error}"
-            raise StoreError(f"{file} contains a damaged stream '{name}' ({why}): restore it from a copy") from error
+            raise StoreError(f"{file} contains a damaged stream '{name}' ({why}): restore it from a back-up") from error
     markers = [text for name, stream in ours if name == MARKERS for text in _texts(stream)]
     sent = {text for texts in expected.values() for text in texts}
     if any(name == MARKERS for name, _ in ours) and sent.isdisjoint(markers):
@@ -111,12 +111,13 @@ def _check_markers(
             continue
         first, last = known_numbers[0], known_numbers[-1]
         if lost := [text for text in sent[first : last + 1] if text not in at]:
-            what = f"{file.name} lacks {counted(len(lost), 'marker')} that its journal contains"
+            what = f"{file.name} does not contain {counted(len(lost), 'marker')} recorded in the journal"
             findings.error(session.path, f"{what}; the first: {lost[0]}")
         span = texts[min(at.values()) : max(at.values()) + 1]
         if added := [text for text in span if text not in known and not text.startswith(_TARGET)]:
-            what = f"{file.name} contains {counted(len(added), 'marker')} that its journal lacks; the first: {added[0]}"
-            findings.error(session.path, f"{what}. Either the journal was changed, or another program sent them")
+            what = f"{counted(len(added), 'marker')} not recorded in the journal, starting with {added[0]}"
+            why = "either the journal was changed, or another program sent markers"
+            findings.error(session.path, f"{file.name} contains {what}: {why}")
             unknown -= len(added)
         if outside := len(sent) - 1 - (last - first):
             when = f"{first} before the recording and {len(sent) - 1 - last} after it"
@@ -150,7 +151,7 @@ def _check_samples(file: Path, stream: Mapping[str, Any], findings: Findings) ->
     stamps_s = np.asarray(stream["time_stamps"], float)
     labels = [channel["label"][0] for channel in stream["info"]["desc"][0]["channels"][0]["channel"]]
     if "tick" not in labels:
-        yield f"samples: {len(stamps_s)} recorded, without the tick numbers that would reveal lost samples"
+        yield f"samples: {len(stamps_s)} recorded without tick numbers, so lost samples cannot be detected"
         return
     if len(stamps_s) == 0:
         yield "samples: none recorded"
@@ -172,14 +173,14 @@ def _clock_drift(stream: Mapping[str, Any]) -> str:
     """Return a text about the drift of a stream's clock against the recorder's, from offsets between two resets."""
     times_s, values_s = (np.asarray(stream.get(name, ()), float) for name in ("clock_times", "clock_values"))
     if len(times_s) < 2:
-        return f"{counted(len(times_s), 'offset')} measured, too few to estimate the drift"
+        return f"{counted(len(times_s), 'offset')} measured, which is too few to estimate the drift"
     resets = np.flatnonzero((np.diff(times_s) < 0) | (np.abs(np.diff(values_s)) > _RESET_S)) + 1
     parts = zip(np.split(times_s, resets), np.split(values_s, resets), strict=True)
     said = []
     for t_s, v_s in parts:
         slope, residual_s = _fit_line(t_s, v_s)
         if math.isfinite(slope):
-            span = f"over {np.ptp(t_s):.0f} s, offsets within {1e3 * residual_s:.2g} ms of a straight line"
+            span = f"over {np.ptp(t_s):.0f} s, with offsets within {1e3 * residual_s:.2g} ms of a straight line"
             said.append(f"drift {1e6 * slope:+.2g} ppm {span}")
     return "; ".join([counted(len(resets), "reset"), *said])
 

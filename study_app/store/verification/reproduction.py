@@ -46,9 +46,9 @@ def reproduce_session(session_folder: Path) -> Reproduced:
     study, folder = locate_session(session_folder)
     ran, lines, key = receipt.read(folder.receipt), journal.read(folder.journal), read_key(study.path)
     if key.hash != ran["key_hash"]:
-        raise StoreError(f"{study.key} is not the key of session {folder.path}: restore it from a copy")
+        raise StoreError(f"{study.key} is not the key of session {folder.path}: restore it from a back-up")
     if lacking := [name for name in receipt.FIELDS if name not in ran]:
-        raise StoreError(f"{folder.receipt} lacks {', '.join(lacking)}: restore it from a copy")
+        raise StoreError(f"{folder.receipt} does not contain {', '.join(lacking)}: restore it from a back-up")
     seed, participant = ran["seed"], ran["participant"]
     complete = ran["status"] in events.REACHED_END
     try:
@@ -59,8 +59,8 @@ def reproduce_session(session_folder: Path) -> Reproduced:
         recorded = recorded_trials(open_events(lines, key) if lines and events.start_of(lines).own_codes else lines)
     except (KeyError, TypeError, AttributeError, ValueError):  # the reason could reveal a condition
         raise StoreError(
-            f"the receipt, the key and the journal of {folder.path} do not determine the session: verify the study's "
-            "folder"
+            f"the receipt, the key and the journal of {folder.path} do not fully describe the session: verify the "
+            "study's folder"
         ) from None
     reproduction = Reproduced([*reproduce(protocol, seed, participant, recorded, complete=complete, place=place)])
     if lines and events.start_of(lines).intervals:
@@ -70,7 +70,7 @@ def reproduce_session(session_folder: Path) -> Reproduced:
         if compared.differences and str(ran.get("level_rules", versions.get("level rules"))) != str(LEVEL_RULES):
             reproduction.followed.append(
                 f"the session was run by liquid-study {versions.get('liquid-study')}, which chose levels by different "
-                "rules: run reproduce in that version"
+                "rules: run reproduce with that version"
             )
     return reproduction
 
@@ -94,7 +94,7 @@ def _compare_levels(
     reproduction.differences += compared.differences
     for block, trials in compared.trials.items():
         follows = sum(trials.values())
-        reproduction.followed.append(f"{block}: {follows} of {len(trials)} levels agree with the answers")
+        reproduction.followed.append(f"{block}: {follows} of {len(trials)} levels are consistent with the answers")
 
 
 class _Compared:
@@ -160,10 +160,10 @@ class _Compared:
             return
         steps = [event.steps for event in own if isinstance(event, events.Stepped)]
         if isinstance(line, events.Responses):
-            follows, wrong = bool(line.items) and line.items[0].value == sum(steps), "the answer is not the sum of its"
+            follows, wrong = bool(line.items) and line.items[0].value == sum(steps), "the answer is not the sum of the"
         else:
             follows = set_to == setting.level(setting.reached(steps))
-            wrong = "the interval ended at a setting that does not follow from its"
+            wrong = "the setting at the end of the interval does not match the"
         if not follows:
             self.differences.append(f"trial {which[0]}, attempt {which[1]}: {wrong} steps")
         self._note(block, which[0], follows)

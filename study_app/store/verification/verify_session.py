@@ -39,7 +39,7 @@ from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 
-_BEGUN = "but the receipt, tables, recordings or checksums show that the session began: restore it from a copy"
+_BEGUN = "but the receipt, tables, recordings or checksums show that the session began: restore it from a back-up"
 _ROUNDED_S = 1.1e-6
 _CHANGED = "has changed since the session ended (its checksum differs)"
 _REBUILT_AFTER = "states that the checksums or the fingerprint were rewritten after the session ended"
@@ -149,7 +149,7 @@ def _check_files(
         findings.warning(folder.path, "is open in another program")
     else:
         for path in (*temporary_files(folder.path), *temporary_files(folder.recordings)):
-            what = "is an incomplete file left by a program that was killed; the command rebuild removes it"
+            what = "is an incomplete file left by a program that was killed; the rebuild command removes it"
             findings.warning(path, what)
         if is_there(folder.crash) and folder.crash.stat().st_size:
             findings.warning(folder.crash, "shows how the program crashed: send it to the developers")
@@ -182,7 +182,7 @@ def _check_files(
             _check_recordings(folder, told, key, hashes, findings, ended=ended)
     for name in system_files(folder):
         if name not in hashes:
-            what = "was made by an operating system, or is a copy made by a program that shares files"
+            what = "was created by the operating system, or is a copy made by a file-sharing program"
             findings.warning(folder.path / name, what)
     if is_there(folder.rebuilt):
         with findings.reading(folder.rebuilt):
@@ -208,7 +208,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
             if not running:
                 findings.warning(
                     folder.path,
-                    "was created, but the program ended before it wrote a journal: begin it again, or delete it",
+                    "was created, but the program ended before it wrote a journal: start it again or delete it",
                 )
         else:
             findings.error(folder.journal, f"is missing, {_BEGUN}")
@@ -243,7 +243,7 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
         findings.error(folder.journal, f"its status is {done.ended!r}, although {missing or 'no trial is missing'}")
     if done.ended is None:
         if not running:
-            findings.warning(folder.path, "is unfinished: you can resume it")
+            findings.warning(folder.path, "is unfinished but can be resumed")
     elif not isinstance(contents.lines[-1], events.SessionEnded):
         findings.error(folder.journal, "contains lines after the session's end")
     return contents
@@ -259,7 +259,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
         findings.failure(path, error)
         return
     if missing := [name for name in receipt.FIELDS if name not in held]:
-        findings.error(path, f"lacks {', '.join(missing)}")
+        findings.error(path, f"does not contain {', '.join(missing)}")
     if key is not None and held["key_hash"] != key.hash:
         findings.error(path, "contains the hash of a different key")
     if not lines:
@@ -270,7 +270,7 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
     differing = [name for name in compared if held.get(name) != getattr(start, name)]
     differing += _differing_fields(held, lines)
     if not differing and start.receipt_hash not in (None, receipt.digest(held)):
-        differing = ["the settings with which the session began"]
+        differing = ["the settings used when the session began"]
     if differing:
         findings.error(path, f"differs from the journal in {', '.join(differing)}")
     told = {str(entry.get("at")) for entry in held.get("resumed", ()) if isinstance(entry, dict)}
@@ -279,22 +279,22 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
         findings.warning(
             path,
             (
-                f"lacks the settings with which the session was resumed at {', '.join(lacking)}: the program was "
-                "killed at that time, or the entry was removed"
+                f"does not contain the settings used when the session was resumed at {', '.join(lacking)}: the "
+                "program was killed at that time, or the entry was removed"
             ),
         )
     if key is not None and not _is_protocol(held, start, key):
-        findings.error(path, "its protocol has been changed: restore it from a copy")
+        findings.error(path, "its protocol has been changed: restore it from a back-up")
     if receipt.has_other_format(held, start):
         findings.error(
             folder.journal,
-            f"has a different format from the one in {path.name}: it has been changed; restore the journal from a copy",
+            f"has a different format from {path.name}: it has been changed; restore the journal from a back-up",
         )
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:
         findings.error(
             path,
-            f"its status is {held.get('status')!r}, but the journal's is {last.status!r}; the command rebuild "
+            f"its status is {held.get('status')!r}, but the journal's is {last.status!r}; the rebuild command "
             "corrects it",
         )
     sequence = protocol.get("sequence") if isinstance(protocol := held.get("protocol"), dict) else None
@@ -361,7 +361,7 @@ def _unconfirmed_answers(lines: Sequence[events.Event]) -> Iterator[str]:
         for trial, number in list(chosen.items()):
             if completed or (isinstance(line, events.TrialStarted) and line.trial > trial):
                 del chosen[trial]
-                yield f"line {number} is an answer in trial {trial}, which was never confirmed: a line was removed"
+                yield f"line {number} contains an answer in trial {trial} that was never confirmed: a line was removed"
         if completed or isinstance(line, events.PageShown | events.FormShown | events.TrialStarted):
             shown = line if isinstance(line, events.FormShown) else None
             if form is not None and (shown is None or (form.form, form.after) != (shown.form, shown.after)):
@@ -380,11 +380,11 @@ def _wrong_responses(lines: Sequence[events.Event]) -> Iterator[str]:
             hides = any(row.kind is not None for row in line.items)  # format 2: a question may have been hidden again
             for row in line.items:
                 if not _same_answer(row, chosen.pop(row.item, events.Answer())):
-                    wrong = "that differs from the answer chosen before: it has been changed"
+                    wrong = "that differs from the one chosen earlier: it has been changed"
                     yield f"{line_name} has an answer for {row.item!r} in {where} {wrong}"
             for item, answer in chosen.items():
                 if answer.given or not hides:
-                    yield f"{line_name} lacks {item!r}, answered in {where}: it has been changed"
+                    yield f"{line_name} does not contain the answer to {item!r} in {where}: it has been changed"
         now.process_line(line)
 
 
@@ -413,7 +413,7 @@ def _check_tables(place: Place, lines: list[events.Event], findings: Findings, *
     for (path, content), name in zip(expected, columns, strict=True):
         held = path.read_bytes() if path.is_file() else content
         if held != content and held == _sealed_tables(place, lines).get(path):
-            findings.error(path, f"lacks the sealed columns: {INTERRUPTED}")
+            findings.error(path, f"does not contain the sealed columns: {INTERRUPTED}")
         elif path not in telling:
             check_table(path, content, columns[name], findings, may_differ=lambda _: not ended)
 
@@ -436,7 +436,7 @@ def check_table(
     try:
         content = read_regular(path)
     except OSError:
-        findings.error(path, "is missing or cannot be read; the command rebuild creates it again")
+        findings.error(path, "is missing or cannot be read; the rebuild command recreates it")
         return
     written = journal.as_written(content)
     if content != written == expected:
@@ -447,7 +447,7 @@ def check_table(
     follows = all(map(may_differ, differing))
     if differing:
         report = findings.warning if follows else findings.error
-        report(path, f"differs from the journal, starting at line {differing[0]}; the command rebuild creates it again")
+        report(path, f"differs from the journal, starting at line {differing[0]}; the rebuild command recreates it")
     if not (differing and follows):  # a row may be partly written: earlier versions wrote in place
         for problem in csv_files.table_problems(content, columns):
             findings.error(path, problem)
@@ -491,7 +491,7 @@ def _check_checksums(
     if not is_there(folder.checksums):
         findings.error(
             folder.checksums,
-            "is missing: the program may have been killed at the end of the session; the command rebuild creates it",
+            "is missing: the program may have been killed at the end of the session; the rebuild command creates it",
         )
         return
     with findings.reading(folder.checksums):
@@ -538,12 +538,12 @@ def _check_recordings(
     known = {line.which for line in lines if isinstance(line, events.Recorded | events.RecordingLost)}
     for line in lines:
         if isinstance(line, events.RecordingLost):
-            findings.warning(folder.recordings, f"{attempt_name(*line.which)} has none: {line.reason}")
+            findings.warning(folder.recordings, f"{attempt_name(*line.which)} does not have a recording: {line.reason}")
         if not isinstance(line, events.Recorded):
             continue
         which = attempt_name(*line.which)
         if line.samples_unrecorded:
-            findings.warning(folder.path / line.recording, f"lacks {line.samples_unrecorded} samples")
+            findings.warning(folder.path / line.recording, f"is missing {line.samples_unrecorded} samples")
         for kind, name, rows, digests in (
             ("samples", line.recording, line.samples_recorded, (line.sha256, line.opened_sha256)),
             ("frames", line.recording_frames, line.frames_recorded, (line.frames_sha256, line.opened_frames_sha256)),

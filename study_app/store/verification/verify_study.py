@@ -124,7 +124,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
         _check_participants(study, name, sessions, findings)
     if early_journals := sum(session.row is not None and not session.chained for session in sessions):
         many = "1 journal is" if early_journals == 1 else f"{early_journals} journals are"
-        findings.warning(study.data, f"{many} in format 1, whose lines cannot show whether an earlier line was changed")
+        findings.warning(study.data, f"{many} in format 1, which cannot show whether an earlier line was changed")
     _check_fingerprints(study, sessions, early, withdrawn, findings)
     if copy is not None:
         _check_copy(study, sessions, withdrawn, *copy, findings)
@@ -138,7 +138,7 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
         if path.is_dir() and (path.name.startswith("sub-") or path.parent in places):
             findings.warning(path, "is ignored because it is not a session folder; it may be a copy of one")
     for path in (*temporary_files(folder), *temporary_files(study.data)):
-        findings.warning(path, "is an incomplete file left by a killed program, or is being written")
+        findings.warning(path, "is being written, or is an incomplete file left by a program that was killed")
     return sessions
 
 
@@ -163,9 +163,7 @@ def _check_contents(study: StudyFolder, findings: Findings) -> None:
         hashes.setdefault(run.version, set()).add(run.hash)
     for version, contents in hashes.items():
         if len(contents) > 1:
-            what = (
-                f"sessions with version {version} ran {len(contents)} different study files (protocol_hash in receipts)"
-            )
+            what = f"sessions with version {version} used {len(contents)} different study files (see protocol_hash)"
             findings.warning(study.data, f"{what}: change study.version whenever the file changes")
 
 
@@ -181,12 +179,12 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
     for claim in claims(study):
         if not claim.participant:
             if claim.path.lstat().st_size:
-                findings.error(claim.path, "has been changed: restore it from a copy")
+                findings.error(claim.path, "has been changed: restore it from a back-up")
             else:
-                findings.warning(claim.path, "was reserved by a program that ended before writing it; it stays unused")
+                findings.warning(claim.path, "was reserved by a program that ended too early; it will remain unused")
             continue
         if not is_unchanged(claim, key):
-            findings.error(claim.path, "has been changed: restore it from a copy")
+            findings.error(claim.path, "has been changed: restore it from a back-up")
         elif claim.participant in holders:
             first = holders[claim.participant].path.stem
             findings.error(
@@ -197,7 +195,7 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
         holders.setdefault(claim.participant, claim)
     for claim in holders.values():
         if claim.replaces is not None and not _same_entry(claim, holders.get(claim.replaces)):
-            findings.error(claim.path, f"replaces participant {claim.replaces}, who does not have such an entry")
+            findings.error(claim.path, f"replaces participant {claim.replaces}, who does not have a matching entry")
     shared = Counter((own.group, own.entry) for own in begun.values() if own.replaces is None)
     for participant, own in begun.items():
         path = study.allocation(own.entry, own.group, None if own.replaces is None else participant)
@@ -249,7 +247,7 @@ def _check_participants(study: StudyFolder, name: str, sessions: Sessions, findi
     content, columns = table_bytes(study, rows), columns_of(study, rows)
     path, sealed = study.participants(name), csv_files.csv_bytes(csv_files.unsealed_columns(columns), ())
     if path.is_file() and sealed != csv_files.csv_bytes(columns, ()) and path.read_bytes().startswith(sealed):
-        findings.error(path, f"lacks the sealed columns: {INTERRUPTED}")
+        findings.error(path, f"does not contain the sealed columns: {INTERRUPTED}")
         return
     late = {number for number, row in enumerate(rows, start=2) if row["status"] == receipt.UNFINISHED}
     told = Findings(findings.folder)
@@ -274,7 +272,7 @@ def _check_fingerprints(
     """
     path = study.fingerprints
     for number in unreadable_lines(path):
-        findings.error(path, f"line {number} is not a fingerprint: restore it from a copy")
+        findings.error(path, f"line {number} is not a fingerprint: restore it from a back-up")
     erased = tuple(f"data/sub-{participant}/" for participant in withdrawn)  # reported as an interrupted withdrawal
     listed = [proof for proof in early if not proof[1].startswith(erased)]
     _compare_proofs(study, sessions, listed, path.name, findings)
@@ -289,7 +287,7 @@ def _check_fingerprints(
             and place_of(study, session.place.folder) not in known
         ):
             place = place_of(study, session.place.folder)
-            findings.error(path, f"lacks {place}, which has ended; the command rebuild adds it")
+            findings.error(path, f"does not list {place}, which has ended; the rebuild command adds it")
 
 
 def _check_copy(
@@ -325,7 +323,7 @@ def _check_copy(
     copy = [line for line in kept if line not in erased]
     for record, place in copy:
         if not place.startswith("data/") and (record, place) not in recorded:
-            what = f"lacks {record} ({place}), which {path} lists: it was deleted or changed"
+            what = f"does not contain {record} ({place}), although {path} lists it: it was deleted or changed"
             findings.error(study.path / place.partition("/")[0], what)
     _compare_proofs(study, sessions, copy, str(path), findings)
     known = {place for _, place in copy}
@@ -378,14 +376,14 @@ def _check_description(study: StudyFolder, findings: Findings) -> None:
     if not heads or held in heads:
         return
     if opened and held in sealed_heads:
-        findings.error(study.description, f"lacks the sealed columns: {INTERRUPTED}")
+        findings.error(study.description, f"does not contain the sealed columns: {INTERRUPTED}")
         return
     if any(is_same_description(held, head) for head in heads):
         findings.warning(
-            study.description, "describes the columns as an earlier version of the program did", shares=True
+            study.description, "contains the column descriptions of an earlier version of the program", shares=True
         )
     else:
-        findings.error(study.description, "differs from what this version writes for the study in the receipts")
+        findings.error(study.description, "does not match the study in the receipts")
 
 
 def _published_protocols(study: StudyFolder) -> Iterator[dict[str, Any]]:
@@ -423,13 +421,13 @@ def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> N
         for number, torn in blinding.unreadable_reveals(study.path):
             if torn:
                 findings.warning(
-                    study.reveals, f"line {number} is not a complete record of an unblinding (power failure)"
+                    study.reveals, f"line {number} is an incomplete record of an unblinding (possibly a power failure)"
                 )
             else:
                 findings.error(
                     study.reveals,
                     f"line {number} is not a record of an unblinding: it has been changed; restore the file from a "
-                    "copy",
+                    "back-up",
                 )
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if key is not None and record["key_hash"] != key.hash:
@@ -459,11 +457,11 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
         folder = merged.folder(site.name)
         if not folder.is_dir():
             lists = f"{merged.manifest.name} lists site {site.name}"
-            findings.error(folder, f"is missing, although {lists}: restore it from a copy")
+            findings.error(folder, f"is missing, although {lists}: restore it from a back-up")
             continue
         if sealed_hash(folder) != site.key_hash:
             key = StudyFolder(folder).key
-            findings.error(key, f"is not the key that site {site.name} was merged with: restore it from a copy")
+            findings.error(key, f"is not the key that site {site.name} was merged with: restore it from a back-up")
         _check_site(merged, site, findings)
         for session in StudyFolder(folder).sessions():
             with contextlib.suppress(StoreError):  # reported when the site is checked
@@ -478,7 +476,7 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
     for path in stray_entries(merged):
         findings.warning(path, f"is not listed as a site in {merged.manifest.name}, so it is ignored")
     for path in temporary_files(merged.path):
-        findings.warning(path, "is an incomplete file left by a killed program, or is being written")
+        findings.warning(path, "is being written, or is an incomplete file left by a program that was killed")
 
 
 def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
@@ -494,4 +492,4 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
         erased = sum(len(tombstone.sessions) for tombstone in withdrawn[before:])
         if (present := len(study.sessions())) + erased < site.sessions:
             which = f"{present} of the {site.sessions} sessions that {merged.manifest.name} lists"
-            findings.error(study.path, f"contains only {which}: restore the others from a copy")
+            findings.error(study.path, f"contains only {which}: restore the others from a back-up")

@@ -59,7 +59,7 @@ def test_a_table_changed_by_hand_is_named_with_what_mends_it(copy: StudyFolder) 
     path = another_answer(session)
     (line,) = told(copy)
     assert line.startswith(
-        f"{path} differs from the journal, starting at line 2; the command rebuild creates it again: run liquid-study"
+        f"{path} differs from the journal, starting at line 2; the rebuild command recreates it: run liquid-study"
     )
     rebuild_session(session.path)
     assert told(copy) == []
@@ -70,7 +70,7 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
     change(session.journal, b'"operator":"', b'"operator":"X')
     (line,) = told(copy)
     assert line.startswith(f"{session.journal} line ")
-    assert "restore the journal from a copy" in line
+    assert "restore the journal from a back-up" in line
     assert "rebuild" not in line
 
 
@@ -81,7 +81,7 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
         (lambda session: change(session.journal, b"\n", b"garbage\n"), "line 1 is damaged"),
         (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "line 2 has n 3, so lines are missing"),
         (lambda session: session.journal.write_bytes(b""), "does not contain a complete line, but the receipt"),
-        (lambda session: cut_last_line(session.journal), "but the end is missing from the journal"),
+        (lambda session: cut_last_line(session.journal), "but the journal does not record the end"),
         (lambda session: change(session.receipt, b'"version"', b'"version" '), "has changed since the session ended"),
         (lambda session: session.checksums.unlink(), "is missing: the program may have been killed"),
     ],
@@ -119,7 +119,7 @@ def test_the_commands_go_on_and_say_so_in_a_line_and_beside_what_they_write(
     name = path.relative_to(copy.path).as_posix()
     if command == "export":
         codebook = json.loads((tmp_path / "out" / "codebook.json").read_text(encoding="utf-8"))
-        what = "differs from the journal, starting at line 2; the command rebuild creates it again"
+        what = "differs from the journal, starting at line 2; the rebuild command recreates it"
         assert codebook["doubts"] == [{"file": name, "what": what}]
     else:
         caption = (tmp_path / "out" / "liquids.txt").read_text(encoding="utf-8")

@@ -128,7 +128,7 @@ def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, 
     later = base64.encodebytes(json.dumps(content_of(tmp_path) | {"format": 3}).encode())
     no_key = r"key\.sealed is no longer a sealed key"
     contents = dict.fromkeys((b"", b"not base64 \xff", b"aGVsbG8=\n", b"W10=\n", b"e30=\n"), no_key)
-    for content, sentence in (contents | {later: "has format 3, but this version reads 1 and 2"}).items():
+    for content, sentence in (contents | {later: "has format 3, but this version reads only formats 1 and 2"}).items():
         sealed(tmp_path).write_bytes(content)
         with pytest.raises(StoreError, match=sentence):
             open_or_draw_key(tmp_path, protocol)

@@ -42,7 +42,7 @@ design = "2ifc"
 method = "brief"
 """
 REASON = re.compile(
-    r'block "(\w+)": (\d+) of (\d+) catch trials answered incorrectly, at most 20 % are permitted', re.ASCII
+    r'block "(\w+)": (\d+) of (\d+) catch trials were answered incorrectly; at most 20 % are permitted', re.ASCII
 )
 BRIEF = """
 [methods.brief]
@@ -98,7 +98,7 @@ def test_sessions_that_cannot_be_excluded_are_named(study: Path) -> None:
     listed = StudyFolder(study).exclusions
     listed.write_text("torn", encoding="utf-8", newline="\n")
     (warning,) = unblind(study, "AB", "to analyse").left
-    assert warning.startswith("the rule catch was not applied (")
+    assert warning.startswith("the rule “catch” was not applied (")
     assert listed.read_text("utf-8") == "torn"
     listed.unlink()
     assert len(unblind(study, "AB", "once more").excluded) == 2
@@ -116,7 +116,9 @@ def test_running_sessions_are_not_judged(study: Path) -> None:
 
 def test_levels_of_a_study_with_catch_trials_follow_and_the_tables_name_them(study: Path) -> None:
     for session in StudyFolder(study).sessions():
-        assert reproduce_session(session.path).followed[-1:] == ["viscosity: 60 of 60 levels agree with the answers"]
+        assert reproduce_session(session.path).followed[-1:] == [
+            "viscosity: 60 of 60 levels are consistent with the answers"
+        ]
         with next(session.path.rglob("*intervals*.csv")).open(encoding="utf-8") as file:
             assert "catch" not in next(csv.reader(file))
     unblind(study, "AB", "to analyse")
@@ -137,7 +139,7 @@ def test_sessions_of_versions_without_catch_trials_are_reproduced_and_unblinded(
     (tmp_path / "levels.toml").write_text(text_of(*SHORT), encoding="utf-8", newline="\n")
     study = rehearse(tmp_path / "levels.toml", participants=1, seed=2, results=tmp_path / "study", recordings=False)
     (session,) = StudyFolder(study).sessions()
-    assert reproduce_session(session.path).followed == ["viscosity: 12 of 12 levels agree with the answers"]
+    assert reproduce_session(session.path).followed == ["viscosity: 12 of 12 levels are consistent with the answers"]
     assert unblind(study, "AB", "to analyse").left == ()
     (path,) = session.path.rglob("*intervals*.csv")
     with path.open(encoding="utf-8") as file:

@@ -159,9 +159,11 @@ def test_a_group_is_refused_where_groups_are_randomised_or_there_are_none(tmp_pa
 def test_a_replacement_needs_a_participant_of_the_same_group(tmp_path: Path) -> None:
     folder, source = tmp_path / "s", source_of(PREEXISTING)
     begun(folder, source, "P001", group="experts").close()
-    with pytest.raises(StudyError, match="P001 is in group experts, but P002 is in group novices"):
+    with pytest.raises(StudyError, match="'P001' in group experts cannot be replaced by P002 in group novices"):
         begun(folder, source, "P002", group="novices", row_of="P001")
-    with pytest.raises(StudyError, match="row of 'P009': this ID does not exist in this folder"):
+    with pytest.raises(
+        StudyError, match="participant 'P009' cannot be replaced: this ID does not exist in this folder"
+    ):
         begun(folder, source, "P002", group="novices", row_of="P009")
     begun(folder, source, "P002", group="experts", row_of="P001").close()
     with pytest.raises(StudyError, match="participant P002 has replaced P001 since the first session"):
@@ -200,7 +202,7 @@ def test_verify_names_an_entry_that_was_changed(tmp_path: Path, edits: tuple[tup
     first, second = study.allocated / f"{stem}.json", study.allocated / f"{stem}-P002.json"
     whole = second.read_text("utf-8")
     second.write_text(whole.replace('"replaces": "P001"', '"replaces": "P003"'), encoding="utf-8", newline="\n")
-    assert f"{second.name}: replaces participant P003, who does not have such an entry" in _errors(study)
+    assert f"{second.name}: replaces participant P003, who does not have a matching entry" in _errors(study)
     second.write_text(whole.replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
     assert f"{second.name}: has been changed" in _errors(study)
     second.unlink()
@@ -233,5 +235,5 @@ def test_a_folder_of_an_earlier_version_goes_on_by_the_numbers_of_ids(tmp_path: 
         assert not reproduce_session(store.folder.path).differences[1:], "only the trials that were not run"
     assert orders["P002"] != orders["P003"] or orders["P004"] != orders["P003"]
     assert orders["P060"] == orders["P003"]
-    with pytest.raises(StudyError, match="the number in an ID assigns the row"):
+    with pytest.raises(StudyError, match="assigns rows by the number in the ID"):
         begun(study.path, source, "P061", row_of="anna")

@@ -41,7 +41,7 @@ def test_a_folder_is_open_in_one_program_until_it_lets_go(tmp_path: Path) -> Non
         (tmp_path / name).write_text("of no program", encoding="utf-8", newline="\n")
     first = lock_folder(tmp_path)
     assert is_open(tmp_path)
-    by = rf"is open in another program \(process {os.getpid()} on .*: wait for it, or end it there"
+    by = rf"is open in another program \(process {os.getpid()} on .*: wait for it, or close it there"
     with pytest.raises(StoreError, match=by):
         lock_folder(tmp_path)
     assert markers(tmp_path) == (first.marker,)

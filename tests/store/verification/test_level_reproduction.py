@@ -82,4 +82,4 @@ def test_compared_conditions_follow_from_the_key(tmp_path: Path) -> None:
     study = rehearse(path, participants=1, seed=2, results=tmp_path / "study", recordings=False)
     found = reproduce_session(next((study / "data").glob("sub-*/ses-*")))
     assert found.differences == []
-    assert found.followed == ["viscosity: 4 of 4 levels agree with the answers"]
+    assert found.followed == ["viscosity: 4 of 4 levels are consistent with the answers"]

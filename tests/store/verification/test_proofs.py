@@ -95,7 +95,7 @@ def test_lines_of_records_are_compared_and_a_withdrawal_that_was_asked_for_adds_
     typed.write_text(kept.read_text("utf-8").upper(), encoding="utf-8", newline="\n")
     assert verify_study(study, kept).errors == verify_study(study, typed).errors == ()
     (study / "blinding" / "reveals.jsonl").write_bytes(b"")
-    assert "reveals.jsonl: lacks " in "\n".join(map(str, verify_study(study, kept).errors))
+    assert "reveals.jsonl: does not contain " in "\n".join(map(str, verify_study(study, kept).errors))
     words = ("withdraw", str(study), "--participant", "P002", "--by", "AK", "--reason", "asked")
     said = CliRunner().invoke(commands, words).stdout.splitlines()
     told = "\n".join(map(str, verify_study(study, kept).errors))
@@ -111,7 +111,7 @@ def test_a_misread_line_is_named(study: Path) -> None:
     other = ("b" if first[2] != "b" else "c").join((first[:2], first[3:]))
     kept.write_text("\n".join([other, *rest]), encoding="utf-8", newline="\n")
     with pytest.raises(
-        StoreError, match=r"kept.txt, line 1 was misread: its last two characters do not match the rest of the line"
+        StoreError, match=r"kept.txt, line 1 was copied incorrectly: its last two characters do not match the rest"
     ):
         verify_study(study, kept)
 
@@ -129,9 +129,9 @@ def test_a_signature_tells_a_changed_copy_and_another_key(study: Path, key_store
         verify_study(study, kept)
     key_store.unlink()
     kept.write_text(whole, encoding="utf-8", newline="\n")
-    assert "compare it with your key" in "\n".join(read_proof(kept).told)
+    assert "compare it with your own" in "\n".join(read_proof(kept).told)
     proof_text(StudyFolder(study), sign=True)
-    with pytest.raises(StoreError, match=r"signed with a key .* that is not this computer's: it was replaced"):
+    with pytest.raises(StoreError, match=r"signed with another computer's key .*: the signature was replaced"):
         verify_study(study, kept)
 
 

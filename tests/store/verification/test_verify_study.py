@@ -49,7 +49,7 @@ def test_a_receipt_without_a_protocol_makes_no_word_of_the_study_a_telltale(stud
     for participant in ("P007", "P008"):
         path = study / "data" / f"sub-{participant}" / "ses-01" / "receipt.json"
         receipt.write(path, {name: value for name, value in receipt.read(path).items() if name != "protocol"})
-        assert "lacks protocol" in told(verify_study(study))
+        assert "does not contain protocol" in told(verify_study(study))
         assert "reveals a condition" not in warned(verify_study(study))
 
 
@@ -57,7 +57,7 @@ def test_two_files_under_one_version_are_named(study: Path) -> None:
     assert "different study files" not in warned(verify_study(study))
     path = study / P007 / "receipt.json"
     receipt.write(path, {**receipt.read(path), "protocol_hash": "ab" * 32})
-    assert "version 1.0 ran 2 different study files" in warned(verify_study(study))
+    assert "version 1.0 used 2 different study files" in warned(verify_study(study))
 
 
 def test_nothing_of_the_key_is_shown(study: Path) -> None:
@@ -83,12 +83,12 @@ def test_another_description_of_a_column_is_a_warning_and_another_range_an_error
     path.write_text(json.dumps(content | {"variableMeasured": variables}), encoding="utf-8", newline="\n")
     findings = verify_study(study)
     assert not any(error.place == path.name for error in findings.errors)
-    assert "describes the columns as an earlier version of the program did" in warned(findings)
+    assert "contains the column descriptions of an earlier version of the program" in warned(findings)
     at = next(index for index, it in enumerate(variables) if "minValue" in it and "unitText" in it)
     for change in ({"minValue": -5}, {"maxValue": 7}, {"unitText": "mile"}, {"@type": "y"}):
         changed = [*variables[:at], variables[at] | change, *variables[at + 1 :]]
         path.write_text(json.dumps(content | {"variableMeasured": changed}), encoding="utf-8", newline="\n")
-        assert "differs from what this version writes" in told(verify_study(study))
+        assert "does not match the study in the receipts" in told(verify_study(study))
 
 
 def test_a_column_that_was_removed_from_a_table_is_found(study: Path) -> None:

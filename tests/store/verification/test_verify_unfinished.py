@@ -42,16 +42,16 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     findings = verify_study(study)
     open_one.close()
     for sentence in (
-        "sub-P009/ses-01: is unfinished: you can resume it",
+        "sub-P009/ses-01: is unfinished but can be resumed",
         "sub-P009/ses-01/journal.jsonl: it ends with an incomplete line of 5 bytes",
         "sub-P009/ses-01/journal.jsonl: contains 'weather' events, which this version does not recognise",
         "sub-P009/ses-01/.receipt.json.0123abcd.tmp: is an incomplete file",
-        "sub-P009/ses-01/recordings: trial 1, attempt 1 has none: No space left on device",
+        "sub-P009/ses-01/recordings: trial 1, attempt 1 does not have a recording: No space left on device",
         "sub-P009/ses-01/recordings/trial-002.parquet: does not appear in the journal",
         "sub-P007/ses-01/crash.txt: shows how the program crashed",
         "sub-P010/ses-01: was created, but the program ended before it wrote a journal",
         "sub-P011/ses-01: is open in another program",
-        "data/.x.csv.0123abcd.tmp: is an incomplete file left by a killed program, or is being written",
+        "data/.x.csv.0123abcd.tmp: is being written, or is an incomplete file left by a program that was killed",
     ):
         assert sentence in warned(findings)
     assert told(findings) == ""
@@ -90,7 +90,7 @@ def test_tables_of_a_session_that_has_not_ended_may_be_behind_its_journal(
     findings = verify_study(study)
     assert findings.errors == ()
     for path in (PARTICIPANTS, "sub-P000/ses-01/subject-P000_session-01_task-brackish_description-trials_data.csv"):
-        assert f"{path}: differs from the journal, starting at line 2; the command rebuild creates it again" in warned(
+        assert f"{path}: differs from the journal, starting at line 2; the rebuild command recreates it" in warned(
             findings
         )
     Files(study).replace(PARTICIPANTS, "withdrawn", "completed")
@@ -115,6 +115,6 @@ def test_every_change_to_the_receipt_of_a_session_that_has_not_ended_is_an_error
         receipt.write(path, held | change)
         assert "sub-P009/ses-01/receipt.json: " in told(verify_study(study)), change
     receipt.write(path, held | {"resumed": []})  # so does a program leave it that is killed while it resumes
-    assert "sub-P009/ses-01/receipt.json: lacks the settings with which the session was resumed" in warned(
+    assert "sub-P009/ses-01/receipt.json: does not contain the settings used when the session was resumed" in warned(
         verify_study(study)
     )
