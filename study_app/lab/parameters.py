@@ -136,7 +136,7 @@ def the_liquid(scene: Scene) -> Liquid:
     if len(scene.liquids) != 1:
         raise StudyError(f"the lab opens one liquid at a time, not {len(scene.liquids)}: choose one")
     if isinstance(scene.velocity, Given):
-        raise StudyError('velocity "given" is only for motions from a file: choose an estimator such as "ewma"')
+        raise StudyError('velocity "given" requires a motion from a file: choose an estimator such as "ewma"')
     return scene.liquids[0]
 
 

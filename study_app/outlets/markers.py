@@ -177,7 +177,7 @@ class SinkThread:
                     f"a marker had still not been sent after {taken_s:.1f} s (limit {HANGS_S:g} s): {_ADVICE}"
                 )
             elif len(self._waiting) >= ROOM:
-                self._give_up(f"{ROOM:,} markers, the maximum, are waiting to be sent: {_ADVICE}")
+                self._give_up(f"the queue of unsent markers is full ({ROOM:,}): {_ADVICE}")
             else:
                 self._waiting.append(marker)
                 self._changed.notify_all()
@@ -202,7 +202,7 @@ class SinkThread:
         try:
             self.sink.close()
         except Exception as error:  # noqa: BLE001
-            self.lost = self.lost or f"it could not be closed: {error}"
+            self.lost = self.lost or f"the marker output could not be closed: {error}"
 
     def _give_up(self, reason: str) -> None:
         self.lost = self.lost or reason

@@ -196,7 +196,7 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
 
     about, requested_hz = "assumed, because the device does not measure its delay", protocol.device.rate_hz
     if facts.dynamics.delay_s is not None:
-        about = f"a force acts after {1e3 * facts.dynamics.delay_s:.2f} ms, as measured by the device"
+        about = f"a force takes effect after {1e3 * facts.dynamics.delay_s:.2f} ms, as measured by the device"
         if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
             about += " when it was opened; it has measured a longer delay since"
     well = facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS
@@ -303,14 +303,14 @@ def _outlet_checks(facts: Measurements, _protocol: Protocol) -> Iterator[Check]:
                 outlet.title,
                 "ok",
                 "off",
-                about="because the study is double-blind and anyone who sees the force can identify the liquid",
+                about="because the study is double-blind and the force would reveal the liquid",
             )
         elif outlet.lost:
             yield Check(
                 outlet.title, "warning", "not available", about=outlet.lost, advice="The session can run without it."
             )
         elif outlet.shows_force:
-            advice = "Anyone who sees the force can identify the liquid, so do not show the stream to anyone."
+            advice = "Do not show the stream to anyone, because the force reveals the liquid."
             who = "listener" if outlet.listens else "no listener"
             yield Check(outlet.title, "warning", who, about="the study is double-blind", advice=advice)
         elif outlet.listens is False:
@@ -327,7 +327,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         share = facts.tick_s * protocol.device.rate_hz
         value, about = (
             f"{facts.tick_s * 1e9:.0f} ns per tick",
-            f"the most expensive scene takes {100 * share:.2g} % of each tick",
+            f"the most demanding scene uses {100 * share:.2g} % of each tick",
         )
         advice, well = "Remove an effect from the scene.", share <= _MOST_OF_A_TICK
         yield _warning_unless("Scene cost", value, about, advice, well=well, share=share)
@@ -362,7 +362,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         about = (
             f"version {protocol.study.version} has already been run from a different file, with {facts.ran_otherwise}"
         )
-        advice = "Set a different study.version in the changed file; the report will mention the change in any case."
+        advice = "Set a different study.version in the changed file; the report mentions the change in any case."
         yield Check("Study file", "warning", "changed", about=about, advice=advice)
 
     if facts.untranslated:
@@ -371,12 +371,12 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         yield Check("Translation", "warning", counted(len(facts.untranslated), "text"), about=about, advice=advice)
 
     if protocol.assigns_rows and protocol.groups:
-        yield Check("Balance", "ok", "position in the group", about="determines the row of the square")
+        yield Check("Balance", "ok", "position in the group", about="determines the row of the Latin square")
     elif protocol.assigns_rows and (number := enrolment_number(facts.participant)) is not None:
-        yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the square")
+        yield Check("Balance", "ok", f"participant number {number}", about="determines the row of the Latin square")
     elif protocol.assigns_rows:
-        advice = f"{facts.participant} does not contain a number, so its row is drawn at random; use IDs such as P007."
-        yield Check("Balance", "warning", "drawn", about="row of the square", advice=advice)
+        advice = f"{facts.participant} does not contain a number, so the row is drawn at random; use IDs such as P007."
+        yield Check("Balance", "warning", "drawn", about="row of the Latin square", advice=advice)
 
 
 def _megabytes(count: float) -> str:

@@ -207,7 +207,7 @@ def replay(session_folder: Path) -> Replayed:
     kept = receipt.read(session.receipt)
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
-        raise StoreError(f"{study.key} is not the key of session {session.path}: restore it from a copy")
+        raise StoreError(f"{study.key} is not the key of session {session.path}: restore it from a back-up")
     lines = open_events(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _recorded_setup(session.receipt, kept, key, lines)
     _recompute_forces(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code before the timing
@@ -220,7 +220,7 @@ def replay(session_folder: Path) -> Replayed:
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(
-                f"{session.receipt} does not contain the device used since {resumed}: restore it from a copy"
+                f"{session.receipt} does not contain the device used since {resumed}: restore it from a back-up"
             )
         name = attempt_name(*which)
         if not isinstance(line, events.Recorded):
@@ -365,7 +365,7 @@ def _compare_recording(replayed: Replayed, name: str, samples: Any, again: _Befo
         replayed.uncompared += (f"{name}: the recording is empty",)
         return
     if not again.knows_its_start:
-        replayed.uncompared += (f"{name}: the recording continues from the force of one that is missing or has a gap",)
+        replayed.uncompared += (f"{name}: the recording continues an earlier one, which is missing or has a gap",)
         return
     replayed.recordings += 1
     replayed.lasted_s += float(samples.time_ns[-1] - samples.time_ns[0]) * 1e-9

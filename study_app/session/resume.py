@@ -105,7 +105,7 @@ def find_protocol(
             if parse(source, name).study.name == start.study:
                 return name
     raise SessionError(
-        f"the protocol of the study {start.study!r} was not found: specify its file with --protocol FILE"
+        f"the protocol for the study {start.study!r} was not found: specify its file with --protocol FILE"
     )
 
 

@@ -152,13 +152,13 @@ def check_row(row_of: str | None, study: Protocol) -> None:
         return
     if not study.assigns_rows:
         raise SessionError(
-            f"row of {row_of!r}: no block in {study.study.name} has a Williams or Latin order, so participants do "
-            "not have rows; omit this option"
+            f"participant {row_of!r} cannot be replaced: no block in {study.study.name} has a Williams or Latin order, "
+            "so rows are not used; omit this option"
         )
     if not ID_PATTERN.fullmatch(row_of) or enrolment_number(row_of) is None:
         raise SessionError(
-            f"row of {row_of!r}: rows are assigned by the number in a participant's ID; specify the ID of the "
-            "participant to be replaced, such as P007"
+            f"participant {row_of!r} cannot be replaced: rows are assigned by the number in the ID; specify an ID with "
+            "a number, such as P007"
         )
 
 

@@ -134,7 +134,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     begun = [at for at, line in enumerate(lines) if isinstance(line, events.TrialStarted)]
     first = next((at for at in begun if lines[at].which[:2] == (trial, attempt)), None)  # type: ignore[attr-defined]
     if first is None:
-        raise StoreError(f"{session.journal} does not contain attempt {attempt} at {named}: choose another trial")
+        raise StoreError(f"{session.journal} does not contain attempt {attempt} of {named}: choose another trial")
     _, *own = open_events([lines[0], *lines[first : next((at for at in begun if at > first), None)]], shown)
     started = own[0]
     assert isinstance(started, events.TrialStarted)  # noqa: S101 - checked before

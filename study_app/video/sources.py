@@ -88,7 +88,7 @@ class Camera:
         self.thread.start()
         with self._changed:
             self._changed.wait_for(lambda: self._frames or self._failure, OPENS_S)
-            failure = self._failure or ("" if self._frames else f"no picture arrived within {OPENS_S:g} s")
+            failure = self._failure or ("" if self._frames else f"no frame arrived within {OPENS_S:g} s")
         if failure:
             self.close()
             raise VideoError(f"the camera {without_login(source)} cannot be used: {failure}")
@@ -125,7 +125,7 @@ class Camera:
         with self._changed:
             failure, held = self._failure, tuple(self._frames)
         if not failure and self._stalls:
-            failure = f"no picture arrived for {STALLS_S:g} s"
+            failure = f"no frame arrived for {STALLS_S:g} s"
         if failure:
             raise stopped_error(failure)
         return next((frame for frame in reversed(held) if frame.due_ns <= moment_ns), None)
@@ -401,7 +401,7 @@ class Videos:
                         before.close()
                     self._keep(view, self._opened(view))
                 except VideoError as error:
-                    return VideosFound("every video in the study must open", str(error))
+                    return VideosFound("every video in the study must be playable", str(error))
         return VideosFound("; ".join(self._words()))
 
     def reopen(self) -> None:
@@ -457,7 +457,7 @@ class Videos:
             return Camera(self._camera, self._now_ns, self._holds_s)
         path = self._folder / view
         if file_hash(path) not in (None, self._hashes.get(view)):
-            raise VideoError(f"{path} is no longer the file that the study began with: restore it")
+            raise VideoError(f"{path} has changed since the study began: restore the original file")
         return Footage(path)
 
     def _words(self) -> Iterable[str]:

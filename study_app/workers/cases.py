@@ -104,7 +104,7 @@ class ClusterExecutor(Executor):
             from distributed import Client  # noqa: PLC0415 - an extra
         except ImportError as error:
             raise WorkerError(
-                "a cluster requires the package distributed, which is not installed: run pip install "
+                "a cluster requires the Python package distributed, which is not installed: run pip install "
                 "'liquid-study[cluster]', or compute on this computer with --workers"
             ) from error
         for name in _LOGGERS:
@@ -114,7 +114,7 @@ class ClusterExecutor(Executor):
         except OSError as error:
             raise _no_scheduler(address, str(error)) from error
         except Exception as error:  # Dask may raise anything if the server is not a Dask scheduler
-            raise _no_scheduler(address, "another program answers there") from error
+            raise _no_scheduler(address, "another program is listening there") from error
         self._executor = self._client.get_executor(pure=False)
         self.has_workers = bool(self._client.nthreads())
         self._pending: set[Future[Any]] = set()
@@ -143,13 +143,11 @@ class ClusterExecutor(Executor):
         """Wait for all cases, or cancel them after an exception; a failure of the cluster is one line."""
         self.shutdown(cancel_futures=kind is not None)
         if isinstance(error, CancelledError):
-            why = f"the cluster at {self.address} was lost: start it again, then repeat the command"
+            why = f"the cluster at {self.address} is no longer available: restart it, then repeat the command"
         elif type(error).__name__ == "KilledWorker":
-            why = (
-                f"the cluster at {self.address} lost several workers during the same case: give its workers more memory"
-            )
+            why = f"several workers of {self.address} failed on the same case: allocate more memory to each worker"
         elif isinstance(error, ModuleNotFoundError) and (error.name or "").startswith("study_app"):
-            why = f"a worker of {self.address} does not have this program: install this version of liquid-study there"
+            why = f"liquid-study is not installed on a worker of {self.address}: install this version there"
         else:
             return
         raise WorkerError(why) from error
@@ -243,11 +241,11 @@ def _receive_greeting(connection: socket.socket) -> None:
         came += more
         wanted += int.from_bytes(came, "little") if len(came) == wanted == 8 else 0
         if not more or wanted > _LONGEST_GREETING:
-            raise ConnectionError("another program answers there")
+            raise ConnectionError("another program is listening there")
 
 
 def _no_scheduler(address: str, why: str) -> WorkerError:
     return WorkerError(
-        f"no Dask scheduler answers at {address} ({why}): start one there with dask scheduler, correct the address, or "
-        "compute on this computer with --workers"
+        f"no Dask scheduler responds at {address} ({why}): start one there with dask scheduler, correct the address, "
+        "or compute on this computer with --workers"
     )

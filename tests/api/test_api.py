@@ -347,7 +347,7 @@ def test_a_session_of_a_participant_is_not_completed_by_simulated_answers(short:
     [
         ("third", "third"),
         (True, "answer True is neither a number nor text"),
-        ({"which": "first"}, "'which' does not occur on this page"),
+        ({"which": "first"}, "this page does not contain 'which'"),
     ],
 )
 def test_an_answer_that_is_not_permitted_ends_the_block_and_loses_nothing(

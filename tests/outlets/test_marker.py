@@ -167,7 +167,7 @@ def test_a_sink_that_hangs_delays_neither_markers_nor_the_end(monkeypatch) -> No
     assert sink.hanging.wait(5)
     for trial in range(2, 7):
         thread.mark(marker(trial))
-    assert thread.lost.startswith("3 markers, the maximum, are waiting to be sent: sending has stopped; check")
+    assert thread.lost.startswith("the queue of unsent markers is full (3): sending has stopped; check")
     thread.close(0.01)
     assert not sink.closed.is_set()
     sink.go_on.set()

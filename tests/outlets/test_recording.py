@@ -66,8 +66,13 @@ def added(rows: Rows) -> Rows:
         (list, list, "300 recorded, 0 lost, 0 late\n", 0),
         (list, late, "300 recorded, 0 lost, 1 late, at most 5 ms between two ticks\n", 0),
         (list, without(90, 110), "20 samples lost in 1 gap; the first after 0.089 s\n", 3),
-        (without(12, 13), list, "own.xdf lacks 1 marker that its journal contains; the first: {", 3),
-        (added, list, 'own.xdf contains 1 marker that its journal lacks; the first: {"event":"note","t_s":0.5}. ', 3),
+        (without(12, 13), list, "own.xdf does not contain 1 marker recorded in the journal; the first: {", 3),
+        (
+            added,
+            list,
+            'own.xdf contains 1 marker not recorded in the journal, starting with {"event":"note","t_s":0.5}: ',
+            3,
+        ),
         (without(0, 8), list, "markers: 4 before the recording and 0 after it", 0),
         (without(0, 9999), list, "own.xdf: it does not contain markers from this study's sessions", 3),
     ],
@@ -80,7 +85,7 @@ def test_what_a_recording_lacks_is_found(
     done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
     assert said in done.output
     assert done.exit_code == code
-    assert "clock of 'liquid-study samples': 0 resets; drift +2 ppm over 95 s, offsets within" in done.output
+    assert "clock of 'liquid-study samples': 0 resets; drift +2 ppm over 95 s, with offsets within" in done.output
     if markers is list:
         assert re.search(r"sub-P001/ses-01: (\d+) of \1 recorded, 0 lost; times agree within [\d.e-]+ ms", done.output)
     assert "sub-P002" not in done.output

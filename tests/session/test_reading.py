@@ -78,7 +78,7 @@ def test_the_rows_of_the_trial_and_of_its_repetition_say_that_the_device_failed(
 
 
 @pytest.mark.parametrize(
-    "what", [FAULT, "one of the study's videos stopped (no picture arrived for 1 s): check the camera and the files"]
+    "what", [FAULT, "one of the study's videos stopped (no frame arrived for 1 s): check the camera and the files"]
 )
 def test_in_a_study_with_videos_journal_and_tables_do_not_say_what_failed(what: str) -> None:
     """Only some conditions show a video, so that its failure tells what a code stands for."""

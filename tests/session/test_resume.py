@@ -238,8 +238,8 @@ def test_session_without_a_row_of_another_has_no_such_key(square: Path) -> None:
     ("source", "row_of", "message"),
     [
         ("demo", "P002", "no block in demo has a Williams or Latin order"),
-        ("square", "anna", "rows are assigned by the number in a participant's ID"),
-        ("square", "P 2", "rows are assigned by the number in a participant's ID"),
+        ("square", "anna", "rows are assigned by the number in the ID"),
+        ("square", "P 2", "rows are assigned by the number in the ID"),
     ],
 )
 def test_row_that_decides_nothing_is_refused(square: Path, source: str, row_of: str, message: str) -> None:

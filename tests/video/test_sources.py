@@ -203,7 +203,7 @@ def test_footage_that_was_replaced_is_refused(tmp_path: Path) -> None:
     write_clip(clip, frames=3, size=(64, 48))
     again = Videos(parse(source_bytes(file), str(file)), tmp_path, "", lambda: 0)
     write_clip(clip, frames=4, size=(64, 48))
-    assert again.open().fault == f"{clip} is no longer the file that the study began with: restore it"
+    assert again.open().fault == f"{clip} has changed since the study began: restore the original file"
 
 
 def test_the_row_of_a_trial_counts_frames_that_were_late_or_lost_and_says_their_age() -> None:
@@ -263,7 +263,7 @@ def test_a_camera_shows_the_newest_frame_that_was_ready_and_says_what_ended_it()
     now_ns[0] = 30 + round(sources.STALLS_S * 1e9)
     assert camera.frame_at(30) is not None
     now_ns[0] += 1
-    with pytest.raises(VideoError, match="no picture arrived for 1 s"):
+    with pytest.raises(VideoError, match="no frame arrived for 1 s"):
         camera.frame_at(30)
     camera._failure = "it ended"
     with pytest.raises(VideoError, match="it ended"):

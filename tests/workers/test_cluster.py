@@ -80,7 +80,8 @@ def test_another_program_at_the_address_of_a_cluster_is_one_line_in_time(monkeyp
         return str(refused.value)
 
     said = ends_with_each(client, at_once=True)
-    line = r"no Dask scheduler answers at tcp://127.0.0.1:\d+ \((timed out|another program answers there)\): start one"
+    why = r"\((timed out|another program is listening there)\)"
+    line = rf"no Dask scheduler responds at tcp://127.0.0.1:\d+ {why}: start one"
     assert [one for one in said.items() if not re.match(line, one[1])] == []
 
 
@@ -90,9 +91,9 @@ def test_another_program_at_the_address_of_a_cluster_is_one_line_in_time(monkeyp
         ("localhost", "'localhost' is not the address of a Dask scheduler: specify tcp://HOST:PORT"),
         ("http://127.0.0.1:8786", "specify tcp://HOST:PORT"),
         ("tcp://127.0.0.1:port", "specify tcp://HOST:PORT"),
-        ("tcp://127.0.0.1:99999", "no Dask scheduler answers at tcp://127.0.0.1:99999"),
+        ("tcp://127.0.0.1:99999", "no Dask scheduler responds at tcp://127.0.0.1:99999"),
         ("tcp://127.0.0.1:1", "(Connection refused)"),
-        ("tcp://no-such-host.invalid:8786", "no Dask scheduler answers at tcp://no-such-host.invalid:8786"),
+        ("tcp://no-such-host.invalid:8786", "no Dask scheduler responds at tcp://no-such-host.invalid:8786"),
     ],
 )
 def test_a_cluster_that_is_not_there_is_one_line_and_exit_code_2(

@@ -84,7 +84,7 @@ _END_SHOWN_MS = 5000
 SCREEN_SETTLES_MS = 500  # a window manager may briefly put a window on another screen
 _SCREEN_REMOVED = (
     "Both windows are on one screen",
-    "The session is paused and cannot be resumed, because the participant's window would cover the force stop. "
+    "The session is paused and cannot be resumed, because the participant's window would cover “Stop force”. "
     "Reconnect the second screen; the participant's window will then return to it.",
 )
 log = logging.getLogger(__name__)
@@ -343,7 +343,7 @@ class SessionBridge(QObject):
     def _report_thread_failure(self, what: str) -> None:
         """Log that a thread has ended with an exception, and tell the operator."""
         self.operator.show_message("Part of the program has stopped", f"{what}. All answers have been kept.")
-        self.record_note(f"a thread in the program ended: {what}")
+        self.record_note(f"a program thread stopped unexpectedly: {what}")
 
     def _now(self) -> float:
         return self.parts.clock()

@@ -188,7 +188,7 @@ class DiagnosisDialog(QDialog):
             self.saved.setText(_sentence(str(error)))
         else:
             self.saved.setText(
-                f"Saved as {path}. The file contains neither participant IDs nor answers nor liquid parameters."
+                f"Saved as {path}. The file does not contain participant IDs, answers or liquid parameters."
             )
         self.saved.show()
 

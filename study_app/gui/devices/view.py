@@ -90,10 +90,10 @@ class _HelpCard(Card):
         super().__init__("Before the first session", gap=8)
         for paragraph in (
             "Connect the USB cable and the power adapter, then press “Refresh”.",
-            "“Diagnose …” opens the device, loads its firmware, homes and tests it without force, and reports any "
+            "“Diagnose …” opens the device, loads its firmware, homes it, tests it without force and reports any "
             "faults.",
-            "“liquid-study devices calibrate” measures its force with a known weight.",
-            "“liquid-study devices bench” measures any force-feedback device in ten minutes.",
+            "“liquid-study devices calibrate” measures the device's force with a known weight.",
+            "“liquid-study devices bench” tests any force-feedback device and takes ten minutes.",
         ):
             line = label(paragraph, "label", "text2", wraps=True, weight=400)
             line.setMinimumWidth(LEAST_WORDS)

@@ -61,7 +61,7 @@ def missing_library(error: OSError | ImportError) -> DisplayError:
     library = str(error).partition(":")[0]
     if _platform_is_linux():
         return DisplayError(
-            f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu run "
+            f"Qt cannot be loaded: {library} is missing on this system; on Debian or Ubuntu, run "
             f"sudo apt install {PACKAGES} ({_NEEDS_NO_DISPLAY})"
         )
     return DisplayError(f"Qt cannot be loaded ({error}): reinstall liquid-study with pip")

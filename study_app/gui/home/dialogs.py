@@ -62,13 +62,13 @@ class RehearsalDialog(Work):
     ) -> None:
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
         groups = ", ".join(facts.protocol.groups)
-        dealt = f" They are distributed evenly across the groups {groups}." if facts.protocol.asks_group else ""
+        dealt = f" Participants are distributed evenly across the groups {groups}." if facts.protocol.asks_group else ""
         super().__init__(
             parent,
             theme,
             f"Rehearse {facts.title}",
-            "Whole sessions run faster than real time, with simulated participants. They are marked as simulated and "
-            f"stored separately, in {self.folder}.{dealt}",
+            "Simulated participants complete whole sessions faster than real time. The sessions are marked as "
+            f"simulated and stored separately in {self.folder}.{dealt}",
             ActionButton("fast_forward", "Rehearse", role="primary"),
             fields=(
                 Field("participants", "Simulated participants", "count", limits=(1, _MAX_PARTICIPANTS)),
@@ -140,8 +140,8 @@ class RehearsalDialog(Work):
 _FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 _HOLDS = "It will contain the folders protocols and results."
-_ROW_HINT = "the session uses that participant's order; leave empty for its own"
-_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty for its own"
+_ROW_HINT = "the session uses that participant's order; leave empty if nobody is replaced"
+_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty if nobody is replaced"
 _GROUP_HINT = "recorded as a property of the participant"
 
 
@@ -234,13 +234,13 @@ class NewSessionDialog(QDialog):
         fields = (
             Field("participant", "Participant", aside="letters and digits, not a name"),
             Field("session", "Session", "count", limits=(1, MAX_SESSION)),
-            seed_field("determines all orders; recorded"),
+            seed_field("determines all orders and is recorded"),
             Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
             choice_field("language", "Language of the participant's pages", languages),
             choice_field("device", "Device", {name: device_label(name) for name in devices}),
             choice_field("screen", "Participant's screen", screen_titles),
             Field("windowed", "In a window instead of full screen", "check"),
-            Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
+            Field("pilot", "Pilot: marked with a frame and stored separately", "check"),
             Field("results", "Results folder for this study", "folder"),
             choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=_GROUP_HINT),
             Field(
@@ -461,7 +461,7 @@ class WorkspaceDialog(Question):
             parent,
             theme,
             "Choose your workspace",
-            "This computer's protocols and results are stored in one folder, which windows and commands use "
+            "This computer's protocols and results are stored in one folder. Windows and commands use it "
             "wherever they are started. You can change it later under This machine.",
             ActionButton("check", "Use this folder", role="primary"),
             back="Not now",

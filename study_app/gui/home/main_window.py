@@ -167,7 +167,7 @@ def bug_sentence(error: BaseException) -> str:
     """Return the sentence about a bug of the program or a plug-in."""
     if isinstance(said := explain_error(error), StudyError):
         return f"{said}."
-    return f"{type(error).__name__}: {error}. This is a bug: please report it with the output in the terminal."
+    return f"{type(error).__name__}: {error}. This is a bug: please report it and include the terminal output."
 
 
 class MainWindow(Themed, QMainWindow):

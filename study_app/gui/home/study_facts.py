@@ -341,7 +341,7 @@ def interrupted_session(
             source=source,
             participant=session.participant,
             heading=f"{kind}{session.participant}, session {session.session} of {session.study} stopped {where}",
-            line=f"{stopped}. Answers on disk: {session.answers}{whole}; all data before that point are complete.",
+            line=f"{stopped}. Answers on disk: {session.answers}{whole}; all data up to that point are complete.",
         )
     return None
 

@@ -374,8 +374,8 @@ def _delay_sentences(vitals: Vitals) -> tuple[str, ...]:
     if vitals.delay_ticks <= vitals.first_delay_ticks:
         return ()
     return (
-        f"The device now answers after {vitals.delay_ticks} ticks ({vitals.first_delay_ticks} at the start), so the "
-        "force is limited to a level that is stable with this delay",
+        f"The device now responds after {vitals.delay_ticks} ticks ({vitals.first_delay_ticks} at the start), so the "
+        "force is limited to a level that is stable at this delay",
     )
 
 
@@ -392,7 +392,7 @@ def _incomplete_recording_sentences(session: Session, progress: Progress, now: M
     """Return a sentence for every trial whose recording lacks samples, newest first."""
     labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
     return tuple(
-        f"The recording of {labels[number]} lacks {grouped(count)} samples because the disk is too slow"
+        f"The recording of {labels[number]} is missing {grouped(count)} samples because the disk is too slow"
         for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
     )
 
@@ -459,7 +459,7 @@ def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: M
         *(_answer_lines(answers, choices) if answers else ()),
         *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
         *(f"not delivered {count}: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
-        *([f"{len(given_up)} unanswered because no attempt was delivered"] if given_up else []),
+        *([f"{len(given_up)} unanswered because no attempt was within limits"] if given_up else []),
     )
 
 

@@ -100,7 +100,7 @@ class ForceCard(Card):
         self.plot.setMinimumHeight(48)
         self.column.addWidget(self.plot, 1)
         span = f"over the last {TRACE_WINDOW_S:.0f} s"
-        force = f"Force along x, y and z, and its magnitude, {span}, in N, with the limit of {limit_n:g} N."
+        force = f"Force along x, y and z and its magnitude {span}, in N. The limit is {limit_n:g} N."
         describe_plot(self.plot, "Force on the hand", force)
 
     def show_forces(self, forces: Forces, now_ns: int) -> None:
@@ -121,7 +121,7 @@ class LatenessCard(Card):
     def __init__(self, limit_s: float) -> None:
         super().__init__("Tick lateness", label("last 60 s", "small", "text2"), padding=16, gap=4)
         self.plot = LatenessPlot(limit_s * 1e6)
-        describe_plot(self.plot, "Tick lateness", "Histogram of how late ticks began during the last minute, in µs.")
+        describe_plot(self.plot, "Tick lateness", "Histogram of tick lateness over the last minute, in µs.")
         axes = label("lateness, µs (log), ticks per bin (log)", "small", "text2")
         axes.setAlignment(Qt.AlignmentFlag.AlignHCenter)
         add_parts(self.column, (self.plot, 1), axes)
@@ -152,7 +152,7 @@ class PositionCard(Card):
 class HiddenForceCard(Card):
     """A placeholder of the force plot's size while the study is double-blind: nothing about the force."""
 
-    TITLE = "Hidden while the study is double-blind"
+    TITLE = "Hidden because the study is double-blind"
     WHY = "The trace would reveal the liquid."
 
     def __init__(self) -> None:

@@ -111,8 +111,8 @@ _RECONNECT = (
     "paused until you resume it; an interrupted trial starts again."
 )
 _WAITS = (
-    "The force is off and nothing has been lost. Free up some disk space or reconnect the drive; the session will then "
-    "continue, paused."
+    "The force is off and nothing has been lost. Free up some disk space or reconnect the drive. The session will then "
+    "resume in a paused state."
 )
 _AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
 _WAITS_AT_END = (

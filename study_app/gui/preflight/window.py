@@ -128,7 +128,7 @@ OF_THE_COMPUTER: Final = ("Servo rate", "Servo lateness", "Priority", "Screen", 
 """The checks before a session that say nothing of the study or its device."""
 
 _RECOMPILES: Final = (
-    "The model is compiled again at every start, which takes up to a minute: set NUMBA_CACHE_DIR to a writable folder."
+    "The model is compiled at every start, which takes up to a minute. Set NUMBA_CACHE_DIR to a writable folder."
 )
 
 
@@ -267,7 +267,7 @@ class PreflightWindow(QWidget):
         self.rows: list[CheckRow] = []
         self.masking = _MaskingQuestion() if asks_masking else None
         self.plot = LatenessPlot(limit_us)
-        describe_plot(self.plot, "Tick lateness", "Histogram of how late ticks began during two seconds, in µs.")
+        describe_plot(self.plot, "Tick lateness", "Histogram of tick lateness over two seconds, in µs.")
         self.cancel = ActionButton("", "Cancel", height=46)
         self.again = ActionButton("repeat", "Check again", height=46)
         self.start = ActionButton("play", "Start", role="primary", height=46)

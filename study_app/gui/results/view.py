@@ -343,7 +343,7 @@ STACKED_HEIGHT, EXCLUSIONS = 330, 360
 _REASON_SIGNS = 40
 _EXTRAS: Final = (
     _Extra("wide", "Wide table: one row per participant"),
-    _Extra("parquet", "Every table as Parquet too"),
+    _Extra("parquet", "Every table also as Parquet"),
     _Extra("sav", "Answers for SPSS, jamovi and JASP (.sav)"),
     _Extra("psych-ds", "A Psych-DS folder with all tables, for sharing"),
 )
@@ -572,9 +572,9 @@ class ResultsPlace(Place):
         proposed = not exclusion.excluded_at
         done = "Keep" if proposed else "Include again"
         why = (
-            f"A rule proposes excluding it: {exclusion.reason}. It will remain in measures, figures and tests."
+            f"A rule proposed this exclusion: {exclusion.reason}. The data will remain in measures, figures and tests."
             if proposed
-            else f"It was excluded for this reason: “{exclusion.reason}”. It will be included again in measures, "
+            else f"Reason for the exclusion: “{exclusion.reason}”. The data will be included again in measures, "
             "figures and tests."
         )
         dialog = Question(
@@ -614,8 +614,8 @@ class ResultsPlace(Place):
             self,
             self.theme,
             f"Report of {self._study_name()}",
-            "One page with figures, tests and conclusions, and every number, table and figure as a file. This takes a "
-            f"few minutes for a large study.{self._code_note()}",
+            "A page with figures, tests and conclusions; every number, table and figure is also saved as a file. This "
+            f"takes a few minutes for a large study.{self._code_note()}",
             go_on="Write the report",
             to=self.results.resolve().parent / f"{self._study_name()}-report",
             opens_file=True,

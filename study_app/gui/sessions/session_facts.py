@@ -212,7 +212,7 @@ LIMIT_WORDS: Mapping[str, tuple[str, str]] = {
     "first_frame_gap_ms": ("time before the first frame", "ms"),
     "worst_frame_gap_ms": ("longest time between two frames", "ms"),
     "withheld_share": ("proportion of the force held back", "%"),
-    "targets_reached": ("targets reached, at least", "%"),
+    "targets_reached": ("targets reached (minimum)", "%"),
 }
 """Of every measure that a limit judges: what it is, and its unit."""
 

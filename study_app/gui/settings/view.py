@@ -157,8 +157,7 @@ def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
     """Return a sentence about the measured offset of a screen."""
     if offset is None:
         return (
-            "Not measured. The screen always shows frames with a slight delay; this delay is recorded as “not "
-            "measured” in every receipt."
+            "Not measured. Every screen shows frames with a slight delay; receipts record this delay as “not measured”."
         )
     text = f"{write_number(offset.mean_ms, _DECIMALS)} ± {write_number(offset.spread_ms, _DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
@@ -320,10 +319,10 @@ FIELDS = (
     Field("triggers", "Trigger port", hint=_PORTS, parse=_check_port),
     Field("photodiode", "Square in the tank's corner for a photodiode", "switch"),
     choice_field("device", "Device", {name: title_of(name) for name in list_devices()}),
-    Field("camera", "Camera for conditions that show a camera picture", longest=CAMERA_LENGTH, placeholder=USUAL),
+    Field("camera", "Camera for conditions that show a camera image", longest=CAMERA_LENGTH, placeholder=USUAL),
     Field(
         "proofs", "Folder for the study's proof, written when a session ends", "folder",
-        hint="A folder that cannot be changed by people who can change the results. Leave empty to disable.",
+        hint="A folder that people with access to the results cannot change. Leave empty to disable.",
         parse=_check_path, write=_text_or_empty,
     ),
     Field("stamps", "Time-stamp server for proofs (RFC 3161)", hint=_STAMPS, parse=_check_server),
@@ -414,7 +413,7 @@ class MachinePlace(Place):
             editor.changed.connect(lambda name, value: self.changed.emit({name: value}))
         self.screens, self.offset = _ScreensCard(), _OffsetForm()
         self.sample = label(_SAMPLE, "statement", wraps=True)
-        self.sample.setAccessibleName(f"A sample statement in the size that participants see: {_SAMPLE}")
+        self.sample.setAccessibleName(f"A sample statement at the size that participants see: {_SAMPLE}")
         self.sample.setFixedHeight(112)
         self.sample.setIndent(0)
         self.sample.setStyleSheet(
@@ -544,8 +543,8 @@ def _text_size_sentence(settings: MachineSettings, screen: ScreenShown, scale: f
     """Return a sentence on the text size for the viewing distance."""
     seen, least = settings.x_height_deg(screen.width_px, screen.width_mm), f"{LEAST_X_HEIGHT_DEG:g}°"
     if seen is None:
-        enlarged = f"Measure the viewing distance; text is then enlarged until an x subtends {least}."
+        enlarged = f"Measure the viewing distance; text is then enlarged until the letter x subtends {least}."
         return f"{enlarged} Until then, text is shown at its default size."
     if scale == 1.0:
-        return f"Default size: an x subtends {seen:.2f}°; at least {least} is recommended."
-    return f"{scale:.2f} times the default size: an x subtends {least} instead of {seen:.2f}°."
+        return f"Default size: the letter x subtends {seen:.2f}°; at least {least} is recommended."
+    return f"{scale:.2f} times the default size: the letter x subtends {least} instead of {seen:.2f}°."

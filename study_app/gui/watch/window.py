@@ -157,7 +157,7 @@ class Stage(QWidget):
         plot = self.forces or MaskedPanel(_FORCES_HIDDEN, _SHOWS_FORCES)
         plot.setMinimumHeight(88)
         plot.setMaximumHeight(190)
-        key = label("" if shown.blinded else "N: sent as a line, requested as an area", "small", "text2")
+        key = label("" if shown.blinded else "N (line = sent, area = requested)", "small", "text2")
         above = hbox(self.numbers, (self.happened, 1), key, spacing=16, margins=(0, 4, int(MARGIN), 0))
         along = hbox((plot, 1), margins=(0, 0, int(MARGIN), 0))
         timed = hbox((self.line, 1), margins=(_AXIS_PX - int(MARGIN), 0, 0, 0))

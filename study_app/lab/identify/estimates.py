@@ -156,12 +156,12 @@ def _parameter_warnings(
         elif z[k] - problem.least[k] < near or problem.most[k] - z[k] < near:
             yield (
                 f"{it.name} reached the end of its range, {values[k]:.6g}{_edge_reason(problem, k, z)}: the best value "
-                "may lie beyond it, and the intervals do not allow for this limit"
+                "may lie beyond it, and the intervals do not take this limit into account"
             )
         elif k not in paired and half[k] > (
             math.log(_VAGUE) if coordinate(it).relative is False else abs(problem.u(z)[k]) / _VAGUE
         ):
-            yield f"{it.name} is poorly determined by {problem.varied}: see its interval"
+            yield f"{it.name} is poorly determined by {problem.varied}: check its interval"
 
 
 def _edge_reason(problem: Problem, k: int, z: Floats) -> str:

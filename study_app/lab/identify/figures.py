@@ -70,13 +70,13 @@ def _values(fit: Fit) -> list[str]:
 
 def _caption(fit: Fit) -> str:
     text = (
-        "Measurements are grey; lines show the least-squares fit, computed with the servo's own tick. The residual, "
-        f"measured − fitted, is {fit.rms_n:.3g} N RMS, {100 * fit.share:.1f} % of the force; its correlation "
-        f"from row to row is {fit.following:.2f}."
+        "Measurements are grey; lines show the least-squares fit, computed at the servo's tick rate. The residual, "
+        f"measured − fitted, is {fit.rms_n:.3g} N RMS ({100 * fit.share:.1f} % of the force); its lag-1 "
+        f"autocorrelation is {fit.following:.2f}."
     ).replace("-", "−")
     along = (
-        " The right panel shows its component along the motion against speed; dots are medians. A slope or "
-        "bend there indicates a wrong law."
+        " The right panel shows the residual along the motion against speed; dots are medians. A slope or "
+        "bend there indicates that the force law is wrong."
     )
     return text + along + "".join(f" Warning: {warning}." for warning in fit.warnings)
 

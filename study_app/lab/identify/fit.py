@@ -149,10 +149,9 @@ def _residual_warnings(residual_n: Floats, rho: float, force_n: Floats) -> Itera
     if rho > max(_FOLLOWING, _CHANCE / math.sqrt(residual_n.size)):
         share = _rms(residual_n) / _rms(force_n)
         yield (
-            f"the residuals ({100 * share:.1f} % of the force) are autocorrelated (correlation {rho:.3f} from row "
-            "to row): the model is incomplete, the sensor filters the force, or velocities computed from positions "
-            "blur sharp turns; the intervals have been widened to allow for this, but they are valid only if the "
-            "model is valid"
+            f"the residuals ({100 * share:.1f} % of the force) are autocorrelated (lag-1 correlation {rho:.3f}): "
+            "the model is incomplete, the sensor filters the force, or velocities computed from positions blur sharp "
+            "turns; the intervals have been widened to allow for this, but they are valid only if the model is valid"
         )
 
 
@@ -225,7 +224,7 @@ def _branch_warnings(curve: FlowCurve) -> Iterator[str]:
     if size > _APART * noise and size > _LEAST_GAP:
         yield (
             f"{branches.description} differ by {100 * math.expm1(size):.0f} % of the stress, which is more than noise "
-            "explains (thixotropy or hysteresis); the fit lies between them, and the intervals do not cover "
+            "can explain (thixotropy or hysteresis); the fit lies between them, and its intervals do not cover "
             "both: fit only one branch"
         )
 

@@ -66,13 +66,13 @@ class FlowCurve:
         if len(repeated) > len(rates) / 2:
             stresses = [self.stress_pa[self.rate_per_s == rate] for rate in repeated]
             least, greatest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
-            description = "the largest and the smallest stresses at repeated shear rates"
+            description = "the largest and smallest stresses at repeated shear rates"
             return Branches(description=description, first=(repeated, greatest), second=(repeated, least))
         turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
         if len(turns) != 1:
             return None
         ways = [self._sorted(slice(turns[0] + 2)), self._sorted(slice(turns[0] + 1, None))]
-        return Branches(description="the stresses at rising and at falling shear rates", first=ways[0], second=ways[1])
+        return Branches(description="the stresses at rising and falling shear rates", first=ways[0], second=ways[1])
 
     def _sorted(self, rows: slice) -> tuple[Floats, Floats]:
         order = np.argsort(self.rate_per_s[rows])
@@ -164,7 +164,7 @@ def with_centred_velocity(motion: Motion) -> Motion:
     rows = 2 * max(math.floor(_SMOOTHED_S / 2 / step_s), 1) + 1
     if len(even.t_s) < rows:
         raise StudyError(
-            f"{len(motion.t_s)} rows are too few to estimate velocities: measure for at least {_SMOOTHED_S:g} s"
+            f"{len(motion.t_s)} rows are too few to estimate velocities: record at least {_SMOOTHED_S:g} s of motion"
         )
     slopes = savgol_filter(even.position_m, rows, 2, deriv=1, delta=step_s, axis=0)
     velocity_mps = np.column_stack([np.interp(motion.t_s, even.t_s, column) for column in slopes.T])
@@ -183,10 +183,10 @@ def at_rate(motion: Motion, rate_hz: float) -> Motion:
     """
     step_s = np.diff(motion.t_s)
     if len(step_s) == 0:
-        raise StudyError("one row is not enough: measure at least 20 rows per second")
+        raise StudyError("one row is not enough: record at least 20 rows per second")
     if step_s.max() > _LONGEST_S:
         row, gap_s = int(step_s.argmax()) + 2, float(step_s.max())
-        raise StudyError(f"row {row} comes {gap_s:.3g} s after the previous row; at most {_LONGEST_S:g} s is permitted")
+        raise StudyError(f"row {row} is {gap_s:.3g} s after the previous row; at most {_LONGEST_S:g} s is permitted")
     tick_s = 1 / rate_hz
     if abs(step_s.mean() / tick_s - 1) < 0.01 and (np.abs(step_s / tick_s - 1) < 0.5).all():
         return motion

@@ -114,8 +114,8 @@ def _parameter(tables: Mapping[str, BaseModel], name: str) -> Parameter:
     place, _, field = name.rpartition(".")
     if field in _THRESHOLDS:
         raise StudyError(
-            f"{name} cannot be fitted: it is a threshold, so the force jumps or does not depend on it; set it "
-            "with --set and compare the residuals"
+            f"{name} is a threshold and cannot be fitted, because the force does not change smoothly with it: set "
+            "it with --set and compare the residuals"
         )
     numbers = {name: dict(_numbers(table)) for name, table in tables.items()}
     for table, fields in numbers.items():

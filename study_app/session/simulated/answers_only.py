@@ -114,7 +114,7 @@ def rehearse_answers(
             _answer_session(study, person, groups[person], kept, features)
             if progress is not None and (time.perf_counter() - said_s >= SAY_EVERY_S or number == participants):
                 said_s = time.perf_counter()
-                progress(f"{person}: {number} of {participants} answered (simulated)")
+                progress(f"{person}: {number} of {participants} simulated participants have answered")
     return folder
 
 
@@ -289,13 +289,13 @@ def begin_session_at_step(results: Path, study: Protocol, source: bytes, start: 
     lines.until = step
     answering.run(until=step)
     if step and answering.state.index < step:
-        raise SessionError(f"step {step + 1} is not reached: {lines.reason or 'the session ends before this step'}")
+        raise SessionError(f"step {step + 1} cannot be reached: {lines.reason or 'the session ends before this step'}")
     clock = SessionClock(lambda: 0, datetime.now().astimezone() - timedelta(seconds=passed.seconds))
     with begin_session(results, study, source, start, clock=clock) as store:
         if store.key.codes != shown.codes:
             raise SessionError(f"{results} contains sessions with a different seed: use a new folder")
         if step:
-            text = f"Steps 1 to {step} were answered by a simulated participant, without force."
+            text = f"A simulated participant completed steps 1 to {step} without force."
             store.append(Note(kind="note", text=text), t_s=0.0, waits=False)
         for event, at_s in lines.kept:
             store.append(event, t_s=at_s, waits=False)

@@ -403,7 +403,7 @@ class RehearsedSession(SimulatedParticipant):
         if unknown := answers.keys() - {item.id for item in page.items}:
             possible = ", ".join(item.id for item in page.items)
             raise SessionError(
-                f"{', '.join(map(repr, sorted(unknown)))} does not occur on this page; questions on it: {possible}"
+                f"this page does not contain {', '.join(map(repr, sorted(unknown)))}; its questions are {possible}"
             )
         visible = [
             item for item in page.items if item.id in shown_questions(page.items, answers) and item.id in answers

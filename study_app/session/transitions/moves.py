@@ -265,7 +265,7 @@ def call_operator(state: SessionState, event: Broke) -> Result:
 def reconnect_device(state: SessionState, event: Reconnected) -> Result:
     """Pause at zero force until the operator resumes; a trial that the failure interrupted is then presented again."""
     if not state.lost_device:
-        raise SessionError("the session was not stopped by its device: end it now and resume it later")
+        raise SessionError("the session was not stopped by a device failure: end it now and resume it later")
     paused = replace(state, phase=Phase.PAUSED, held="force")
     opened = journal.DeviceReconnected(device=event.described.get("name"), described=event.described)
     return paused, (
@@ -309,7 +309,7 @@ def stop_force_of_stalled(state: SessionState, event: ForceStopped) -> Result:
 def end_stalled_session(state: SessionState, _event: EndRequested) -> Result:
     """End without a line in the journal: the session stays unfinished; pending writes are still tried."""
     if state.over:
-        raise SessionError("the session is over, but its last lines have not been written to the disk yet")
+        raise SessionError("the session has ended, but its last lines have not yet been written to disk")
     ended = replace(state, stall=replace(_stall(state), before=Phase.ENDED))
     return ended, (show_page(ended),)
 

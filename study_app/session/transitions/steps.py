@@ -321,7 +321,7 @@ def _page_fields(state: SessionState) -> dict[str, Any]:
 def _check_item(state: SessionState, item: str) -> None:
     if item not in state.items:
         listed = ", ".join(state.items)
-        raise SessionError(f"item {item!r} is not on this page, which has the items {listed}")
+        raise SessionError(f"item {item!r} is not on this page, which contains the items {listed}")
 
 
 def _check_shown(state: SessionState, item: str) -> None:

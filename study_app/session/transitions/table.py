@@ -133,7 +133,7 @@ def advance(state: SessionState, event: Event) -> tuple[SessionState, tuple[Comm
     if move is None:
         if state.stall is not None:
             waits = f"{state.stall.reason}; until then, the session waits"
-            raise SessionError(f"{type(event).__name__} cannot happen while {state.phase.value}: {waits}")
+            raise SessionError(f"{type(event).__name__} is not possible while {state.phase.value}: {waits}")
         taken = ", ".join(sorted(kind.__name__ for phase, kind in _TRANSITIONS if phase is state.phase))
         raise SessionError(
             f"{type(event).__name__} is not possible while {state.phase.value}; possible events: {taken}"

@@ -138,7 +138,7 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     assert lines[0]["simulated"] is True
     resumed = next(at for at, line in enumerate(lines) if line["event"] == "session_resumed")
     notes = [line["text"] for line in lines[:resumed] if line["event"] == "note"]
-    assert notes == ["Steps 1 to 4 were answered by a simulated participant, without force."]
+    assert notes == ["A simulated participant completed steps 1 to 4 without force."]
     assert [line["trial"] for line in lines[:resumed] if line["event"] == "responses"] == [1, 2]
     assert [line["trial"] for line in lines[resumed:] if line["event"] == "responses"] == [3, 4]
     assert lines[-1]["status"] == "completed"

@@ -219,7 +219,7 @@ def test_a_preexisting_group_is_chosen_before_a_session_begins_and_kept_in_the_n
     assert made.begin.isEnabled()
     assert (made.chosen().participant, made.chosen().group) == ("P002", "first_thin")
     made.editors["row_of"].control.setText("P001")
-    assert "P001 is in group first_thick, but P002 is in group first_thin" in made.verdict.text()
+    assert "'P001' in group first_thick cannot be replaced by P002 in group first_thin" in made.verdict.text()
     made.editors["row_of"].control.clear()
     made.editors["participant"].control.setText("P001")
     made.editors["session"].control.setValue(2)

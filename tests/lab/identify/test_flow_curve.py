@@ -192,7 +192,7 @@ def test_a_fit_does_not_depend_on_the_order_of_rows(gap):
 
 def test_branches_that_differ_are_named_with_their_gap():
     found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), loop(gap=0.2))
-    said = "the largest and the smallest stresses at repeated shear rates differ by 25 % of the stress"
+    said = "the largest and smallest stresses at repeated shear rates differ by 25 % of the stress"
     assert any(warning.startswith(said) for warning in found.warnings)
     low, high = found.intervals["yield_stress_pa"]
     assert 1 < low < high < 30
@@ -202,7 +202,7 @@ def test_branches_at_other_shear_rates_are_told_by_the_way_of_the_ramp():
     curve = loop(gap=0.2)
     rates = curve.rate_per_s * np.where(np.arange(44) < 22, 1.0, 1.05)
     found = fit_curve(begun("ketchup"), "ketchup", list(STARTS["ketchup"]), FlowCurve(rates, curve.stress_pa))
-    assert any(it.startswith("the stresses at rising and at falling shear rates differ by") for it in found.warnings)
+    assert any(it.startswith("the stresses at rising and falling shear rates differ by") for it in found.warnings)
 
 
 def test_noise_makes_no_branches():

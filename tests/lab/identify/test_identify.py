@@ -210,7 +210,7 @@ def test_what_cannot_be_fitted_is_said(names, said):
         (lambda m, f: (m, f[:-1]), r"finite and have the shape \(n, 3\)"),
         (lambda m, f: (m, f * math.nan), "finite"),
         (lambda m, f: slowed(m, f, [0]), "one row is not enough"),
-        (lambda m, f: slowed(m, f, [0, 1, 2, 99, 100]), "row 4 comes 0.097 s after the previous row"),
+        (lambda m, f: slowed(m, f, [0, 1, 2, 99, 100]), "row 4 is 0.097 s after the previous row"),
     ],
 )
 def test_what_was_not_measured_is_said(change, said):

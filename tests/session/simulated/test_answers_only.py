@@ -58,7 +58,7 @@ def test_a_receipt_that_was_changed_with_its_proofs_differs_from_the_journal(twe
     path = study / "data/sub-P001/ses-01/receipt.json"
     receipt.write(path, receipt.read(path) | {"screens": {}})
     cover_up(study)
-    assert ("differs from the journal in the settings with which the session began") in "\n".join(
+    assert ("differs from the journal in the settings used when the session began") in "\n".join(
         map(str, verify_study(study).errors)
     )
 

@@ -108,7 +108,7 @@ def test_journal_recordings_and_answers_agree(study: Path) -> None:
     session = StudyFolder(study).sessions()[0].path
     assert replay(session).proved
     found = reproduce_session(session)
-    assert (found.differences, found.followed) == ([], ["thicker: 4 of 4 levels agree with the answers"])
+    assert (found.differences, found.followed) == ([], ["thicker: 4 of 4 levels are consistent with the answers"])
     checked = verify_study(study, None)
     lost = (
         "2 of 4 trials were not delivered: the force was not as requested (limit 5 %) in 2, the force limit was reached"
