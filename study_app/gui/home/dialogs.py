@@ -140,8 +140,8 @@ class RehearsalDialog(Work):
 _FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 _HOLDS = "It will contain the folders protocols and results."
-_ROW_HINT = "the session uses that participant's order; leave empty if nobody is replaced"
-_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty if nobody is replaced"
+_ROW_HINT = "the session uses that participant's order; leave empty if none"
+_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty if none"
 _GROUP_HINT = "recorded as a property of the participant"
 
 
@@ -240,7 +240,7 @@ class NewSessionDialog(QDialog):
             choice_field("device", "Device", {name: device_label(name) for name in devices}),
             choice_field("screen", "Participant's screen", screen_titles),
             Field("windowed", "In a window instead of full screen", "check"),
-            Field("pilot", "Pilot: marked with a frame and stored separately", "check"),
+            Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
             Field("results", "Results folder for this study", "folder"),
             choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=_GROUP_HINT),
             Field(

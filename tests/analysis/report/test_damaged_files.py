@@ -79,7 +79,7 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
     [
         (lambda session: session.journal.unlink(), "is missing, but the receipt, tables"),
         (lambda session: change(session.journal, b"\n", b"garbage\n"), "line 1 is damaged"),
-        (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "line 2 has n 3, so lines are missing"),
+        (lambda session: change(session.journal, b'"n":2,', b'"n":3,'), "line 2 has n 3; lines are missing"),
         (lambda session: session.journal.write_bytes(b""), "does not contain a complete line, but the receipt"),
         (lambda session: cut_last_line(session.journal), "but the journal does not record the end"),
         (lambda session: change(session.receipt, b'"version"', b'"version" '), "has changed since the session ended"),

@@ -95,7 +95,7 @@ def test_a_journal_is_neither_written_over_nor_continued_after_another_program(t
     before = path.read_bytes()
     with pytest.raises(StoreError, match="already exists"):
         Journal.create(path)
-    with pytest.raises(StoreError, match="changed while it was being opened: close the other program"):
+    with pytest.raises(StoreError, match="changed while it was being opened: close the program"):
         Journal.reopen(path, contents, SessionClock())
     assert path.read_bytes() == before
     with pytest.raises(StoreError, match="cannot be written"):
