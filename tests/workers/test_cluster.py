@@ -40,7 +40,7 @@ def test_killed_workers_change_no_result_and_a_lost_scheduler_is_one_line(tmp_pa
                 for future in futures:
                     future.result()
 
-        with pytest.raises(WorkerError, match=f"the cluster at {address} was lost") as raised:
+        with pytest.raises(WorkerError, match=f"the cluster at {address} is no longer available") as raised:
             lost()
         assert "\n" not in str(raised.value)
         assert not psutil.pid_exists(scheduler.pid) or scheduler.status() == psutil.STATUS_ZOMBIE

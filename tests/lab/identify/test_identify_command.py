@@ -110,7 +110,7 @@ def test_from_a_file_to_a_preset(tmp_path):
         ("t_s,velocity_mps,force_n\n0,1,2\n0.001,nan,2\n", "line 3: 'nan' is not a finite number"),
         ("t_s,velocity_mps,force_n\n0,1\n", "line 2: has 2 fields"),
         ("t_s,velocity_mps,force_n\n0,1,2\n0,1,2\n", "time must increase"),
-        ("t_s,velocity_mps,force_n\n0,1,2\n9,1,2\n", "row 2 comes 9 s after"),
+        ("t_s,velocity_mps,force_n\n0,1,2\n9,1,2\n", "row 2 is 9 s after"),
         (b"\xff\xfe", "not UTF-8 text"),
         (None, "cannot read"),
     ],

@@ -73,7 +73,7 @@ def test_it_cannot_be_resumed_but_begun_where_no_program_takes_it_over(
         lambda: reopen_store(place.path, protocol, SOURCE, operator="", device={}, screens={}),
         lambda: app.resume(place.path),
     ):
-        with pytest.raises(StoreError, match=r"it cannot be resumed: begin a new session for participant P004"):
+        with pytest.raises(StoreError, match=r"it cannot be resumed: run a new session with participant P004"):
             go_on()
     with lock_folder(place.path):
         before = sorted(place.path.iterdir())
