@@ -124,7 +124,7 @@ def _quantity_warnings(measured: Measured, axes: Sequence[int]) -> Iterator[str]
     if follows < _UNRELATED:
         yield (
             f"velocity and acceleration explain only {100 * follows:.0f} % of the measured values: they may not be "
-            "the force on this body, or their times may differ from those of the motion"
+            "the force on this body, or their times may not match the motion"
         )
 
 
