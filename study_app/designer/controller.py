@@ -220,7 +220,7 @@ class DesignerController(QObject):
         try:
             self.editing.make_step(sentence, *offered.edits, select=row.element or None)
         except Refused as refusal:
-            self.place.message.emit("This repair cannot be made", f"{refusal}.")
+            self.place.message.emit("This correction cannot be applied", f"{refusal}.")
 
     def _show_refusal(self, path: Place, sentence: str, asked: Request) -> None:
         if isinstance(asked, RenameElement):

@@ -158,7 +158,7 @@ def playing_notice(step: str, title: str) -> Notice:
 def ended_notice(step: str, how: str) -> Notice:
     """Return the question whether to keep the data of a played pilot."""
     return Notice(
-        f"Played from {step}: {how}. Its data will be deleted unless you save them.", _KEEP, "neutral", "flag"
+        f"Played from {step}: {how}. The recorded data will be deleted unless you save them.", _KEEP, "neutral", "flag"
     )
 
 

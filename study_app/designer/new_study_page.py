@@ -99,7 +99,7 @@ class KnownAnswer:
     @property
     def sentence(self) -> str:
         return (
-            f"Simulated: {self.planted:g} {self.unit} at 75 % correct (after {self.source}). Estimated: "
+            f"Simulated: {self.planted:g} {self.unit} at 75 % correct (based on {self.source}). Estimated: "
             f"{self.found:.3g} {self.unit}; in 9 of 10 simulated studies with {self.people} participants the "
             f"estimate was between {self.low:.3g} and {self.high:.3g} {self.unit}. These numbers come from a model, "
             "not from measurements."
@@ -130,13 +130,13 @@ TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     ),
     "delay-detection": (
         "Delay detection",
-        "What is the shortest picture delay that participants notice? Two-interval trials with adaptive levels.",
+        "What is the shortest visual delay that participants notice? Two-interval trials with adaptive levels.",
     ),
     "rate-realism": (
         "Rate realism",
         "How real does a liquid feel? Participants set a slider after each of four liquids, three times per liquid.",
     ),
-    "questionnaire-only": ("Questionnaire only", "Questions of every kind before, during and after a single trial."),
+    "questionnaire-only": ("Questionnaire only", "Questions of every type, before, during and after a single trial."),
     "empty": ("Empty study", "One liquid, one block, a welcome page and a thank-you page; ready to run."),
 }
 """Title and question of each template, in the order in which they are shown."""
@@ -768,7 +768,12 @@ class NewStudyPage(Themed, QWidget):
         self.buttons = []
         for heading, aside, copies, across in (
             ("Templates", "", False, ACROSS),
-            ("Or copy an existing study", "including its comments; the original is not changed", True, COPIES_ACROSS),
+            (
+                "Or copy an existing study",
+                "The copy includes the comments; the original is not changed.",
+                True,
+                COPIES_ACROSS,
+            ),
         ):
             labels = label(heading, "card"), label(aside, "small", "text2")
             add_layout(column, hbox(*labels, STRETCH, spacing=10, margins=(_RING, 0, 0, 0)))

@@ -266,7 +266,8 @@ def _addable_instruments() -> tuple[Addable, ...]:
     entries = []
     for name in instruments():
         source = instrument(name)
-        texts = "" if source["languages"] else ". Its texts are not included, so you must write them in the study"
+        lacks = ". The program does not include its texts, so you must add them to the study"
+        texts = "" if source["languages"] else lacks
         help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
         title = f"Instrument: {name.upper()}, {len(source['items'])} questions"
         entries.append(Addable(words=title, icon="list", asks=AddInstrument(name), help=help_))

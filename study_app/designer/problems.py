@@ -368,7 +368,9 @@ class ProblemsCard(Card):
         inside = QWidget()
         self._column = column = vbox(spacing=0, margins=0, parent=inside)
         if rows and not listed:
-            column.addWidget(label(f"This element is without problems; the others have {len(rows)}", "label", "text2"))
+            column.addWidget(
+                label(f"This element does not have any problems; the others have {len(rows)}", "label", "text2")
+            )
         column.addStretch()
         self.lines = []
         for row in listed:

@@ -125,7 +125,7 @@ class SeriesCard(Prompt):
             f"Enter one value per copy of {title}. The copies are added to the blocks that use the original.",
         )
         self.study, self.path, self.numbers = study, path, numbers
-        self.number = make_dense(Choice(), "Value that differs")
+        self.number = make_dense(Choice(), "Value to vary")
         for row in numbers:
             number_title = ", ".join(label_of(step) for step in row.path[2:])
             self.number.addItem(f"{number_title} [{row.unit}]" if row.unit else number_title)

@@ -269,8 +269,7 @@ class Saving(QObject):
         if opened.keeper.others > self._others:
             self._others = opened.keeper.others
             said = (
-                "This study is also being edited in another window of the program; the unsaved edits made there are "
-                "kept as a version"
+                "This study is also being edited in another window. The unsaved edits made there are kept as a version"
             )
             self._show_notice(said, ("compare", "Compare"))
             self._show_banner(opened)
@@ -301,7 +300,7 @@ def _banner_notice(opened: Document) -> Notice | None:
         return None
     if not opened.file.exists():
         return Notice("Another program has deleted or moved this file", (("keep", "Keep mine"),))
-    too = ", which has also been edited here" if opened.edited else ""
+    too = ", and you have edited it here too" if opened.edited else ""
     return Notice(
         f"Another program has changed this file{too}",
         (("keep", "Keep mine"), ("take", "Use the file's"), ("compare", "Compare")),

@@ -123,4 +123,4 @@ def edited_elements_text(saved: str, draft: str, folder: Path) -> str:
         for path in places
     )
     named, more = list(titles)[:_NAMED_AT_MOST], len(titles) - _NAMED_AT_MOST
-    return f": {', '.join(named) or 'comments, order or notation only'}{f' and {more} more' if more > 0 else ''}"
+    return f": {', '.join(named) or 'only comments, order or formatting'}{f' and {more} more' if more > 0 else ''}"

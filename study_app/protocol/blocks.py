@@ -44,13 +44,14 @@ class Criterion(Table):
 class Catch(Table):
     """Easy trials among the others: a participant who answers many of them incorrectly does not attend to the task."""
 
-    share: Annotated[float, within(0.01, 0.5, "between one catch trial per 100 other trials and one per 2")] = Field(
+    share: Annotated[float, within(0.01, 0.5, "from one catch trial per 100 other trials to one per 2")] = Field(
         default=0.1,
-        description="Ratio of catch trials to other trials in a track; one occurs at a random position in every "
-        "1/share trials.",
+        description="Ratio of catch trials to other trials in a track. One catch trial occurs at a random position in "
+        "every 1/share trials.",
     )
     wrong_most: Annotated[float, within(0, 1, "a proportion of the catch trials")] = Field(
-        default=0.25, description="Proportion of catch trials answered incorrectly above which the session is excluded."
+        default=0.25,
+        description="Maximum proportion of catch trials answered incorrectly; above this, the session is excluded.",
     )
 
     def count(self, trials: int) -> int:
@@ -91,22 +92,20 @@ class Block(Table):
     id: Id = Field(description="The name of the block's table.")
     phase: Phase = Field(
         default="main",
-        description="main: analysed; practice: kept but not analysed; baseline: kept for comparison but not analysed.",
+        description="How the block's data are used. main: analysed; practice: kept but not analysed; baseline: kept "
+        "for comparison but not analysed.",
     )
-    part: int | None = Field(default=None, ge=1, le=20, description="Part of the study to which the block belongs.")
+    part: int | None = Field(default=None, ge=1, le=20, description="Part of the study that contains the block.")
     title: Localised = Field(description="Name of the block.")
     setting_label: Localised = Field(
-        description="Neutral name for the block's trials, to which a number is added, as in “Liquid setting 1”."
+        description="Neutral name for the block's trials; the program adds a number, as in “Liquid setting 1”."
     )
-    code_prefix: str | None = Field(
-        default=None, pattern=r"^[A-Z]$", description="Letter with which the block's codes begin."
-    )
+    code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="First letter of the block's codes.")
     conditions: tuple[Id, ...] = Field(
         default=(), description="The conditions to present; omit this key if the block has a stimulus."
     )
     standard: Id | None = later(
-        default=None,
-        description="The reference condition, with which the design compares the block's other conditions.",
+        default=None, description="The reference condition; the design compares the block's other conditions with it."
     )
     stimulus: Id | None = later(
         default=None, description="The stimulus to present at varying levels, instead of conditions."
@@ -116,17 +115,17 @@ class Block(Table):
     )
     design: Kind | None = later(
         default=None,
-        description="How a trial is constructed: the name of a table in [designs], or a kind with its defaults. The "
-        "design draws the order of trials and asks its own question.",
+        description="How a trial is constructed: the name of a table in [designs], or a kind with default settings. "
+        "The design randomises the order of trials and asks its own question.",
     )
     method: Kind | None = later(
         default=None,
-        description="How levels are chosen: the name of a table in [methods], or a kind with its defaults.",
+        description="How levels are chosen: the name of a table in [methods], or a kind with default settings.",
     )
     until: Criterion | None = later(default=None, description="When the block ends early; default: never.")
     catch: Catch | None = later(
         default=None,
-        description="Easy trials that check attention, and the rule for excluding a session; default: none.",
+        description="Easy trials that check attention, and the rule for excluding participants; default: none.",
     )
     compares: Compared | None = Field(
         default=None,
@@ -136,34 +135,34 @@ class Block(Table):
     )
     replicates: bool = Field(
         default=False,
-        description="Whether a block that compares delays may have several conditions with the same delay; these "
-        "are analysed as replicates of one condition.",
+        description="Whether a block that compares delays may have several conditions with the same delay. Such "
+        "conditions are analysed as replicates of one condition.",
     )
     order: Order = Field(
         default="fixed",
-        description="fixed: as written; shuffled: a new order in each repetition; constrained: all trials are "
-        "shuffled together, subject to max_repeats and min_distance; williams, latin: balanced using the rows "
-        "of a Williams design or Latin square, which are selected by the number in the participant's ID.",
+        description="Order of the conditions. fixed: as written; shuffled: a new order in each repetition; "
+        "constrained: all trials are shuffled together, subject to max_repeats and min_distance; williams, latin: "
+        "a row of a Williams design or Latin square, selected by the number in the participant's ID.",
     )
     max_repeats: int | None = Field(
         default=None,
         ge=1,
         le=100,
-        description="Maximum number of times in a row that a condition may be presented; only with order constrained.",
+        description="Maximum number of consecutive presentations of a condition; only if order is constrained.",
     )
     min_distance: int | None = Field(
         default=None,
         ge=1,
         le=1000,
-        description="Minimum number of trials from one presentation of a condition to the next: 2 means never twice "
-        "in a row, and 3 means at least two other trials in between; only with order constrained.",
+        description="Minimum number of trials from one presentation of a condition to the next; only if order is "
+        "constrained. 2 means never twice in a row; 3 means at least two other trials in between.",
     )
     repetitions: int = Field(default=1, ge=1, le=100, description="How many times each condition is presented.")
     break_every: int | None = Field(
         default=None, ge=1, le=10_000, description="Number of trials between breaks; default: no breaks."
     )
     break_page: Id | None = Field(default=None, description="The page shown during a break (a page of kind break).")
-    task: Id = Field(description="What the participant does.")
+    task: Id = Field(description="The participant's task in each trial.")
     questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; default: none.")
 
     @model_validator(mode="after")
@@ -174,11 +173,11 @@ class Block(Table):
             if name in self.model_fields_set and getattr(self, name) is not None:  # receipts contain every key
                 instead = {
                     "repetitions": "set it in the method's table",
-                    "questionnaire": "ask it in a form after the block",
+                    "questionnaire": "ask its questions in a form after the block",
                 }.get(name, "omit it")
                 raise invalid(f"cannot be used in a block with {what}: {instead}", name, kind="surplus")
         if what == "a design" and (self.standard not in self.conditions or len(self.conditions) < 2):
-            raise invalid("must be one of at least two conditions: choose the reference condition", "standard")
+            raise invalid("must be one of the block's conditions, and the block needs at least two", "standard")
         return self
 
     @model_validator(mode="after")

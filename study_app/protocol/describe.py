@@ -163,7 +163,7 @@ def _session_lines(variant: Variant, planned: int | None, language: str) -> Iter
     if len(protocol.main_blocks) < 2:
         return _titled(title, rows)
     order = block_order_words(protocol, planned, in_group=variant.group is not None)
-    return (*_titled(title, rows), f"  Order of blocks: {order}")
+    return (*_titled(title, rows), f"  Block order: {order}")
 
 
 def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: int) -> Iterable[str]:
@@ -224,7 +224,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         low, high = stimulus.domain
         steps = round((high - low) / method.step(stimulus))
         longest = f"at most {method.most_s:g} s per setting"
-        yield "Settings", f"{steps} steps from end to end, starting near either end, {longest}"
+        yield "Settings", f"{steps} steps from one end to the other, starting near either end, {longest}"
     pairs = product(standards_of(protocol, block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
     unit = quantity(stimulus.vary).unit
@@ -240,7 +240,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         felt_n = [steady_force(level_scene, pace_mps).drag_n for level_scene in scenes]
         fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(compared) :])
         yield (
-            "Force when paced",
+            "Force at set pace",
             f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
             f"{FASTER:g} times that speed",
         )
@@ -308,7 +308,7 @@ def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
 def _drawing_notes(condition: Condition) -> Iterator[str]:
     """Yield notes on unusual displays and force links of a condition."""
     if condition.delay_ms:
-        yield f"shown {condition.delay_ms:g} ms late"
+        yield f"shown with a delay of {condition.delay_ms:g} ms"
     if condition.shows_video:
         alone = ", without the ball and the targets" if condition.overlay == "hidden" else ""
         yield f"video: {condition.view}{alone}"

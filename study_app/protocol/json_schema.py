@@ -18,7 +18,7 @@ from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
 _LIQUID_FILE = (
-    "Path of a liquid file that contains one liquid, relative to this file; it replaces the keys of this table."
+    "Path of a file that contains one liquid, relative to this file; the liquid replaces the keys of this table."
 )
 
 

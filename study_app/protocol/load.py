@@ -265,13 +265,15 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
         sentence = re.sub(r" \(at .*\)$", "", str(error))
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         line, column = (int(place[1]), int(place[2])) if place else (text.count("\n") + 1, 1)
-        broken = Problem("file", f"not TOML at column {column}: {sentence}", line, hint="see toml.io for the notation")
+        broken = Problem(
+            "file", f"invalid TOML at column {column}: {sentence}", line, hint="see toml.io for the notation"
+        )
         raise ProtocolError(name, (broken,)) from error
     except RecursionError as error:
         broken = Problem("file", "is nested too deeply", hint="use fewer brackets within brackets")
         raise ProtocolError(name, (broken,)) from error
     except ValueError as error:  # Python's own limit of digits names no place either
-        raise ProtocolError(name, (Problem("file", "contains a whole number of more than 64 bits"),)) from error
+        raise ProtocolError(name, (Problem("file", "contains a whole number with more than 64 bits"),)) from error
     return document, Places(text)
 
 

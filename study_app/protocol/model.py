@@ -56,7 +56,7 @@ __all__ = [
 
 MAX_FORCE_N = 8.0
 HandForceN: TypeAlias = Annotated[
-    float, within(0.1, MAX_FORCE_N, "forces below 0.1 N are hardly felt, and 8 N is the safe maximum")
+    float, within(0.1, MAX_FORCE_N, "participants hardly feel less than 0.1 N, and 8 N is the maximum safe force")
 ]
 
 
@@ -93,7 +93,7 @@ class StudyHead(Table):
     """Name, version and languages of the study."""
 
     name: str = Field(
-        pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in the names of folders and files."
+        pattern=r"^[a-z][a-z0-9]*$", max_length=40, description="Short name, used in folder and file names."
     )
     title: Localised = Field(description="The study's title, as it is displayed.")
     description: Description = Field(
@@ -122,16 +122,16 @@ class StudyHead(Table):
     codes: Literal["study", "participant"] = later(
         default="study",
         description=(
-            "study: a code means the same for all participants; participant: until unblinding, each participant has "
-            "different codes."
+            "How codes are assigned to conditions. study: a code means the same for all participants; participant: "
+            "each participant has different codes until unblinding."
         ),
     )
     block_order: OrderOfBlocks = later(
         default="fixed",
         description=(
             "Order of the main blocks; pages, forms and other blocks keep their positions. fixed: as written; "
-            "balanced: counterbalanced using the rows of a Williams design, which are selected by the number in the "
-            "participant's ID or by the participant's position in the group; random: drawn for each session."
+            "balanced: a row of a Williams design, selected by the number in the participant's ID or by the "
+            "participant's position in the group; random: drawn for each session."
         ),
     )
     group_assignment: GroupAssignment = later(
@@ -140,7 +140,7 @@ class StudyHead(Table):
         "already belong to a group, such as experts or novices, and the operator enters the group in each "
         "session.",
     )
-    credits: Credits | None = later(default=None, description="Authors, licence and citation to be stated in exports.")
+    credits: Credits | None = later(default=None, description="Authors, licence and citation for exports.")
 
     @model_validator(mode="after")
     def _name_can_be_a_file(self) -> Self:
@@ -190,7 +190,7 @@ class SceneDefaults(Table):
     velocity: Estimator = Field(default_factory=Ewma, description="How velocity is estimated from positions.")
     knee: Knee = Field(default_factory=Knee, description="How high speeds are reduced before forces are computed.")
     motion: MotionBox = Field(default_factory=MotionBox, description="How the ball is expected to move in the scene.")
-    accuracy: Accuracy = Field(default_factory=Accuracy, description='What may be left out with effects = "auto".')
+    accuracy: Accuracy = Field(default_factory=Accuracy, description='The force that effects = "auto" may omit.')
     fade_s: FadeS = later(default=FADE_S, description="Time over which the force fades in [s].")
 
 
@@ -209,8 +209,8 @@ class PageText(Table):
 
     kind: Literal["consent", "instructions", "break", "debrief"] = Field(
         description=(
-            "consent: what the participant agrees to; instructions: what to do next; break: a rest; debrief: "
-            "what the study was about."
+            "Purpose of the page. consent: what the participant agrees to; instructions: what to do next; break: a "
+            "rest; debrief: what the study was about."
         )
     )
     title: Localised = Field(description="Page heading.")
@@ -219,7 +219,7 @@ class PageText(Table):
     min_s: Seconds | None = Field(
         default=None,
         description=(
-            "Minimum duration of a break [s], counted down on the page; by default the participant can end the break "
+            "Minimum duration of a break [s]; the page counts it down. By default, the participant can end the break "
             "at any time."
         ),
     )
@@ -271,16 +271,18 @@ def scene_with(scene: SceneDefaults, device: DeviceNeeds, liquids: Sequence[Stud
 class Limits(Table):
     """Limits within which a trial is valid."""
 
-    lateness_ms: Annotated[float, within(0.01, 1000, "no servo is more punctual, and 1 s is a failure")] = Field(
-        default=2, description="Maximum 99th percentile of tick lateness [ms]."
+    lateness_ms: Annotated[
+        float, within(0.01, 1000, "no servo loop is more punctual, and a lateness of 1 s is a failure")
+    ] = Field(default=2, description="Maximum 99th percentile of tick lateness [ms].")
+    worst_gap_ms: Annotated[
+        float, within(0.25, 1000, "at 4 kHz ticks are 0.25 ms apart, and a gap of 1 s is a failure")
+    ] = Field(default=20, description="Maximum time between two ticks [ms].")
+    delay_error_ms: Annotated[
+        float, within(1, 1000, "no screen is more punctual, and an error of 1 s is a failure")
+    ] = Field(
+        default=25, description="Maximum 95th percentile of the delay error (achieved minus requested delay) [ms]."
     )
-    worst_gap_ms: Annotated[float, within(0.25, 1000, "no tick is shorter than at 4 kHz, and 1 s is a failure")] = (
-        Field(default=20, description="Maximum time between two ticks [ms].")
-    )
-    delay_error_ms: Annotated[float, within(1, 1000, "no screen is more punctual, and 1 s is a failure")] = Field(
-        default=25, description="Maximum 95th percentile of the delay error, achieved minus requested delay [ms]."
-    )
-    frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and 1 s is a failure")] = Field(
+    frame_gap_ms: Annotated[float, within(1, 1000, "no screen is faster, and a gap of 1 s is a failure")] = Field(
         default=250,
         description="Maximum time before the first frame, between two frames, or from the last frame to the end of "
         "the trial [ms].",
@@ -298,10 +300,10 @@ class Limits(Table):
         Annotated[float, within(0.01, 100, "a proportion of the targets; without this limit any number is enough")]
         | None
     ) = later(default=None, description="Minimum proportion of a reaching task's targets that must be reached [%].")
-    level_error_percent: Annotated[float, within(0.1, 100, "encoder counts alone give 0.2 %")] | None = later(
-        default=None, description="Maximum error in an interval's delivered level [%]; default: 2."
-    )
-    level_error_ms: Annotated[float, within(0.1, 100, "frames of 120 Hz last 8 ms")] | None = later(
+    level_error_percent: (
+        Annotated[float, within(0.1, 100, "encoder resolution alone causes an error of 0.2 %")] | None
+    ) = later(default=None, description="Maximum error in an interval's delivered level [%]; default: 2.")
+    level_error_ms: Annotated[float, within(0.1, 100, "at 120 Hz a frame lasts 8 ms")] | None = later(
         default=None, description="Maximum error in the delay difference delivered in a trial [ms]; default: 2."
     )
     pace_error_percent: Annotated[float, within(1, 1000, "a hand cannot keep a pace within 1 %")] | None = later(
@@ -310,16 +312,15 @@ class Limits(Table):
         "follows [%]; default: 40.",
     )
     attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
-        default=None,
-        description="Maximum number of times a trial with intervals is presented until it is delivered; default: 3.",
+        default=None, description="Maximum number of attempts to deliver a trial with intervals; default: 3."
     )
     missing_percent: (
-        Annotated[float, within(0, 100, "a proportion of the trials; with 0, trials must not be missing")] | None
+        Annotated[float, within(0, 100, "a proportion of the trials; 0 means that all trials are required")] | None
     ) = later(
         default=None,
         description=(
-            "Maximum proportion of a session's main trials with intervals that may be missing because they were not "
-            "delivered [%]; above this, the session is incomplete; default: 5."
+            "Maximum proportion of undelivered trials among a session's main trials with intervals [%]; above this, "
+            "the session is incomplete; default: 5."
         ),
     )
 
@@ -330,24 +331,24 @@ _Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller")]
 class Published(Table):
     """A value of another study, which figures show next to the study's own."""
 
-    block: Id = Field(description="The block with whose results it is compared.")
+    block: Id = Field(description="The block whose results are compared with the published value.")
     measure: Literal["weber", "threshold", "exponent", "pse"] = Field(
-        description="weber: the Weber fraction; threshold: the threshold; exponent: the exponent of a power law; "
-        "pse: the point of subjective equality."
+        description="The quantity that was published. weber: the Weber fraction; threshold: the threshold; exponent: "
+        "the exponent of a power law; pse: the point of subjective equality."
     )
-    value: _Reported = Field(description="The value; a threshold is in the unit of the varied parameter.")
+    value: _Reported = Field(description="The published value; a threshold is in the unit of the varied parameter.")
     standard: _Reported | None = Field(
-        default=None, description="The standard to which it applies, in the same unit; default: all standards."
+        default=None, description="The standard to which the value applies, in the same unit; default: all standards."
     )
-    low: _Reported | None = Field(default=None, description="Lower end of its interval or range.")
-    high: _Reported | None = Field(default=None, description="Upper end of its interval or range.")
+    low: _Reported | None = Field(default=None, description="Lower end of the published interval or range.")
+    high: _Reported | None = Field(default=None, description="Upper end of the published interval or range.")
     percent: Annotated[float, within(0, 100, "a proportion of answers")] | None = Field(
         default=None, description="Percentage of correct answers at this value; default: unknown."
     )
-    n: Annotated[int, within(1, 1_000_000, "studies have fewer")] | None = Field(
+    n: Annotated[int, within(1, 1_000_000, "studies have fewer participants")] | None = Field(
         default=None, description="Number of participants in the published study."
     )
-    source: Brief = Field(default="", description="Where it was published.")
+    source: Brief = Field(default="", description="The publication that reports the value.")
 
     def described(self) -> str:
         """Return the value in words."""
@@ -376,7 +377,7 @@ class Contrast(Table):
         "if form is specified, the ID of one of its questions or scores.",
     )
     form: Id | None = later(
-        default=None, description="The questionnaire whose answers or score are compared; it is asked after the blocks."
+        default=None, description="The questionnaire whose answers or score are compared; it must follow the blocks."
     )
     blocks: tuple[Id, ...] = Field(
         min_length=1,
@@ -384,7 +385,7 @@ class Contrast(Table):
         description=("The two blocks to compare, or the block in which conditions or groups are compared."),
     )
     conditions: tuple[Id, Id] | None = Field(
-        default=None, description="The two conditions of the block to compare, within participants."
+        default=None, description="The two conditions of the block to compare within participants."
     )
     groups: tuple[Id, Id] | None = Field(
         default=None,
@@ -394,14 +395,14 @@ class Contrast(Table):
     expected: Literal["higher", "lower"] | None = Field(
         default=None,
         description=(
-            "higher: the first is expected to be higher than the second; lower: it is expected to be lower; "
-            "default: either direction."
+            "Expected direction. higher: the first is higher than the second; lower: the first is lower; default: "
+            "either direction."
         ),
     )
     bound: Annotated[float, within(1e-9, 1e9, "published differences are smaller")] | None = Field(
         default=None,
-        description="Largest difference that would not matter (for thresholds, the largest ratio, such as 1.25); "
-        "default: equivalence is not tested.",
+        description="Equivalence bound: the largest negligible difference (for thresholds, the largest negligible "
+        "ratio, such as 1.25); default: equivalence is not tested.",
     )
 
     @model_validator(mode="after")
@@ -474,10 +475,10 @@ class Contrast(Table):
 BELOW_CHANCE_P: Final = 0.001
 _Rule: TypeAlias = Literal["below_chance", "threshold_beyond_levels", "constant_answers", "fast_answers"]
 RULES: Final[Mapping[_Rule, str]] = {
-    "below_chance": "fewer answers in a block are correct than expected by chance (binomial p below 0.001)",
+    "below_chance": "a block has fewer correct answers than expected by chance (binomial p below 0.001)",
     "threshold_beyond_levels": "a threshold lies outside the range of its stimulus's levels",
     "constant_answers": "more than {limit:g} % of the answers to statements are identical",
-    "fast_answers": "half of the answers were given within {limit:g} s of the question",
+    "fast_answers": "the median response time is below {limit:g} s",
 }
 """When each planned rule proposes a session for exclusion."""
 _LIMITS: Final[Mapping[_Rule, tuple[float, float]]] = {"constant_answers": (1, 100), "fast_answers": (0.05, 600)}
@@ -488,9 +489,9 @@ class ExclusionRule(Table):
     """A rule by which a session is proposed for exclusion; a person decides."""
 
     rule: _Rule = Field(
-        description="below_chance: fewer correct answers than expected by chance; threshold_beyond_levels: a "
-        "threshold outside the range of levels; constant_answers: nearly always the same answer; fast_answers: "
-        "answers given too fast to have read the question."
+        description="Reason for exclusion. below_chance: fewer correct answers than expected by chance; "
+        "threshold_beyond_levels: a threshold outside the range of levels; constant_answers: nearly always the same "
+        "answer; fast_answers: answers so fast that the participant cannot have read the questions."
     )
     limit: float | None = Field(
         default=None,
@@ -516,23 +517,23 @@ class ExclusionRule(Table):
 class Analysis(Table):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
 
-    alpha: Annotated[float, within(0.0001, 0.2, "studies with human participants cannot show less than 0.0001")] = (
-        Field(default=0.05, description="Largest p value that counts as significant.")
-    )
-    equivalence_bound: Annotated[float, within(0.05, 6, "the scale has 6 steps, and means differ by tenths")] | None = (
-        Field(
-            default=None,
-            description="Largest mean difference from the condition without delay that would not matter, in scale "
-            "points; default: equivalence is not tested.",
-        )
+    alpha: Annotated[
+        float, within(0.0001, 0.2, "studies with human participants cannot show p values below 0.0001")
+    ] = Field(default=0.05, description="Largest p value that is considered significant.")
+    equivalence_bound: (
+        Annotated[float, within(0.05, 6, "the scale spans 6 points, and means differ by tenths of a point")] | None
+    ) = Field(
+        default=None,
+        description="Largest negligible mean difference from the condition without delay, in scale points; "
+        "default: equivalence is not tested.",
     )
     primary: tuple[Id, ...] = Field(
-        default=(), description="Primary items; all others are exploratory; default: all items are primary."
+        default=(), description="Primary items, as opposed to exploratory items; default: all items are primary."
     )
     names: tuple[Id, ...] = Field(
         default=(),
-        description="Items that each name a liquid; if one item has a higher answer than all others, it is the "
-        "participant's choice.",
+        description="Items that each name a liquid. If a participant rates one item higher than all the others, it is "
+        "the participant's choice.",
     )
     rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to increase with delay.")
     falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to decrease with delay.")
@@ -555,8 +556,8 @@ class Analysis(Table):
     )
     looks: tuple[Annotated[int, Field(ge=2, le=100_000)], ...] = later(
         default=(),
-        description="Numbers of participants at which the key is opened and all hypotheses are tested; the last "
-        "of these must equal the planned number of participants; default: once, at the end.",
+        description="Numbers of participants at which the key is opened and all hypotheses are tested. The last one "
+        "must equal the planned number of participants; default: once, at the end.",
     )
     spending: Literal["obrien-fleming", "pocock"] = later(
         default="obrien-fleming",
@@ -567,9 +568,7 @@ class Analysis(Table):
     )
     published: tuple[Published, ...] = later(default=(), description="Published values to compare with the results.")
     contrasts: tuple[Contrast, ...] = later(default=(), description="Hypotheses to be tested and reported first.")
-    exclusions: tuple[ExclusionRule, ...] = later(
-        default=(), description="Rules by which sessions are proposed for exclusion."
-    )
+    exclusions: tuple[ExclusionRule, ...] = later(default=(), description="Rules for proposing sessions for exclusion.")
 
     @model_validator(mode="after")
     def _looks_end_at_the_last_participant(self) -> Self:
@@ -594,7 +593,7 @@ class Analysis(Table):
             yield "Recognised", ", ".join(named_by)
         yield "Increase with delay", ", ".join(self.rising) or "none"
         yield "Decrease with delay", ", ".join(self.falling) or "none"
-        yield "Detection", "not asked" if self.noticed is None else f"an answer of at least 5 to {self.noticed}"
+        yield "Detection", "not asked" if self.noticed is None else f"agreement with {self.noticed} (5 to 7)"
         if self.participants is not None:
             yield "Participants", f"{self.participants} planned"
         if self.looks:

@@ -38,7 +38,7 @@ class Score(Table):
     weights: dict[Id, _Weight] = Field(default_factory=dict, description="Weight of an item; default: 1.")
     weights_from: tuple[Id, ...] = Field(
         default=(),
-        description="Questions in which participants choose between items; each item's weight is the "
+        description="Questions in which participants choose between items. Each item's weight is the "
         "number of times it was chosen.",
     )
 

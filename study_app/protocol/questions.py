@@ -516,7 +516,8 @@ class Slider(Question):
         if abs(steps - round(steps)) > 1e-6 or not 1 <= round(steps) <= _MOST_STEPS:
             permitted = f"a whole number from 1 to {_MOST_STEPS}"
             raise invalid(
-                f"is {self.step:g}, which gives {steps:g} steps from end to end; this must be {permitted}", "step"
+                f"is {self.step:g}, which gives {steps:g} steps from end to end; this number must be {permitted}",
+                "step",
             )
         return self
 

@@ -32,18 +32,18 @@ class SimulatedParticipants(Table):
     )
     bias_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
         default=0.76,
-        description="Between-participant SD of response bias, which is added to every answer, in scale points.",
+        description="Between-participant SD of response bias, in scale points. The bias is added to every answer.",
     )
-    slope_sd: Annotated[float, within(0, 2, "with 2, three in ten participants respond in the opposite direction")] = (
-        Field(
-            default=0.50,
-            description=(
-                "Between-participant SD of the slope of answers across conditions, relative to the mean slope; used in "
-                "power analyses but not in rehearsals."
-            ),
-        )
+    slope_sd: Annotated[
+        float, within(0, 2, "with an SD of 2, three in ten participants respond in the opposite direction")
+    ] = Field(
+        default=0.50,
+        description=(
+            "Between-participant SD of the slope of answers across conditions, relative to the mean slope; used in "
+            "power analyses but not in rehearsals."
+        ),
     )
-    lapse_rate: Annotated[float, within(0, 0.5, "fewer than half of the answers are errors")] = Field(
+    lapse_rate: Annotated[float, within(0, 0.5, "at most half of the answers can be errors")] = Field(
         default=0.0,
         description=(
             "Proportion of erroneous answers (simulated as 3 points too high); used in power analyses but not in "

@@ -65,10 +65,10 @@ class Constraint:
         if repetitions == 1:
             return None
         if self.min_distance is not None and self.min_distance > codes:
-            possible = f"with {counted(codes, 'condition')} it can be at most {codes}"
+            possible = f"it must be at most {codes} with {counted(codes, 'condition')}"
             return "min_distance", f"is {self.min_distance}, but {possible}"
         if self.max_repeats is not None and codes == 1 and self.max_repeats < repetitions:
-            possible = f"with one condition presented {repetitions} times it must be at least {repetitions}"
+            possible = f"it must be at least {repetitions} if the only condition is presented {repetitions} times"
             return "max_repeats", f"is {self.max_repeats}, but {possible}"
         return None
 

@@ -245,7 +245,7 @@ def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> N
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ('"late", "load"]', '"late"]', "load is not asked after every block that is compared"),
+        ('"late", "load"]', '"late"]', "load does not follow every block in the comparison"),
         ('measure = "raw"', 'measure = "raws"', '"load" does not have a numeric question or score raws'),
         ('measure = "raw"', 'measure = "threshold"', "compare one of its questions or scores"),
     ],

@@ -70,7 +70,7 @@ def test_check_notes_how_many_texts_are_still_to_translate(tmp_path: Path, liqui
     )
     noted = liquid_study("check", "own.toml")
     assert noted.returncode == 0
-    note = "study.languages: 1 text to translate into Dutch, still in English: pages.consent.title"
+    note = "study.languages: 1 text is still in English and must be translated into Dutch: pages.consent.title"
     assert noted.stdout.endswith(f"\nNote: {note}.\n")
 
 

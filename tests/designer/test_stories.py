@@ -141,7 +141,7 @@ def others(story: Story) -> None:
         designer.change((old, new))
         look()
 
-    both = "Another program has changed this file, which has also been edited here"
+    both = "Another program has changed this file, and you have edited it here too"
     outside("A first look", "Another look")
     story.expect(undo="Use the file's content", kept="saved")
     story.ask(SetValue(VERSION, "0.7"))
@@ -486,7 +486,9 @@ def adaptive(story: Story) -> None:
     story.act("begin", lambda: story.designer.controller.begin_study("template:viscosity-jnd", "thicker"))
     levels = story.designer.value("methods", "easy", "levels")
     story.play("@methods.easy :methods.easy.levels ctrl+a '0.5 x' Return")
-    assert "“x” is not a number. The study keeps 0.5; Esc restores it." in " ".join(told(story.designer.place.form))
+    assert "“x” is not a number. The study keeps 0.5; press Esc to restore it." in " ".join(
+        told(story.designer.place.form)
+    )
     story.play("Escape")
     assert story.designer.value("methods", "easy", "levels") == levels
     story.select("stimuli", "damping")
@@ -777,7 +779,7 @@ def asked_when(story: Story) -> None:
     story.expect("1 problem", undo="Add to Session order", at="Add to Session order")
     story.has('sequence = ["welcome", "liquids", "reaching", "delays", "thanks", "delays"]')
     story.act("counterbalance", story.designer.field("study", "block_order").segments.buttons[1].click)
-    story.expect(undo="Change Order of blocks")
+    story.expect(undo="Change Block order")
     story.has('block_order = "balanced"')
 
 

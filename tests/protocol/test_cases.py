@@ -81,7 +81,7 @@ def test_windows_line_ends_change_nothing() -> None:
     ("text", "said"),
     [
         ("a = " + "[" * 3000 + "]" * 3000, "file: is nested too deeply"),
-        ("format = " + "9" * 6000, "file: contains a whole number of more than 64 bits"),
+        ("format = " + "9" * 6000, "file: contains a whole number with more than 64 bits"),
         (SOUND.replace('en = "Small"', f'en = "{"a" * 5000}"'), "at most 500 are"),
         (SOUND.replace('en = "Read this."', f'en = "{"read " * 5000}"'), "at most 20000 are"),
         (SOUND.replace("[tasks.explore]", f"[tasks.{'a' * 5000}]"), "is longer than 60"),

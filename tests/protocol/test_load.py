@@ -232,7 +232,7 @@ def test_a_file_that_is_larger_than_any_study_is_refused_at_once(tmp_path: Path,
     file = tmp_path / "large.toml"
     file.write_bytes(content)
     begun_s = time.perf_counter()
-    with pytest.raises(ProtocolError, match=r"is 1\.\d MB in size, but study files are at most 1 MB"):
+    with pytest.raises(ProtocolError, match=r"is 1\.\d MB in size, but a study file may be at most 1 MB"):
         load(str(file))
     with pytest.raises(ProtocolError, match="check that it is a study file"):
         parse(content, "large")

@@ -114,7 +114,7 @@ def test_the_key_of_an_earlier_study_is_drawn_again_but_for_smoothing_times_that
         ('file = "liquids/syrup.toml"\ndensity_kg_m3 = 1', SYRUP, "liquids.thick.density_kg_m3"),
         ('file = "liquids/syrup.toml"', SYRUP.replace("1387.25", "0"), "density_kg_m3: is 0, but must be"),
         ('file = "liquids/syrup.toml"', SYRUP + "\n[liquids.more]\ndensity_kg_m3 = 1000\n", "contains 2 liquids"),
-        ('file = "liquids/syrup.toml"', "format = 2\n[liquids", "not TOML"),
+        ('file = "liquids/syrup.toml"', "format = 2\n[liquids", "invalid TOML"),
         ('file = "liquids/syrup.toml"', SYRUP.replace("[liquids.from", "[study]\n[liquids.from"), "study"),
     ],
 )

@@ -42,10 +42,10 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
     """
     key, named = distinguishing_key(node_at(study.document, path))
     if not key or kind not in named:
-        raise Refused(f"the kind {kind!r} does not exist here; known kinds: {', '.join(map(str, named))}")
+        raise Refused(f"the kind {kind!r} is not available here; choose one of these: {', '.join(map(str, named))}")
     node = table_of((named[kind],), {})
     if node is None:
-        raise Refused(f"{kind} is not a table kind")
+        raise Refused(f"there is no table of kind {kind}")
     value = value_at(study.document, path)
     table = value if isinstance(value, Mapping) else {}
     edits: list[Edit] = [Unset((*path, name)) for name in table if name != key and name not in node["properties"]]
@@ -94,7 +94,7 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     if code in codes:
         raise Refused(f"the study already includes {language_name(code)}")
     if code not in LANGUAGES:
-        raise Refused(f'the program does not have texts in "{code}"; known languages: {", ".join(LANGUAGES)}')
+        raise Refused(f'the program does not support "{code}"; supported languages: {", ".join(LANGUAGES)}')
     tables = (Set(path, {codes[0]: text}) for path, text in texts_of(study) if isinstance(text, str))
     return (Set(("study", "languages"), [*codes, code]), *tables)
 
@@ -240,7 +240,7 @@ def _repairs_by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
     elif fault.kind == "other language":
         yield Repair("Remove this text", (Unset(path),))
     elif fault.kind == "not a number" and isinstance(value, str) and (number := number_of(value)) is not None:
-        yield Repair(f"Use {shown_value(number)} as a number", (Set(path, number),))
+        yield Repair(f"Change to the number {shown_value(number)}", (Set(path, number),))
     elif fault.kind == "one language" and isinstance(value, str) and languages:
         yield Repair("Use this text in every language", (Set(path, dict.fromkeys(languages, value)),))
     elif fault.kind == "not in sequence" and isinstance(sequence, tuple):
@@ -322,7 +322,7 @@ def edits_to_add(
     """
     row = row_at(study.document, section)
     if row is None or row.kind not in {"tables", "list"}:
-        raise Refused(f"{label_of(section[-1])} does not accept new elements")
+        raise Refused(f"new elements cannot be added to {label_of(section[-1])}")
     several = row.kind == "list"
     value: dict[str, Any] = {}
     path: Path
@@ -476,7 +476,7 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
     known = [row.value]
     for value in values:
         if why := violated_bound(document, row, value):
-            raise Refused(f"{exact_text(value)} is not permitted: {row.label} is {why}")
+            raise Refused(f"{exact_text(value)} is not permitted: {row.label} must be {why}")
         if value in known:
             raise Refused(f"{exact_text(value)} is listed twice or equals the original's value")
         known.append(value)

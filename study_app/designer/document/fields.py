@@ -119,7 +119,7 @@ def edits_to_rename(
     check_id(name, free)
     if name in taken:
         where = "" if item is None else " by another item in this questionnaire"
-        raise Refused(f'the name "{name}" is already used{where}; "{free}" is free')
+        raise Refused(f'the name "{name}" is already used{where}; "{free}" is available')
     if item is None:
         return (Rename(thing, name, references_to(document, thing)),)
     return (Set((*thing, "id"), name), *(Set(place, name) for place in references_to(document, thing)))
@@ -200,7 +200,7 @@ def check_id(name: str, free: str = "") -> None:
     plain = name.isascii() and name.replace("_", "a").isalnum() and name == name.lower()
     if not plain or not name[:1].isalpha() or len(name) > MAX_ID:
         rule = f"at most {MAX_ID} lowercase letters, digits and underscores, starting with a letter"
-        proposed = f'; "{free}" is free' if free else ""
+        proposed = f'; "{free}" is available' if free else ""
         raise Refused(f'"{name}" is not a valid ID: use {rule}{proposed}')
 
 
@@ -432,10 +432,10 @@ _LABELS: Final = {
     "begin": "First level",
     "between_s": "Between trials",
     "bias_sd": "Response bias (SD)",
-    "block_order": "Order of blocks",
+    "block_order": "Block order",
     "break_every": "Trials between breaks",
     "catch": "Catch trials",
-    "code_prefix": "Letter for blind codes",
+    "code_prefix": "Code letter",
     "contrasts": "Hypotheses",
     "count": "Number of targets",
     "damping_nspm": "Viscosity (damping)",
@@ -450,7 +450,7 @@ _LABELS: Final = {
     "falling": "Decreasing with delay",
     "feedback_s": "Feedback duration",
     "go_on": "Continue",
-    "group_assignment": "Assignment to groups",
+    "group_assignment": "Group assignment",
     "id": "ID",
     "intro": "Introduction",
     "latin": "Latin square",

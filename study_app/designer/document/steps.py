@@ -160,7 +160,7 @@ class AddEntry(Request):
         value = self.value
         if value is None:
             if row is None:
-                raise Refused("this place does not accept new elements")
+                raise Refused("new elements cannot be added here")
             if row.kind == "list":
                 return Step(f"Add {element_noun(self.path[-1])}", edits_to_add(at.study, self.path)[0])
             first = initial_value({}, self.path) if not entries else entries[-1]
@@ -283,7 +283,7 @@ class AddLiquid(Request):
         if theirs == own:
             return origin
         if value_at(study.document, _SCALE) is None:
-            return f"{origin}. The scene's scale becomes {theirs:g} for all liquids, as in that study."
+            return f"{origin}. The scene's scale changes to {theirs:g} for all liquids, as in that study."
         return (
             f"{origin}. Its forces differ, because the scene's scale is {theirs:g} in that study and {own:g} in "
             "this one."
@@ -392,7 +392,7 @@ class MoveElement(Request):
             raise Refused(f"{title} is not part of an ordered list, so it cannot be moved")
         to = index_of(entry) + (by if by < 0 else 1 + by)
         if not 0 <= to <= len(value_at(document, entry[:-1])):
-            raise Refused(f"{title} is already the {'first' if by < 0 else 'last'}")
+            raise Refused(f"{title} is already {'first' if by < 0 else 'last'} in the list")
         return _move_step(at.study, self.path, entry, to, f"Move {title} {'up' if by < 0 else 'down'}")
 
 

@@ -36,7 +36,7 @@ def _replace_value(spans: Spans, edit: Editor, path: Path, value: Any) -> None:
     """Replace the value at ``path``; a comment after it keeps its column if possible."""
     node = spans.node(path)
     if node is None or node.kind in {"table", "array table"}:
-        raise Refused("a table with headers cannot become a single value")
+        raise Refused("a table with headers cannot be replaced with a single value")
     text, like = spans.text, spans.text[node.value : node.end]
     line = text.rfind("\n", 0, node.start) + 1
     indent = re.match(r"[ \t]*", text[line:]).group()  # type: ignore[union-attr]
@@ -479,7 +479,7 @@ def apply_edit(text: str, edit: Edit) -> tuple[str, tuple[Splices, ...]]:
     try:
         edited = _parse(text)
     except tomllib.TOMLDecodeError as error:
-        raise WriterError(f"{edit} produced a text that is not TOML: {error}") from error
+        raise WriterError(f"{edit} produced invalid TOML: {error}") from error
     if not is_same_value(edited, meant) and not is_same_value(
         _pruned(copy.deepcopy(edited), edit.path), _pruned(meant, edit.path)
     ):
@@ -503,14 +503,14 @@ def meant_document(document: Mapping[str, Any], edit: Edit) -> Document:
         if isinstance(node, list) or isinstance(last, int):
             _value_at(node, last)
         elif not isinstance(node, dict):
-            raise Refused(f"{_path_text(tuple(parent))} is not a table, so it does not have the key {last}")
+            raise Refused(f"{_path_text(tuple(parent))} is not a table, so it cannot have the key {last}")
         node[last] = copy.deepcopy(edit.value)
         return meant
     node = _own_value(meant, parent)
     if isinstance(edit, Insert):
         _check_value(edit.value)
         if not isinstance(node, list) or not isinstance(last, int) or not 0 <= last <= len(node):
-            raise Refused(f"{_path_text(tuple(parent))} does not have position {last} for a new entry")
+            raise Refused(f"a new entry cannot be inserted at position {last} of {_path_text(tuple(parent))}")
         node.insert(last, copy.deepcopy(edit.value))
         return meant
     value = _value_at(node, last)
@@ -687,7 +687,7 @@ def _is_written_apart(spans: Spans, path: Path) -> bool:
     node = spans.node(path)
     apart = node.kind in {"table", "array table"} if node is not None else bool(spans.pieces(path))
     if apart and isinstance(path[-1], int):
-        raise Refused(f"{_path_text(path)} is a table with a header, so it cannot become a single value")
+        raise Refused(f"{_path_text(path)} is a table with a header, so it cannot be replaced with a single value")
     return apart
 
 

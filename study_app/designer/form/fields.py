@@ -112,7 +112,7 @@ class _Typed(_Base):
         raise NotImplementedError
 
     def begin_value(self) -> None:
-        """Use the displayed text as the value of another element, without a rejection; Esc restores it."""
+        """Use the displayed text as the value of another element, without a rejection; press Esc to restore it."""
         self.show_refused(False)
         self._before = self.words()
 
@@ -507,7 +507,7 @@ class ChoiceField(Field):
             self.list.show_pictures(self._values)
         known = self._values[: len(values) - len(row.sections)]
         self.list.setCurrentIndex(known.index(shown) if shown in known else -1)
-        self.list.setPlaceholderText("" if known else "There is nothing to choose yet")
+        self.list.setPlaceholderText("" if known else "There is nothing to choose from yet")
         self.arrow.setEnabled(row.target is not None)
 
     def words(self, choice: Any, default: object) -> str:
@@ -610,8 +610,8 @@ def add_button(name: str, accessible_name: str = "") -> ActionButton:
 def kept_value_sentence(value: Any) -> str:
     """Return the sentence about the value that the study keeps while the typed one is rejected."""
     if value is None:
-        return "The study does not use this text; Esc clears the field."
-    return f"The study keeps {typed_value(value)}; Esc restores it."
+        return "This text is not in the study; press Esc to clear the field."
+    return f"The study keeps {typed_value(value)}; press Esc to restore it."
 
 
 def typed_value(value: Any) -> str:

@@ -81,7 +81,7 @@ def form_of(study: Study, path: Path) -> Form:
         main = path[:1] == ("blocks",) and value_at(document, (*path, "phase")) in (None, "main")
         if (path == SEQUENCE or main) and (of_blocks := rows_of_blocks(document)):
             together = tuple(_form_row(study, row, places) for row in of_blocks)
-            sections = (*sections, Section(path, "The main blocks together", together))
+            sections = (*sections, Section(path, "All main blocks", together))
         if path[:1] == ("groups",) and (assignment := row_at(document, ASSIGNMENT)) is not None:
             sections = (Section(path, "", (_form_row(study, assignment, places),)), *sections)
     shown = {row.path for section in sections for row in section.rows}
@@ -132,26 +132,26 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
             yield sentence, AddToSession(path, new)
 
     firsts = {place[:-1]: place for place, _ in reversed(blocks)}
-    yield from as_step("Before the first block\tonce", firsts.values())
+    yield from as_step("Before the first block\t(once)", firsts.values())
     for name in dict.fromkeys(step for _, step in blocks):
         title, block = title_of(document, ("blocks", name)), value_at(document, ("blocks", name))
         if isinstance(block, Mapping) and "design" not in block and (other := block.get("questionnaire")) != path[1]:
             instead = "" if other is None else f", instead of {title_of(document, (path[0], str(other)))}"
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
-            yield f"After each trial of {title}\twith questions about this trial{instead}", asked
+            yield f"After each trial of {title}\t(about that trial{instead})", asked
     ends = {
         name: _places_after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)
     }
     for name, after in ends.items():
-        yield from as_step(f"After {title_of(document, ('blocks', name))}\tonce, about the block", after)
+        yield from as_step(f"After {title_of(document, ('blocks', name))}\t(once, about the block)", after)
     if len(ends) > 1:
         yield from as_step(
-            f"After each block\t{len(ends)} times, for comparison", _places_after(place for place, _ in main)
+            f"After each block\t({len(ends)} times, for comparison)", _places_after(place for place, _ in main)
         )
     lasts = {
         place[:-1]: place if step in names(document, "pages") else _places_after([place])[0] for place, step in steps
     }
-    yield from as_step("At the end\tonce, about the session", lasts.values())
+    yield from as_step("At the end\t(once, about the session)", lasts.values())
 
 
 def _places_after(places: Iterable[Path]) -> tuple[Path, ...]:

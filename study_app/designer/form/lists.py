@@ -164,7 +164,7 @@ class EntryList(Field):
             self.list.keys |= {"Alt+Up": lambda: self.move_entry(self.chosen, self.chosen - 1),
                                "Alt+Down": lambda: self.move_entry(self.chosen, self.chosen + 2),
                                "Del": lambda: self.remove_entry(self.chosen), "Ctrl+D": self._duplicate}  # fmt: skip
-            self.list.setAccessibleDescription("Alt+Up and Alt+Down move an entry, and Delete removes it")
+            self.list.setAccessibleDescription("Alt+Up and Alt+Down move an entry; Delete removes it")
         else:
             self.list.itemClicked.connect(lambda item: self.open_entry(self.list.row(item)))
         self.box.addWidget(self.list)
@@ -414,7 +414,7 @@ class LanguageListField(EntryList):
             shown = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.faults and at:
                 made = self.copies[code] = add_button(
-                    f"Copy the {first} text where {entry.title} is missing", f"Copy {first}"
+                    f"Copy the {first} text wherever {entry.title} is missing", f"Copy {first}"
                 )
                 made.clicked.connect(partial(self.asked.emit, ChangeLanguage("copy", code)))
                 shown.line.addWidget(made)

@@ -67,13 +67,13 @@ def _order_balance(study: Study, row: Row) -> tuple[Verdict, str] | None:
     if order == "fixed":
         return ("neutral", "ring", "same for everyone"), "The effects of condition and position cannot be separated."
     if not isinstance(order, str) or order not in _SQUARES:
-        drawn = "A new order is drawn in every session, so positions are balanced only on average."
+        drawn = "A new order is drawn for each session, so positions are balanced only on average."
         return ("neutral", "ring", "balanced on average"), drawn
     square, repetitions = _SQUARES[order], block.get("repetitions", 1)
     rows = row_count(square, codes)
     numbers = ", ".join(str(rows * number) for number in range(1, _ROUNDS + 1))
     carries = square == "williams" and isinstance(repetitions, int) and has_even_borders(codes, max(1, repetitions))
-    at = f"for every multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
+    at = f"for any multiple of {rows} participants{' in a group' if study.document.get('groups') else ''}."
     if carries or codes == 2:
         return ("ok", "check", f"balanced for {numbers} …"), f"Positions and carry-over are balanced {at}"
     return ("warn", "warning", f"partly for {numbers} …"), f"Only positions are balanced {at}"
@@ -376,7 +376,8 @@ _RELATIONS: Final = (
 )  # fmt: skip
 BOUND, RATIO = 0.5, 1.25
 _NOTHING_TO_COMPARE: Final = (
-    "A hypothesis compares two main blocks, two conditions of a block, or two groups. Add a second one first."
+    "A hypothesis compares two main blocks, two conditions of a block, or two groups. Add a second block, condition or "
+    "group first."
 )
 
 
@@ -503,7 +504,7 @@ class Hypothesis(QWidget):
             box.setMinimumContentsLength(6)
             box.activated.connect(self._take_choice)
         self.within = label("within", "label")
-        self.bound = TypedLine(f"{name}, largest difference that would not matter")
+        self.bound = TypedLine(f"{name}, largest negligible difference")
         self.bound.setFixedWidth(64)
         self.bound.typed.connect(self._take_bound)
         self.away = IconButton("cross", f"Remove {name}", size=FIELD_PX, role="plain")

@@ -103,7 +103,7 @@ class _Strip(Themed, QWidget):
         self.setFixedHeight(14)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         listed = [segment.words for segment in segments]
-        self.setAccessibleName("Order of the session: " + ", ".join(listed))
+        self.setAccessibleName("Session order: " + ", ".join(listed))
         self.setToolTip(plain_tip("\n".join((*listed, "Click a step to open it"))))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:

@@ -12,7 +12,7 @@ from study_app.gui.widgets.boxes import add_parts, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.labels import label
 
-_EARLIER = "These numbers describe the study's last valid state. Correct the problems to update them."
+_EARLIER = "These numbers describe the last valid version of the study. Correct the problems to update them."
 FACTS_MOST, FACTS_LEAST = 366, 190
 FACTS_SHARE, HIGH_FROM = 0.3, 940
 """The share of a window's height that the cards take at most; in windows as high as this two rows are shown whole."""

@@ -148,7 +148,7 @@ def _text_verdicts(study: Study, facts: Facts) -> Sequence[Verdict]:
         named = f"in {revealed[0].element}, “{revealed[0].word}” reveals a condition" if revealed else ""
         more = f", and {len(revealed) - 1} more" if len(revealed) > 1 else ""
         verdicts.append(
-            ("warn", "warning", named + more) if revealed else ("ok", "check", "The texts do not reveal a condition")
+            ("warn", "warning", named + more) if revealed else ("ok", "check", "The texts do not reveal any condition")
         )
     return verdicts
 
@@ -165,23 +165,23 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
         verdict: Verdict = ("ok", "check", "balanced")
         if rows is not None:
             rounds = counted(participants // rows, "round")
-            verdict = ("ok", "check", f"balanced: {participants} participants complete {rounds} of {rows}")
+            verdict = ("ok", "check", f"balanced: {participants} participants complete {rounds} of {rows} orders")
     elif rows is not None and participants % rows:
         last = participants - participants % rows
         even = f"{last} or {last + rows}" if last else f"{rows}"
-        verdict = ("warn", "warning", f"balanced with {even} participants, for a {_SQUARE_NAMES[order]}")
+        verdict = ("warn", "warning", f"a {_SQUARE_NAMES[order]} would be balanced with {even} participants")
     elif rows is not None:
         verdict = ("warn", "warning", "positions are balanced, but carry-over is not")
     elif order == "fixed":
         verdict = ("warn", "warning", "the order is the same for all participants, which reveals the codes")
     else:
-        verdict = ("neutral", "info", "balanced only on average, because the order is drawn for each session")
+        verdict = ("neutral", "info", "balanced only on average, because a new order is drawn for each session")
     aside = f"{_title(study, block.id)}, {participants} {'participants' if planned is None else 'planned'}"
     if len(evenness.codes) > _MOST_CODES:
         cells = [count for line in evenness.positions for count in line]
         after = evenness.after_another
         summary = (
-            f"each code is in each position {min(cells)} to {max(cells)} times and follows each other code "
+            f"each code occurs in each position {min(cells)} to {max(cells)} times and follows each other code "
             f"{min(after)} to {max(after)} times"
         )
         return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {summary}"),))]

@@ -371,22 +371,24 @@ class Feeling(QObject):
         """Set the liquid of a side to the values of a setting, as one step."""
         opened, before = self.editing.opened, self._sides.get(side)
         if opened is None or before is None or opened.file != self._file:
-            self.place.message.emit("The liquid was not put back", "A different study is now open in the designer.")
+            self.place.message.emit(
+                "The liquid was not put back into the study", "A different study is now open in the designer."
+            )
             return
         if opened.read_only:
-            self.place.message.emit("The liquid was not put back", opened.read_only)
+            self.place.message.emit("The liquid was not put back into the study", opened.read_only)
             return
         path: Path = ("liquids", before.id)
         document = opened.study.document
         if value_at(document, path) is None:
             self.place.message.emit(
-                "The liquid was not put back", f"The study no longer contains the liquid {before.id}."
+                "The liquid was not put back into the study", f"The study no longer contains the liquid {before.id}."
             )
             return
         title = title_of(document, path)
         if liquid_file_name(value_at(document, path)) is not None:
             sentence = f"{title} is in a separate liquid file. Save it there as a preset."
-            self.place.message.emit("The liquid was not put back", sentence)
+            self.place.message.emit("The liquid was not put back into the study", sentence)
             return
         after = setting.scene.liquids[0]
         edits = tuple(_liquid_edits(document, path, _liquid_values(before), _liquid_values(after)))
@@ -394,7 +396,7 @@ class Feeling(QObject):
             if edits:
                 self.editing.make_step(f"Put {title} back from the lab", *edits, select=path)
         except Refused as refusal:
-            self.place.message.emit("The liquid was not put back", f"{refusal}.")
+            self.place.message.emit("The liquid was not put back into the study", f"{refusal}.")
             return
         self._sides[side] = after.model_copy(update={"id": before.id})
         self.editing.select(path)
@@ -403,7 +405,7 @@ class Feeling(QObject):
         if shared:
             names = ", ".join(parameter(setting.scene, name).label.lower() for name in shared)
             self.place.message.emit(
-                f"{title} was put back", f"These settings apply to all liquids in the study: {names}."
+                f"{title} was put back into the study", f"These settings apply to all liquids in the study: {names}."
             )
 
 

@@ -657,7 +657,7 @@ class ParticipantPreview(Card):
         if own.kind == "alike":
             shown = "the text is shown as written"
         elif own.missing_language or own.kind == "one language":
-            shown = "the text in another language is shown"
+            shown = "the text is shown in another language"
         return f"{title_of(study.document, self._selected)} has a problem ({own.message}), so {shown}."
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:

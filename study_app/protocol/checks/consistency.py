@@ -136,11 +136,14 @@ def _check_targets(parts: Draft) -> Iterator[Fault]:
     half = tuple(size / 2 for size in parts.device.workspace_mm)
     for name, task in parts.tasks.items():
         if isinstance(task, Follow) and task.amplitude_mm + task.radius_mm > half[0]:
-            message = f"with {task.amplitude_mm:g} mm and a radius of {task.radius_mm:g} mm, the target leaves the tank"
+            message = (
+                f"with an amplitude of {task.amplitude_mm:g} mm and a radius of {task.radius_mm:g} mm, the target "
+                "leaves the tank"
+            )
             yield Fault(
                 ("tasks", name, "amplitude_mm"),
                 message,
-                f"device.workspace_mm extends to {half[0]:g} mm on either side",
+                f"device.workspace_mm extends only {half[0]:g} mm to either side",
             )
         if not isinstance(task, Reach):
             continue
@@ -153,7 +156,7 @@ def _check_targets(parts: Draft) -> Iterator[Fault]:
                         path,
                         f"at {'xyz'[axis]} = {place:g} mm, a target with a radius of {task.radius_mm:g} mm extends "
                         "beyond the tank",
-                        f"device.workspace_mm extends to {room:g} mm on either side",
+                        f"device.workspace_mm extends only {room:g} mm to either side",
                         use=((*path, axis), int(math.copysign(most, place))) if most >= 0 else None,
                     )
 
@@ -190,8 +193,8 @@ def _check_forces(parts: Draft) -> Iterator[Fault]:
             if scene is not None and (exerted_n := force_n(scene, stroke)) < LEAST_N:
                 yield Fault(
                     ("blocks", name, "conditions", index),
-                    f'"{condition}" exerts {exerted_n:.2g} N in the fastest stroke of task "{block.task}" '
-                    f"({stroke.speed_mps:.2g} m/s), which is less than {LEAST_N:g} N: participants cannot perceive it",
+                    f'"{condition}" exerts only {exerted_n:.2g} N in the fastest stroke of task "{block.task}" '
+                    f"({stroke.speed_mps:.2g} m/s): participants cannot perceive a force below {LEAST_N:g} N",
                     "select effects such as drag, or increase the density, the scale or the ball's diameter",
                 )
 
@@ -204,7 +207,7 @@ def _check_liquids_differ(parts: Draft) -> Iterator[Fault]:
             yield Fault(
                 ("liquids", name),
                 f'has the same values as "{earlier}"',
-                ("change it, or list that liquid's condition twice"),
+                "change one of them; to present a liquid twice, list its condition twice",
             )
 
 
@@ -225,7 +228,7 @@ def _check_conditions_differ(parts: Draft) -> Iterator[Fault]:
             presents = (settings.liquid_ids, settings.ball, settings.view, settings.overlay, *numbers_of)
             earlier = first.setdefault(presents, condition)
             if earlier != condition:
-                message = f'"{condition}" presents the same as "{earlier}"'
+                message = f'"{condition}" is identical to "{earlier}"'
                 hint = "change it, or use repetitions" + (", or write replicates = true" if delays else "")
                 yield Fault(("blocks", name, "conditions", index), message, hint)
 
@@ -246,7 +249,7 @@ def _check_comparisons(parts: Draft) -> Iterator[Fault]:
             varied.remove("delays")
         if len(varied) > 1:
             differ = " and in ".join(quantity.removesuffix("s") for quantity in varied)
-            message = f"its conditions differ in {differ}, whose effects the analysis cannot tell apart"
+            message = f"its conditions differ in {differ}, and the analysis cannot separate these effects"
             yield Fault(
                 ("blocks", name, "conditions"), message, "vary only one of them, or use a separate block for each"
             )
@@ -260,7 +263,7 @@ def _check_blocks(parts: Draft) -> Iterator[Fault]:
     owners: dict[str, str] = {}
     for name, block in parts.blocks.items():
         if block.code_prefix is not None and owners.setdefault(block.code_prefix, name) != name:
-            message = f'block "{owners[block.code_prefix]}" already has the prefix "{block.code_prefix}"'
+            message = f'block "{owners[block.code_prefix]}" already uses the prefix "{block.code_prefix}"'
             yield Fault(("blocks", name, "code_prefix"), message, "choose a different letter")
         page = parts.pages.get(block.break_page or "")
         if page is not None and page.kind != "break":

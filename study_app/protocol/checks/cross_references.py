@@ -112,7 +112,7 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     Blocks and forms occur once in a sequence. `check_groups` checks that no block is omitted in a study with groups.
     """
     pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
-    apart = "rename one of them, because sequence cannot tell them apart"
+    apart = "rename one of them: sequence needs a different name for each"
     for name in pages:
         if name in blocks:
             yield Fault(("blocks", name), "a page has the same name", apart)
@@ -210,15 +210,17 @@ def check_languages(document: Document) -> Iterator[Fault]:
     for path, name in written:
         if name not in LANGUAGES or name in REFUSED:
             known = REFUSED.get(
-                name, f"known: {', '.join(LANGUAGES)}; liquid-study language {name} creates a file for a new one"
+                name,
+                f"supported languages: {', '.join(LANGUAGES)}; run liquid-study language {name} to create a file for a "
+                "new language",
             )
-            yield Fault(path, f'the program does not have texts in "{name}"', known, permitted=tuple(LANGUAGES))
+            yield Fault(path, f'the program does not support "{name}"', known, permitted=tuple(LANGUAGES))
     wanted = tuple(name for _, name in written)
     texts = (texts_of_pattern for pattern in TEXTS for texts_of_pattern in entries(document, pattern)) if wanted else ()
     for path, text in texts:
         if isinstance(text, str) and len(wanted) > 1:
             listed = ", ".join(f'{language} = "…"' for language in wanted)
-            message = "is in one language, but the study is in several languages"
+            message = "is written in one language, but the study has several languages"
             yield Fault(path, message, f"write {{ {listed} }}", kind="one language")
         elif isinstance(text, Mapping):
             for language in wanted:
@@ -226,7 +228,7 @@ def check_languages(document: Document) -> Iterator[Fault]:
                     yield missing_text(path, language)
             for language in text:
                 if language not in wanted:
-                    hint = f"these are: {', '.join(wanted)}"
+                    hint = f"languages of the study: {', '.join(wanted)}"
                     yield Fault((*path, language), "is not a language of the study", hint, kind="other language")
 
 
@@ -249,7 +251,7 @@ def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
         if key in document and all(own):
             yield Fault(
                 (key,),
-                "is not used, because each group has its own",
+                f"is not used, because every group has its own {key} or {next(other for other in OWN if other != key)}",
                 f"remove {key} here, or omit it in at least one group",
             )
     used = {step for _, steps in sequences_in(document) for step in steps if isinstance(step, str)}
@@ -334,9 +336,9 @@ def _check_show_if(table: Document, items: Sequence[tuple[Path, Question]], cont
                 missing = f'there is no item "{rule.item}" in this questionnaire'
                 yield Fault(place, missing, did_you_mean(rule.item, earlier), kind="unknown name")
             elif rule.item not in earlier:
-                yield Fault(place, f'"{rule.item}" comes later', "name an earlier item")
+                yield Fault(place, f'"{rule.item}" comes later', "choose an earlier item")
             elif table.get("item_order", "fixed") != "fixed":
-                hint = 'item_order = "fixed": an item comes after the one that it depends on'
+                hint = 'write item_order = "fixed": an item must follow the item that it depends on'
                 yield Fault(place, "item_order is shuffled", hint)
             else:
                 yield from _check_permitted_answers(place, rule, earlier[rule.item], context)
@@ -350,7 +352,7 @@ def _check_permitted_answers(place: Path, rule: ShowIf, earlier: Question, conte
         levels = []
     for value in rule.permitted:
         if levels and str(value) not in levels:
-            yield Fault(place, f'"{value}" is not one of its answers', f"these are: {', '.join(levels)}")
+            yield Fault(place, f'"{value}" is not one of its answers', f"choose one of these: {', '.join(levels)}")
         elif earlier.value_type != "text" and isinstance(value, str):
             yield Fault(place, f'"{value}" is not one of its answers', "specify a number")
     if not rule.permitted and earlier.value_type == "text":

@@ -55,8 +55,9 @@ def check_kinds(document: Mapping[str, Any]) -> Iterator[Fault]:
             if name not in known:
                 yield unknown_name(path, f'there is no {key} "{name}"', name, {*tables, *known})
             elif needed := [of for of, field in known[name].model_fields.items() if field.is_required()]:
-                example = f'write [{section}.NAME] with kind = "{name}" and {", ".join(needed)}, and {key} = "NAME"'
-                yield Fault(path, f'the kind "{name}" does not have a default for {", ".join(needed)}', example)
+                listed = ", ".join(needed)
+                example = f'add a table [{section}.NAME] with kind = "{name}" and {listed}, and write {key} = "NAME"'
+                yield Fault(path, f'the kind "{name}" does not have a default for {listed}', example)
 
 
 def check_designs(protocol: Protocol) -> Iterator[Fault]:
@@ -124,11 +125,11 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
             )
         return
     if design.has_standard and standards_of(protocol, block) == (None,):
-        message = f'"{block.design}" presents a standard in noise trials, but with level = "value" there is none'
+        message = f'"{block.design}" needs a standard for noise trials, but level = "value" does not define one'
         yield Fault((*place, "design"), message, 'level = "weber" or "difference"')
         return
     if not design.adaptive and method_of(protocol, block).adaptive:
-        message = f'is adaptive, but answers to "{block.design}" do not determine the next level'
+        message = f'is adaptive, but cannot choose levels from answers to "{block.design}"'
         yield Fault((*place, "method"), message, 'method = "constant"')
     elif method_of(protocol, block).adaptive and not rises(protocol.stimuli[block.stimulus], design):
         message = (
@@ -143,7 +144,7 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
         yield Fault(
             (*place, "standards"),
             f"the stimulus does not have the standard {unknown[0]:g}",
-            f"it has these: {listed or 'none'}",
+            f"standards of the stimulus: {listed or 'none'}",
         )
     if design.first is not None and len(tracks_of(protocol, block)) > 1:
         yield Fault(
@@ -167,7 +168,9 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
         standard for standard in standards_of(protocol, protocol.blocks[published.block]) if standard is not None
     ]
     if published.standard is not None and published.standard not in standards:
-        listed = f"it has these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
+        listed = (
+            f"choose one of these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
+        )
         yield Fault((*place, "standard"), f"the block does not have the standard {published.standard:g}", listed)
     ends = (
         published.value if published.low is None else published.low,
@@ -201,7 +204,9 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
             )
         if contrast.conditions is not None and block.design is not None:
             yield Fault(
-                (*place, "conditions"), f"the results of {name} refer to all its levels", "compare two blocks instead"
+                (*place, "conditions"),
+                f"the results of {name} apply to all its levels together",
+                "compare two blocks instead",
             )
 
 
@@ -209,9 +214,7 @@ def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, p
     """Check that a form is asked after a block of a contrast, and has its measure."""
     exchanged = [] if protocol.study.block_order == "fixed" else [main.id for main in protocol.main_blocks]
     if block not in follows(protocol, form, protocol.blocks, exchanged):
-        yield Fault(
-            (*place, "form"), f"{form} is not asked after every block that is compared", f"ask it after {block}"
-        )
+        yield Fault((*place, "form"), f"{form} does not follow every block in the comparison", f"add it after {block}")
     asked = protocol.questionnaires[form]
     known = [*(item.id for item in asked.items if item.value_type != "text"), *asked.scores]
     if contrast.measure not in known:
@@ -306,10 +309,12 @@ def _out_of_range_fault(block: Block, stimulus: Stimulus, standard: float | None
     unit = " ms" if name.endswith("_ms") else ""
     permitted = f"at most {limit:g}" if value > 0 else "at least 0"
     if standard is None or stimulus.level_kind != "difference":
-        return Fault(place, f"level {level:g} gives {value:g}{unit}; {name} must be {permitted}", f"{permitted}{unit}")
+        return Fault(
+            place, f"level {level:g} gives {value:g}{unit}, but {name} must be {permitted}", f"{permitted}{unit}"
+        )
     above = "above" if stimulus.direction == "up" else "below"
     most = limit - standard if stimulus.direction == "up" else standard
-    message = f"{level:g}{unit} {above} a standard of {standard:g} is {value:g}; {name} must be {permitted}"
+    message = f"{level:g}{unit} {above} a standard of {standard:g} is {value:g}, but {name} must be {permitted}"
     return Fault(place, message, f"at most {most:g}")
 
 
@@ -336,7 +341,7 @@ def _check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault
             (*place, "method"), f'with "{block.design}" the participant sets the levels', 'method = "adjustment"'
         )
     elif method_of(protocol, block).adjusts and not design.adjusts:
-        message = f'"{block.method}" needs a design in which participants set the level, unlike "{block.design}"'
+        message = f'"{block.method}" is only for designs in which participants set the level, not for "{block.design}"'
         yield Fault((*place, "method"), message, 'design = "adjustment", or method = "constant"')
 
 
@@ -360,9 +365,8 @@ def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
         ):
             yield Fault(
                 ("methods", str(block.method), "step_size"),
-                f'"{stimulus.vary}" cannot change while it is presented',
-                "vary a parameter that can change, such as drag.coefficient, or use a different method to choose "
-                "levels",
+                f'"{stimulus.vary}" cannot be changed during a presentation',
+                "vary a parameter that can be changed, such as drag.coefficient, or use a different method",
             )
             return
 

@@ -47,7 +47,7 @@ _MOST_NAMED: Final = 4
 """Of more clipped levels the first and the last of each row are named."""
 PACED: Final = 'choose a task of kind "follow"'
 _GIVES: Final = ("gives", "give")
-_IS: Final = ("is", "are")
+_REACHES: Final = ("reaches", "reach")
 
 
 def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Fault]:
@@ -66,7 +66,7 @@ def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterato
     for block in protocol.blocks.values():
         for index, name in enumerate(block.conditions if block.stimulus is None else ()):
             place = ("blocks", block.id, "conditions", index)
-            yield from _check_clipping_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" is', place)
+            yield from _check_clipping_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" reaches', place)
 
 
 def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
@@ -139,7 +139,7 @@ def check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int
     condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
         block, scene = max(felt, key=lambda pair: hand_mps_of(protocol, pair[0]))
-        yield from _check_clipping_at_pace(protocol, block, scene, f'"{condition}" is', place)
+        yield from _check_clipping_at_pace(protocol, block, scene, f'"{condition}" reaches', place)
         return
     every, scene = _levels_at_strongest_force(protocol, blocks), protocol.scene_for(condition)
     limit_nspm, loop = _slope_limit(scene, delay_ticks)
@@ -147,15 +147,16 @@ def check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int
     if by_loop and beyond is None:
         most = max(by_loop, key=lambda level: level.asked_n or 0.0)
         message = (
-            f"{_levels_with_verb(list(every), by_loop, _IS)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
-            f"{hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s; {loop} allows only {most.sent_n:.1f} N"
+            f"{_levels_with_verb(list(every), by_loop, _REACHES)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
+            f"speed of {hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s, but {loop} allows only "
+            f"{most.sent_n:.1f} N"
         )
         yield Fault(place, message, _highest_unclipped_level(protocol, every[most], most.standard))
     by_force = [level for level in every if (level.asked_n or 0.0) > scene.force_limit_n and level not in by_loop]
     if by_force:
         most = max(by_force, key=lambda level: level.asked_n or 0.0)
         strongest = override_value(scene, stimulus.vary, most.comparison)
-        named = _levels_with_verb(list(every), by_force, _IS)
+        named = _levels_with_verb(list(every), by_force, _REACHES)
         yield from _check_clipping_at_pace(protocol, every[most], strongest, named, place)
 
 
@@ -187,13 +188,13 @@ def unpaced_clipping_warning(protocol: Protocol, blocks: Sequence[Block]) -> str
     by_loop = any(steady_force(scene, UNPACED_MPS).limit == "slope" for scene in scenes)
     limit = "by the slope limit" if by_loop else f"at {protocol.device.force_limit_n:g} N"
     clipped = f"at {UNPACED_MPS:g} m/s the force{of} is clipped {limit}"
-    return f"tasks.{task}: {clipped}, and such trials are repeated; {PACED}"
+    return f"tasks.{task}: {clipped}, and clipped trials are repeated; {PACED}"
 
 
 def _check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
     """Yield a fault if the force limit clips a scene at a block's pace, with the share and the remedy.
 
-    ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 is".
+    ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 reaches".
     """
     task = protocol.tasks[block.task]
     if not isinstance(task, Follow):
@@ -208,8 +209,8 @@ def _check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what
     least = (beyond - 1) * 1e-6
     yield Fault(
         place,
-        f"{what} {drag_n:.1f} N at {FASTER:g} times the paced {pace_mps:.3g} m/s, but device.force_limit_n is "
-        f"{scene.force_limit_n:g}",
+        f"{what} {drag_n:.1f} N at {FASTER:g} times the paced speed of {pace_mps:.3g} m/s, but device.force_limit_n "
+        f"is {scene.force_limit_n:g}",
         f"amplitude_mm = {_rounded_down(least * task.amplitude_mm, 1):g} or "
         f"frequency_hz = {_rounded_down(least * task.frequency_hz, 2):g}",
     )
@@ -324,8 +325,8 @@ def _returned_energy_fault(protocol: Protocol, block: Block, stroke: Stroke) -> 
         return None
     return Fault(
         ("stimuli", str(block.stimulus), "levels"),
-        f"{damping:.3g} N·s/m with a delay of {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per motion "
-        "reversal, which the passivity controller removes",
+        f"damping of {damping:.3g} N·s/m with a delay of {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per "
+        "motion reversal, and the passivity controller removes this energy",
         f"choose a delay of at most {longest_delay_ms(damping, stroke)} ms, which returns {1000 * LIMIT_J:g} mJ",
     )
 

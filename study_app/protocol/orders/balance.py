@@ -199,9 +199,9 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
         of = (
             ""
             if planned is None
-            else (f": each block is in each position for {planned / blocks:.3g} of {planned} participants")
+            else f" (each block in each position for {planned / blocks:.3g} of {planned} participants)"
         )
-        return f"random: drawn for each session, so balanced only on average{of}"
+        return f"random: a new order is drawn for each session, so the order is balanced only on average{of}"
     order_evenness = _block_evenness(orders, [("", place) for place in range(1, planned + 1)], 1) if planned else None
     rows = row_count("williams", blocks)
     by, of = ("position in the group", " per group") if in_group else ("number in the participant's ID", "")
@@ -211,7 +211,7 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
     counts = [count for line in order_evenness.positions for count in line]
     even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
     more = "" if order_evenness.balanced else f"; {planned + -planned % rows} would be balanced"
-    return f"{text}; with {planned} participants{of} each block is in each position {even}{more}"
+    return f"{text}; with {planned} participants{of}, each block occurs in each position {even}{more}"
 
 
 def _block_evenness(orders: Orders, placed: Iterable[tuple[str, int | None]], seed: int) -> Evenness:
@@ -276,10 +276,10 @@ def _advice(block: _BlockBalance) -> Iterator[str]:
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
         case "fixed":
-            yield "Everyone gets the same order, so effects of condition and position cannot be separated."
+            yield "All participants have the same order, so the effects of condition and position cannot be separated."
         case "shuffled" | "constrained":
             yield (
-                "New orders are drawn in every session, so they are balanced only on average; each seed gives "
+                "A new order is drawn for each session, so the orders are balanced only on average. Each seed gives "
                 "different tables."
             )
             if repetitions == 1:
@@ -303,7 +303,7 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
     if block.unnumbered:
         yield (
             f"These IDs do not contain a number: {', '.join(block.unnumbered)}. Their rows are drawn at random, so "
-            "they are balanced only on average."
+            "the orders are balanced only on average."
         )
     elif people % rows == 0 and block.evenness.positions_even:
         rounds = people // rows
@@ -318,11 +318,11 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
         )
     else:
         enough = people + -people % rows
-        then = f"each code then occurs in each position {_times_text(enough // codes)}"
+        then = f"each code would occur in each position {_times_text(enough // codes)}"
         if block.order == "williams" and has_even_borders(codes, block.repetitions):
             follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
-            then += f" and follows each other code {_times_text(follows)}"
-        yield f"A full round consists of {rows} participants. The next complete round ends at {enough}: {then}."
+            then += f" and follow each other code {_times_text(follows)}"
+        yield f"A full round consists of {rows} participants. With {enough} participants, {then}."
 
 
 def _times_text(number: int) -> str:

@@ -237,7 +237,7 @@ def source_bytes(name_or_path: str | Path) -> bytes:
 def check_size(source: bytes, name: str) -> None:
     """Raise an error if a source is larger than any study, before it is parsed."""
     if len(source) > _MOST_BYTES:
-        size = f"is {len(source) / 1e6:.1f} MB in size, but study files are at most {_MOST_BYTES / 1e6:g} MB"
+        size = f"is {len(source) / 1e6:.1f} MB in size, but a study file may be at most {_MOST_BYTES / 1e6:g} MB"
         raise ProtocolError(name, (Problem("file", size, hint="check that it is a study file"),))
 
 

@@ -47,7 +47,7 @@ class Modulus(Table):
 
     level: float = Field(description="The level presented.")
     number: Annotated[float, within(1e-6, 1e9, "numbers that people use")] = Field(
-        description="The number assigned to it."
+        description="The number assigned to this level."
     )
 
 
@@ -268,7 +268,7 @@ class YesNo(Design):
 
     kind: Literal["yesno"] = "yesno"
     noise_share: Annotated[
-        float, within(0.05, 0.5, "with fewer noise trials false alarms are unknown; half is balanced")
+        float, within(0.05, 0.5, "with fewer noise trials, the false-alarm rate is unknown; 0.5 is balanced")
     ] = Field(default=0.3, description="Proportion of trials in which the standard is presented.")
     paper_name: ClassVar = "yes–no"
     answers: ClassVar = ("yes", "no")

@@ -96,8 +96,8 @@ class Method(Table):
 
     order: TrackOrder = Field(
         default="interleaved",
-        description="interleaved: trials of all tracks are intermixed, in random order within each round; blocked: "
-        "each track is completed before the next one starts.",
+        description="Order of the tracks. interleaved: each round contains one trial of each track, in random order; "
+        "blocked: each track is completed before the next one starts.",
     )
 
     tracks: Annotated[int, Field(ge=1, le=4)] = Field(default=1, description="Number of tracks for each standard.")
@@ -190,7 +190,7 @@ class Method(Table):
         return 0
 
 
-Trials = Annotated[int, within(1, 1000, "no participant can answer more in one track")]
+Trials = Annotated[int, within(1, 1000, "no participant can complete more trials in one track")]
 
 
 class _Adaptive(Method):
@@ -349,8 +349,7 @@ class Constant(Method):
     adaptive: ClassVar[bool] = False
     levels: _Count | _Listed = Field(
         default=CONSTANT_LEVELS,
-        description="A list of levels, or the number of levels, which are then spaced "
-        "evenly over the stimulus's range.",
+        description="A list of levels, or the number of levels to be spaced evenly over the stimulus's range.",
     )
     repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
         default=20, description="Number of times each level is presented."
@@ -383,7 +382,7 @@ class Precision(Table):
     """When a track ends early: once the threshold's 95 % interval is narrow enough."""
 
     ratio: Annotated[float, Field(gt=1, le=1e12)] = Field(
-        description="Maximum ratio of the interval's upper end to its lower end."
+        description="Maximum ratio of the upper end of the threshold's 95 % interval to its lower end."
     )
     after: Trials = Field(default=30, description="Minimum number of answers.")
 
@@ -398,8 +397,8 @@ class QuestPlus(_Adaptive):
     )
     family: Family | None = Field(
         default=None,
-        description="weibull: a Weibull function, the default for distances; normal: a cumulative normal, the default "
-        "otherwise; logistic: a logistic function.",
+        description="Shape of the psychometric function. weibull: Weibull function (the default for distances); "
+        "normal: cumulative normal (the default otherwise); logistic: logistic function.",
     )
     widths: tuple[_Positive, _Positive] | None = Field(
         default=None,
@@ -519,8 +518,7 @@ class UpDown(_Adaptive):
         ),
     )
     ratio: Annotated[float, Field(gt=0, le=10)] | None = Field(
-        default=None,
-        description="Ratio of the step down to the step up; default: the value that García-Pérez gives for the rule.",
+        default=None, description="Ratio of the step down to the step up; default: García-Pérez's value for the rule."
     )
     average: Annotated[int, Field(ge=2, le=100)] = Field(
         default=8, description="Maximum number of final reversals to average."
@@ -551,7 +549,7 @@ class UpDown(_Adaptive):
     def paper_name(self) -> str:
         return (
             f"weighted up–down tracks ({self.rule}, steps down {self._ratio:.4g} times the steps up; García-Pérez "
-            f"1998), which converge to {self.target_percent:.1f} %"
+            f"1998) that converge to {self.target_percent:.1f} %"
         )
 
     target_percent = property(lambda self: 100 * converges_to(int(self.rule[0]), self._ratio))

@@ -50,7 +50,7 @@ class Condition(Table):
         default=(), description=("Several liquids; where they overlap, the one listed last applies.")
     )
     delay_ms: Annotated[
-        float, within(0, MOST_DELAY_MS, "a picture that is more than a second late is not feedback")
+        float, within(0, MOST_DELAY_MS, "a picture that is more than 1 s late does not act as feedback")
     ] = Field(default=0, description="Delay of everything drawn in the tank [ms].")
     label: Id | None = Field(
         default=None, description="The item in analysis.names that names this condition correctly; default: none."
@@ -59,14 +59,14 @@ class Condition(Table):
         default="shown",
         description="shown: the ball is always drawn; hidden: it is drawn only during the task's lead-in.",
     )
-    force_delay_ms: Annotated[float, within(0, scene.MOST_DELAY_MS, "a longer delay pushes the hand")] = later(
-        default=0, description="Force delay [ms]; the picture is not delayed."
-    )
-    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "networks have smaller deviations")] = later(
+    force_delay_ms: Annotated[
+        float, within(0, scene.MOST_DELAY_MS, "after a longer delay the force pushes the hand")
+    ] = later(default=0, description="Force delay [ms]; the picture is not delayed.")
+    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "delays in networks vary less")] = later(
         default=0, description="Maximum additional force delay, drawn at random at every tick [ms]."
     )
-    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "beyond this most forces are held values")] = later(
-        default=0, description="Proportion of ticks at which the force is lost and the previous force is held."
+    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "with more losses, most forces would be held values")] = (
+        later(default=0, description="Proportion of ticks at which the force is lost and the previous force is held.")
     )
     view: str = later(
         default="tank",
@@ -132,7 +132,7 @@ class Stimulus(Table):
         "comparison − standard (the default for times, …_ms); value: the comparison itself.",
     )
     standards: tuple[float, ...] = Field(
-        default=(), max_length=8, description="The standard stimuli; default: the parameter's present value."
+        default=(), max_length=8, description="The standard stimuli; default: the parameter's current value."
     )
     levels: tuple[float, float] = Field(description="The smallest and the largest level.")
     spacing: Literal["log", "linear"] = Field(
@@ -203,7 +203,7 @@ class Stimulus(Table):
     @model_validator(mode="after")
     def _standards_make_sense(self) -> Self:
         if self.level_kind == "weber" and any(standard == 0 for standard in self.standards):
-            raise invalid("a Weber fraction does not exist for a standard of 0", "level", 'level = "difference"')
+            raise invalid("the Weber fraction is not defined for a standard of 0", "level", 'level = "difference"')
         if len(set(self.standards)) < len(self.standards):
             raise invalid("the same standard is listed twice", "standards")
         return self

@@ -17,7 +17,7 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.table import Localised, OfKinds, Table, invalid
 
 Seconds: TypeAlias = Annotated[
-    float, within(0.1, 3600, ("a hand needs at least 0.1 s to move, and a trial takes less than an hour"))
+    float, within(0.1, 3600, ("a hand movement takes at least 0.1 s, and a trial takes less than an hour"))
 ]
 Radius: TypeAlias = Annotated[float, within(0.5, 100, "even a resting hand trembles by a few tenths of a millimetre")]
 Point: TypeAlias = tuple[float, float, float]
@@ -149,11 +149,11 @@ class Follow(Task):
 
     kind: Literal["follow"]
     axis: Literal["x"] = Field(default="x", description="Axis of the hand frame along which the target moves.")
-    amplitude_mm: Annotated[float, within(1, 250, "the tank is 10 to 1000 mm wide, and a hand trembles")] = Field(
-        default=20, description="Distance from the middle to either end in the hand frame [mm]."
-    )
+    amplitude_mm: Annotated[
+        float, within(1, 250, "the tank is at most 1000 mm wide, and smaller amplitudes are lost in tremor")
+    ] = Field(default=20, description="Distance from the middle to either end in the hand frame [mm].")
     frequency_hz: Annotated[
-        float, within(0.05, 5, "a hand cannot follow a faster motion, and a slower one is hardly a motion")
+        float, within(0.05, 5, "a hand cannot follow a faster motion, and a slower motion is barely noticeable")
     ] = Field(default=1, description="Frequency of the target's motion [Hz].")
     cycles: int = Field(default=3, ge=1, le=1000, description="Number of periods evaluated after the lead-in.")
     radius_mm: Radius = Field(default=6, description="Target radius [mm].")
@@ -289,7 +289,7 @@ class Reach(Task):
         limit, targets = self.duration_s or self.timeout_s, self.count or 1
         if targets * self.dwell_s >= limit:
             subject = "a target" if targets == 1 else f"each of {targets} targets"
-            lasting_s = f"takes as long as the whole task (which lasts at most {limit:g} s)"
+            lasting_s = f"takes at least as long as the whole task ({limit:g} s)"
             raise invalid(f"dwell_s = {self.dwell_s:g} in {subject} {lasting_s}: shorten it", "dwell_s")
         return self
 

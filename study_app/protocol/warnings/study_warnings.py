@@ -11,6 +11,7 @@ from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
 from study_app.haptics.model.gate import effective_speed_mps
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady_force
+from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.checks.consistency import LEAST_N, force_n
 from study_app.protocol.checks.force_limits import PACED, fastest_hz, unpaced_clipping_warning
@@ -98,8 +99,8 @@ def _clipped_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[st
             beyond = "" if is_valid else ", a reduction beyond limits.withheld_percent"
             advice = "" if scale is None else f"; with scene.scale = {scale} it is not clipped"
             yield (
-                f"{name} is clipped: at a hand speed of {HAND_MPS:g} m/s {limit} reduces its {it.drag_n:.2f} N to "
-                f"{it.force_n:.2f} N{beyond}{advice}"
+                f"{name} is clipped: at a hand speed of {HAND_MPS:g} m/s {limit} reduces its force of "
+                f"{it.drag_n:.2f} N to {it.force_n:.2f} N{beyond}{advice}"
             )
 
 
@@ -171,15 +172,15 @@ def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Itera
     if not design.has_noise and trials % count:  # not every arrangement comes equally often
         place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
         wanted = "an even number" if count == 2 else f"a multiple of {count}"
-        yield f"{place}: {trials} trials cannot balance {count} arrangements; choose {wanted}"
+        yield f"{place}: {count} arrangements cannot be balanced over {counted(trials, 'trial')}; choose {wanted}"
     if block.stimulus is not None:
         for key, sentence in method_of(protocol, block).warnings():
             yield f"methods.{block.method}.{key}: {sentence}"
     if block.catch is not None and not track.catch:
         share = math.ceil(100 / track.slots) / 100
         yield (
-            f"blocks.{block.id}.catch.share: a share of {block.catch.share:g} of {track.slots} trials is less than one "
-            f"catch trial; choose {share:g}"
+            f"blocks.{block.id}.catch.share: with a share of {block.catch.share:g}, {track.slots} trials do not "
+            f"include a catch trial; choose {share:g}"
         )
     if design.feedback == "always" and protocol.study.blinding == "double":
         yield (
@@ -227,7 +228,7 @@ def _imperceptible_settings(protocol: Protocol, without_force: str) -> Iterator[
                     yield f'{place}: the ball is hidden, so participants cannot see its delay: write ball = "shown"'
                 elif key in OF_LINK and (without_force or gives_none):
                     what = f"{without_force or 'the condition'} does not produce force"
-                    yield f"{place}: {what}, so participants cannot feel whether it is late or lost"
+                    yield f"{place}: {what}, so participants cannot feel whether the force is late or lost"
         of_liquids = protocol.compared_in(block.id) == "liquids" if vary is None else vary not in OF_CONDITION
         if without_force and of_liquids and block.phase == "main":
             seen = ", so participants see but do not feel how the liquids slow the ball down"

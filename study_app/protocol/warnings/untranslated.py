@@ -87,9 +87,9 @@ def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) ->
     texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
     for (language, source), count in Counter((text.language, text.source) for text in texts).items():
         stated, wanted = language_name(source), language_name(language)
-        what = f"{counted(count, 'text')} to translate into {wanted}, still in {stated}"
+        are = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
+        what = f"{are} still in {stated} and must be translated into {wanted}"
         if only_one:
-            are = f"{counted(count, 'text')} {'is' if count == 1 else 'are'}"
             what = f"{are} still in {stated}, but the study's only language is {wanted}"
         of_these = [text for text in texts if (text.language, text.source) == (language, source)]
         yield f"study.languages: {what}{f': {listed_places(of_these)}' if lists_places else ''}"

@@ -147,8 +147,8 @@ def study() -> Study:
 @pytest.mark.parametrize(
     ("values", "why"),
     [
-        ((2000,), "2000 is not permitted: Visual delay is at most 1000"),
-        ((-5, 30), "-5 is not permitted: Visual delay is at least 0"),
+        ((2000,), "2000 is not permitted: Visual delay must be at most 1000"),
+        ((-5, 30), "-5 is not permitted: Visual delay must be at least 0"),
         ((30, 30.0), "30 is listed twice or equals the original's value"),
         ((30, 0), "0 is listed twice or equals the original's value"),
         ((), "a series must have 1 to 24 copies"),
@@ -196,14 +196,15 @@ def translated() -> Study:
 
 
 def words(study: Study) -> list[str]:
-    return [one for one in facts(study).warnings if "to translate" in one]
+    return [one for one in facts(study).warnings if "translated into" in one]
 
 
 def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_text_is_none(translated: Study) -> None:
     count = sum(any(map(str.isalpha, str(text["en"]))) for _, text in texts_of(translated))
     assert (translated.faults, copied_texts(translated)) == ((), {"nl": count, "de": count})
     assert words(translated) == [
-        f"study.languages: {count} texts to translate into {name}, still in English" for name in ("Dutch", "German")
+        f"study.languages: {count} texts are still in English and must be translated into {name}"
+        for name in ("Dutch", "German")
     ]
     assert (copied_texts(DEMO), words(DEMO)) == ({}, [])
     for edit in (Set((*TITLE, "nl"), "Een eerste blik"), Unset((*TITLE, "nl"))):

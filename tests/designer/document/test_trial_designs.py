@@ -93,7 +93,7 @@ def test_a_block_with_a_design_does_not_offer_a_questionnaire_after_each_trial(s
     wrong = after(study, SetValue(DESIGN, "abx"), SetValue((*DESIGN[:2], "questionnaire"), "after"))
     (fault,) = wrong.faults
     assert fault.kind == "surplus"
-    assert fault.message == "cannot be used in a block with a design: ask it in a form after the block"
+    assert fault.message == "cannot be used in a block with a design: ask its questions in a form after the block"
 
 
 def test_a_design_that_is_added_and_removed_again_leaves_no_problem(study: Study) -> None:
@@ -140,7 +140,7 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     entries = {entry.words: entry for entry in addable_elements(study, ())}
     slime = entries["Slime liquid (slime)"]
     assert isinstance(slime.asks, AddLiquid)
-    assert slime.help.endswith("The scene's scale becomes 3 for all liquids, as in that study.")
+    assert slime.help.endswith("The scene's scale changes to 3 for all liquids, as in that study.")
     other = after(study, SetValue(("scene", "scale"), 10))
     assert slime.asks.help(other).endswith(
         "Its forces differ, because the scene's scale is 3 in that study and 10 in this one."
@@ -154,7 +154,7 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert "slime_2 is clipped" not in warned(added)
     clipped = warned(after(added, SetValue(("scene", "scale"), 10)))
     assert (
-        "its 17.36 N to 5.30 N, a reduction beyond limits.withheld_percent; with scene.scale = 3 it is not clipped"
+        "force of 17.36 N to 5.30 N, a reduction beyond limits.withheld_percent; with scene.scale = 3 it is not clipped"
         in clipped
     )
     table = added.document["liquids"]["slime_2"]

@@ -191,11 +191,11 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
         (Set(("a", "b"), 1), "a is not a table"),
         (Set(("c",), None), "a value cannot be empty: remove its key instead"),
         (Set(("c",), {"d": "\ud800"}), "incomplete character"),
-        (Duplicate(("a",), "l"), 'the name "l" is taken'),
-        (Rename(("a",), "l"), 'the name "l" is taken'),
+        (Duplicate(("a",), "l"), 'the name "l" is already taken'),
+        (Rename(("a",), "l"), 'the name "l" is already taken'),
         (Move(("l", 0), 2), "cannot be moved to position 3"),
-        (Insert(("l", 4), 1), "does not have position 4"),
-        (Unset(("l", 7)), "there is no 8"),
+        (Insert(("l", 4), 1), "cannot be inserted at position 4"),
+        (Unset(("l", 7)), "no longer contains entry 8"),
     ],
 )
 def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
@@ -205,5 +205,5 @@ def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
 
 def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("study_app.designer.document.toml_edits.toml_value", lambda *_: "7")
-    with pytest.raises(WriterError, match="another document than the one meant"):
+    with pytest.raises(WriterError, match="did not produce the intended document"):
         apply_edit("a = 1\n", Set(("a",), 2))

@@ -71,7 +71,7 @@ def test_check_states_the_balance_of_each_group() -> None:
     """16 participants are 8 per group, and each of the two orders comes 4 times there."""
     for study, assignment in ((experts(), "randomised in permuted"), (experts(PREEXISTING), "pre-existing: entered")):
         text = describe(study)
-        assert text.count("with 8 participants per group each block is in each position 4 times") == 2
+        assert text.count("with 8 participants per group, each block occurs in each position 4 times") == 2
         assert assignment in text
 
 

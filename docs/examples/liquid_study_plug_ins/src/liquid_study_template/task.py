@@ -14,9 +14,9 @@ class Circle(Task):
     """Follow a target around a circle, at an even speed."""
 
     kind: Literal["liquid-study-template:circle"] = "liquid-study-template:circle"
-    circle_mm: Annotated[float, within(2, 100, "the tank is 10 to 1000 mm wide, and a hand trembles")] = Field(
-        default=15, description="Radius of the circle [mm]."
-    )
+    circle_mm: Annotated[
+        float, within(2, 100, "the tank is at most 1000 mm wide, and smaller circles are lost in tremor")
+    ] = Field(default=15, description="Radius of the circle [mm].")
     turns: int = Field(default=3, ge=1, le=1000, description="Number of turns.")
     turn_s: Annotated[float, within(0.5, 60, "no hand goes around faster")] = Field(
         default=2, description="Time for a turn [s]."
