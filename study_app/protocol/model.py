@@ -272,13 +272,13 @@ class Limits(Table):
     """Limits within which a trial is valid."""
 
     lateness_ms: Annotated[
-        float, within(0.01, 1000, "no servo loop is more punctual, and a lateness of 1 s is a failure")
+        float, within(0.01, 1000, "no servo loop is more accurate, and a lateness of 1 s is a failure")
     ] = Field(default=2, description="Maximum 99th percentile of tick lateness [ms].")
     worst_gap_ms: Annotated[
         float, within(0.25, 1000, "at 4 kHz ticks are 0.25 ms apart, and a gap of 1 s is a failure")
     ] = Field(default=20, description="Maximum time between two ticks [ms].")
     delay_error_ms: Annotated[
-        float, within(1, 1000, "no screen is more punctual, and an error of 1 s is a failure")
+        float, within(1, 1000, "no screen is more accurate, and an error of 1 s is a failure")
     ] = Field(
         default=25, description="Maximum 95th percentile of the delay error (achieved minus requested delay) [ms]."
     )
@@ -410,7 +410,7 @@ class Contrast(Table):
         if len(self.blocks) == 2 and self.conditions is not None:
             raise invalid("specify two blocks, or two conditions of one block", "conditions")
         if self.form is not None and (self.conditions is not None or self.measure in OF_LEVELS):
-            raise invalid("with form, compare one of its questions or scores between blocks or groups", "form")
+            raise invalid("if form is specified, compare its questions or scores between blocks or groups", "form")
         if self.groups is None and self.within is None:
             raise invalid("specify two blocks, or one block and two conditions, or one block and two groups", "blocks")
         for first, second in filter(None, (self.groups, self.within)):

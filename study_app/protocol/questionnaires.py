@@ -88,7 +88,7 @@ class Questionnaire(Table):
         default="fixed", description="fixed: as written; shuffled: a new order for every trial."
     )
     items: tuple[AnyQuestion, ...] = Field(
-        min_length=1, description="The questions; a question without kind is a statement on the questionnaire's scale."
+        min_length=1, description="Questions; a question without a kind is a statement on the questionnaire's scale."
     )
     instrument: str | None = later(
         default=None, description="The standard questionnaire whose items and scoring are used."

@@ -352,7 +352,7 @@ def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Itera
         if len(differing) > 1:
             yield (
                 f"blocks.{block.id}.conditions: “{name}” and the standard “{standard}” differ in "
-                f"{' and '.join(differing)}: answers do not show which of these was noticed"
+                f"{' and '.join(differing)}: answers cannot show which of these differences participants noticed"
             )
 
 
