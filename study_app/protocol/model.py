@@ -130,8 +130,8 @@ class StudyHead(Table):
         default="fixed",
         description=(
             "Order of the main blocks; pages, forms and other blocks keep their positions. fixed: as written; "
-            "balanced: a row of a Williams design, selected by the number in the participant's ID or by the "
-            "participant's position in the group; random: drawn for each session."
+            "balanced: counterbalanced by the rows of a Williams design, assigned by the number in the participant's "
+            "ID or by the participant's position in the group; random: drawn for each session."
         ),
     )
     group_assignment: GroupAssignment = later(
