@@ -247,7 +247,7 @@ def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> N
     [
         ('"late", "load"]', '"late"]', "load does not follow every block in the comparison"),
         ('measure = "raw"', 'measure = "raws"', '"load" does not have a numeric question or score raws'),
-        ('measure = "raw"', 'measure = "threshold"', "compare one of its questions or scores"),
+        ('measure = "raw"', 'measure = "threshold"', "compare its questions or scores"),
     ],
 )
 def test_a_form_that_blocks_do_not_have_in_common_is_refused(before: str, after: str, words: str) -> None:
