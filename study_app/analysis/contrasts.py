@@ -54,23 +54,23 @@ RATIOS: Final = ("threshold", "pse")
 """Measures that are compared as ratios where the levels of all blocks are spaced by ratios."""
 
 LEFT_OUT: Final = (
-    "Every participant with both values is included, even if a threshold lies outside the levels; the report "
-    "lists excluded participants and the reasons."
+    "Participants are included if both of their values are available, even if a threshold lies outside the range of "
+    "levels. The report lists the excluded participants and the reasons."
 )
 """Who is compared, in power, preregistration and report."""
 _WEIGHTED: Final = (
     "Thresholds are weighted as in the group mean. If two blocks have the same levels and design, their thresholds "
-    "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio "
-    "in the tables. "
+    "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio of the "
+    "thresholds in the tables. "
 )
 _SIZES: Final = (
-    "Standardised effects give all participants equal weight: d_z is the mean within-participant difference divided by "
-    "the standard deviation of the differences, and g is Hedges' g for two groups. Their 95 % confidence intervals are "
-    "calculated from the noncentral t distribution. Bayes factors are two-sided JZS Bayes factors (Rouder et al., "
-    f"2009) that compare a difference with no difference, using a Cauchy prior with scale {number(PRIOR_SCALE, 3)}. "
-    "Cliff's delta is the probability that an answer in the first group is larger than one in the second, minus the "
-    "probability that it is smaller; within participants, it is the proportion of participants whose first answer is "
-    "larger minus the proportion whose first answer is smaller."
+    "Standardised effects give all participants equal weight: d_z is the mean within-participant difference divided "
+    "by the standard deviation of the differences, and g is Hedges' g for two groups. Their 95 % confidence intervals "
+    "are calculated from the noncentral t distribution. Bayes factors are two-sided JZS Bayes factors (Rouder et al., "
+    "2009) that compare the hypothesis of a difference with the null hypothesis, using a Cauchy prior with scale "
+    f"{number(PRIOR_SCALE, 3)}. Cliff's delta is the probability that an answer in the first group is larger than one "
+    "in the second, minus the probability that it is smaller; within participants, it is the proportion of "
+    "participants whose answer is larger in the first condition minus the proportion whose answer is smaller."
 )
 _MOST_NAMED: Final = 20
 
@@ -349,11 +349,11 @@ def _tested(
             method = f"t({means.freedom}), {sides}; bootstrap {by_bootstrap}; skewness-corrected t {for_skewness}"
     return ContrastResult(
         test=(
-            "contrast, two-sample t of differences"
+            "contrast, two-sample t test of differences"
             if contrast.is_interaction
-            else "contrast, two-sample t"
+            else "contrast, two-sample t test"
             if contrast.groups
-            else "contrast, paired t"
+            else "contrast, paired t test"
         ),
         n=sum(map(len, compared.samples)),
         dropped=len(compared.left_out),
@@ -422,6 +422,7 @@ def question(contrast: ContrastResult) -> str:
 def answer(contrast: ContrastResult) -> str:
     """Return the result as sentences."""
     sentences = [f"Not tested: {contrast.note}." if contrast.p_adjusted is None else _difference_words(contrast)]
+    kind = "ratio" if contrast.ratio else "difference"
     if contrast.contrast.bound is not None and _lies_beyond(contrast, contrast.contrast.bound):
         what = "All differences lie" if contrast.interval is None else "The whole confidence interval lies"
         sentences.append(f"{what} outside the equivalence bounds (not equivalent).")
@@ -429,14 +430,14 @@ def answer(contrast: ContrastResult) -> str:
         people = (
             "of people differ by more than the bound"
             if contrast.contrast.groups is None
-            else "of a group are not represented in the sample"
+            else "of a group belong to a minority that the sample does not include"
         )
         sentences.append(
-            "The mean lies within the equivalence bounds (equivalent), but the data do not rule out that up to "
-            f"{100 * (contrast.not_excluded or 0.0):.0f} % {people}."
+            f"The mean {kind} lies within the equivalence bounds (equivalent), but the data do not rule out that up "
+            f"to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
         )
     elif contrast.equivalent is not None:
-        sentences.append("The mean was not shown to lie within the equivalence bounds.")
+        sentences.append(f"The mean {kind} was not shown to lie within the equivalence bounds.")
     if contrast.left_out:
         sentences.append(f"Excluded: {_left_out_words(contrast)}.")
     return " ".join(sentences)
@@ -491,26 +492,30 @@ def _bayes_words(contrast: ContrastResult) -> str:
     )
 
 
+def t_test_name(contrast: Contrast, *, ratio: bool) -> str:
+    """Return the name of a contrast's t test and the values that it uses; ``ratio``: logarithms."""
+    used = ["within-participant differences"] * contrast.is_interaction + ["log-transformed values"] * ratio
+    values = f" on {' of '.join(used)}" if used else ""
+    return f"two-sample t test{values} with unequal variances" if contrast.groups else f"paired t test{values}"
+
+
 def contrast_methods(results: Results) -> Iterator[str]:
     """Yield the sentences about hypotheses for the methods paragraph."""
     contrasts = results.contrasts
     if not contrasts:
         return
     for place, contrast in enumerate(contrasts, start=1):
-        logarithms = " on logarithms" if contrast.ratio else ""
-        differences = " on within-participant differences" if contrast.contrast.is_interaction else ""
-        groups = f"two-sample t test with unequal variances{differences}{logarithms}"
-        test = groups if contrast.contrast.groups else f"paired t test{logarithms}"
+        test = t_test_name(contrast.contrast, ratio=contrast.ratio)
         sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
         label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
         yield f"{label} ({contrast.contrast.described(contrast.compared)}) was tested with a {sides} {test}."
     if any(contrast.contrast.groups for contrast in contrasts):
-        yield "Comparisons between groups use the smaller group's degrees of freedom for t (Hsu 1938)."
+        yield "Comparisons between groups used the degrees of freedom of the smaller group (Hsu 1938)."
     holm_words = f", Holm-adjusted across {len(contrasts)} hypotheses"
     yield (
-        "Each participant contributed one value to each comparison. A bootstrap that adds a participant as extreme as "
-        "the most extreme one (Gaffke 2005) and a t test corrected for skewness (Hall 1992) had to agree with the t "
-        f"test: the p value is the largest of the three{holm_words * (len(contrasts) > 1)}."
+        "Each participant contributed one value to each comparison. In addition to the t test, we used a bootstrap "
+        "that adds a participant as extreme as the most extreme one (Gaffke 2005) and a t test corrected for skewness "
+        f"(Hall 1992). The reported p value is the largest of the three{holm_words * (len(contrasts) > 1)}."
     )
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
@@ -519,8 +524,8 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if bounds := [contrast for contrast in contrasts if contrast.contrast.bound is not None]:
         adjusted = f", Holm-adjusted across {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
-            "Equivalence was tested with two one-sided t tests and the same bootstrap, which had to agree"
-            f"{adjusted}. It also requires a sample that is large enough to include somebody from a minority that "
+            f"Equivalence was tested with two one-sided t tests and the same bootstrap{adjusted}; both had to show "
+            "equivalence. In addition, the sample had to be large enough to include somebody from any minority that "
             "could shift the mean by the bound."
         )
     if gone := {
@@ -565,17 +570,17 @@ def contrast_section(results: Results) -> Iterator[str]:
     )
     weighted = any(contrast.contrast.measure == "threshold" for contrast in results.contrasts)
     yield paragraph(
-        "The study file states these hypotheses. Each was tested on one value per participant with a t test, a "
-        "bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
+        "These hypotheses are stated in the study file. Each was tested on one value per participant, using a t test, "
+        "a bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
         "The adjusted p value is the largest of the three, Holm-adjusted across "
-        f"{number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that the t tests and the bootstrap "
-        "show, with enough participants, that the mean lies within the stated bounds (Holm-adjusted across the "
-        "bounds). "
-        f"{_WEIGHTED if weighted else ''}{LEFT_OUT}",
+        f"{number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that there are enough "
+        "participants and that both the t tests and the bootstrap show that the mean difference (or ratio) lies "
+        f"within the stated bounds (Holm-adjusted across the bounds). {_WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
     yield paragraph(
-        f"{_SIZES} SD is the between-participant standard deviation of each compared value and of their difference.",
+        f"{_SIZES} SD is the standard deviation across participants of each compared value and, for paired "
+        "comparisons, of their difference.",
         "soft",
     )
     if rows := [contrast for contrast in results.contrasts if contrast.left_out]:

@@ -80,7 +80,7 @@ def try_part(
 ) -> list[str]:
     """Return a part of the page or, if it fails, its title and the reason; the failure is recorded."""
     made = failures.attempt(what, lambda: list(make()), block=block)
-    return [title, box([paragraph(f"Not there: {made.why}.")], "care")] if isinstance(made, Failure) else made
+    return [title, box([paragraph(f"Not available: {made.why}.")], "care")] if isinstance(made, Failure) else made
 
 
 def chunks(parts: Sequence[str]) -> list[list[str]]:

@@ -389,7 +389,7 @@ def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
         often = f"{most}" if fewest == most else f"{fewest} to {most}"
         single = "; the detection threshold uses each single answer" if result.delays_ms else ""
         lines.append(
-            f"Each participant rated each {settings_noun(result)} {often} times; the tests use the median of these "
+            f"Each participant rated each {settings_noun(result)} {often} times. The tests use the median of these "
             f"answers{single}."
         )
     if len(result.sessions) > 1:
@@ -409,9 +409,9 @@ def min_sample_reason(alpha: float, bound: float) -> str:
     """Return a sentence on the minimum number of participants for equivalence of statements, and its reason."""
     share = smallest_minority(bound, STEPS)
     return (
-        f"{min_sample(alpha, bound)}, because a smaller sample has more than a {percent(alpha)} chance of including "
-        f"nobody from a minority ({percent(share)} of all people) whose answers differ by "
-        f"{significant(bound / share)} points, which is enough to shift the mean by the bound"
+        f"{min_sample(alpha, bound)}. A smaller sample has more than a {percent(alpha)} chance of including nobody "
+        f"from a minority of {percent(share)} of people; if the answers of such a minority differ by "
+        f"{significant(bound / share)} points, they shift the mean by the bound"
     )
 
 
@@ -437,7 +437,7 @@ def incomplete_words(result: BlockResult) -> str:
         for person, items in sorted(statements.items())
     ]
     return (
-        f"Participants excluded from tests over all {settings_noun(result)}s because an answer is missing: "
+        f"Participants excluded from tests across all {settings_noun(result)}s because an answer is missing: "
         f"{listed(who)}."
     )
 

@@ -139,7 +139,7 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     (found,) = (results := evaluate(replace(study, trials=gone))).contrasts
     assert (found.n, found.dropped, found.left_out) == (7, 1, {"P003": "no threshold in late"})
     assert "Excluded: P003 (no threshold in late)." in first_page(results, ())
-    words = "Every participant with both values is included, even if a threshold lies outside the levels"
+    words = "Participants are included if both of their values are available, even if a threshold lies outside"
     assert words in preregistration(parse(text.encode(), "delayed.toml"), "0" * 64)
 
 
@@ -174,7 +174,7 @@ def test_two_conditions_of_a_statement_are_compared_and_can_be_equivalent() -> N
     assert (same.verdict, same.equivalent) == ("equivalent", True)
     (narrow,) = evaluate(statements(contrast.model_copy(update={"bound": 0.01}))).contrasts
     assert (narrow.verdict, narrow.equivalent) == ("not shown", False)
-    assert "The mean was not shown to lie within the equivalence bounds." in answer(narrow)
+    assert "The mean difference was not shown to lie within the equivalence bounds." in answer(narrow)
     (beyond,) = evaluate(statements(contrast, 2.0)).contrasts
     assert beyond.interval is not None
     assert beyond.interval.low > 1.0
@@ -197,7 +197,7 @@ def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
     told = methods(made, evaluate(made))
     assert f"Hypothesis 1 ({contrast.described()}) was tested with a two-sided paired t test." in told
     assert f"Hypothesis 2 ({other.described()}) was tested with a one-sided paired t test." in told
-    assert "the p value is the largest of the three, Holm-adjusted across 2 hypotheses." in told
+    assert "The reported p value is the largest of the three, Holm-adjusted across 2 hypotheses." in told
     assert "Equivalence was tested with two one-sided t tests" in told
     assert "Means were tested in the hypotheses" in told
     assert "never means" not in told
@@ -473,7 +473,7 @@ def test_power_plans_differences_and_equality_within_people(
     half, least = (spread * end for end in detectable(40, tail=0.05))
     ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
     assert ("(a factor of 1.2), relative to a mean d′ of 1." if edits else "(a factor of 1.2).") in told
-    assert "Equivalence requires at least 14 participants, at α = 0.05. Every participant with both values" in told
+    assert "Equivalence requires at least 14 participants, at α = 0.05. Participants are included if both" in told
     assert "| smallest difference | shown to be equivalent if there is no difference |" in told
     assert told.strip().endswith(f"| {spread:.0%} | {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
 

@@ -77,7 +77,7 @@ def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(sp
         spending=spending,
     )
     rate = f"{100 * error_of_every_report(looks, 0.05, spending):.1f} %"
-    assert f"would make a false claim in {rate} of cases instead of 5 %" in made.at(13).look_words(13)
+    assert f"the rate of false claims would be {rate} instead of 5 %" in made.at(13).look_words(13)
 
 
 @pytest.mark.parametrize(
@@ -141,7 +141,7 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
         ]
         shown += (holm(ps)[0] or 1.0) <= 0.05
     assert counts[0, FULL, 0] == shown > 0
-    told = "Student's t test on the slopes from each participant's regression of answers on delays"
+    told = "Student's t test on the slopes of each participant's regression of answers on delays"
     assert told in preregistration(protocol, "0" * 64)
     assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count_findings(planned, (10,), 1, 0, 10)))
     settings = delays((0, 50, 100))
@@ -150,17 +150,17 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
     (found,) = (results := evaluate(made)).blocks
     assert {one.outcome.test for one in DelayTrend.of(found)} == {"t test of slopes"}
     assert not MeanTests.of(found), "each statement is tested once"
-    assert f"Trends over the delay were tested with {told} (one-sided" in methods(made, results)
+    assert f"Trends across delays were tested with {told} (one-sided" in methods(made, results)
 
 
 @pytest.mark.parametrize(
     ("n", "said"),
     [
-        (5, "none has been reached"),
+        (5, "None has been reached"),
         (6, "look 1 of 2"),
         (12, "look 2 of 2"),
-        (9, "This look at 9 participants is unplanned: looks are planned at 6 and 12 participants."),
-        (13, "This look at 13 participants is unplanned"),
+        (9, "This look at 9 participants was not planned; looks are planned at 6 and 12 participants."),
+        (13, "This look at 13 participants was not planned"),
     ],
 )
 def test_the_first_page_says_which_look_it_is(n: int, said: str) -> None:

@@ -104,7 +104,7 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     assert thresholds(study) == [None, "P001"], "not in the mean without a decision"
     report(pairs, tmp_path / "open")
     page = (tmp_path / "open" / "report.html").read_text("utf-8")
-    assert "A rule proposes the exclusion of P002, session 1 (below chance); nobody has decided yet" in page
+    assert "A planned rule proposes excluding P002, session 1 (below chance); no decision has been made yet" in page
     assert "two participants" in table_text(page)
     assert "1 participant)" in table_text(page)
     held = json.loads((tmp_path / "open" / "report.json").read_text("utf-8"))

@@ -113,7 +113,7 @@ def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path)
     assert [one.question.partition(": ")[2] or one.title for one in asked] == [
         "Which liquids were distinguished?",
         "At what delay do participants begin to notice a difference?",
-        "Up to what delay do answers not change by a relevant amount?",
+        "Up to what delay do answers remain practically unchanged?",
     ]
     assert all(one.answer or one.caption for one in asked)
     assert asked[0].numbers.startswith("participant\t")

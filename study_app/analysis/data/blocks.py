@@ -411,16 +411,16 @@ class Decided:
             return ""
         planned = f"{' and '.join([', '.join(map(str, self.looks[:-1])), str(self.looks[-1])])} participants"
         if self.look == 0:
-            return f"Looks are planned at {planned}; none has been reached yet, so all results are exploratory."
+            return f"Looks are planned at {planned}. None has been reached yet, so all results are exploratory."
         if n not in self.looks:
             from study_app.analysis.statistics.outcome import error_of_every_report  # noqa: PLC0415 - loads scipy
 
             alpha = self.planned_alpha or self.alpha
             return (
-                f"This look at {n} participants is unplanned: looks are planned at {planned}. An adjusted p value is "
-                f"significant if it is at most {significant(self.alpha)}, as at the last planned look. If there were "
-                "no effect and the study were tested in this way after every participant, it would make a false claim "
-                f"in {100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % of cases instead of "
+                f"This look at {n} participants was not planned; looks are planned at {planned}. An adjusted p value "
+                f"is significant if it is at most {significant(self.alpha)}, as at the last planned look. If there "
+                "were no effect and the data were tested in this way after every participant, the rate of false "
+                f"claims would be {100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of "
                 f"{100 * alpha:g} %."
             )
         return (
@@ -439,7 +439,7 @@ class Decided:
 
 TRENDS: Final = {
     "ranks": "a sign-flip permutation test on the participants' rank correlations between answers and delays",
-    "slopes": "Student's t test on the slopes from each participant's regression of answers on delays",
+    "slopes": "Student's t test on the slopes of each participant's regression of answers on delays",
 }
 """How a trend over the delay is tested, in words."""
 
@@ -616,6 +616,6 @@ def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:
         return question_of(table)
     except (KeyError, ValueError) as error:
         raise AnalysisError(
-            f"question {table.get('id')!r} in {where.id!r} is of a kind that this version does not support "
-            f"({table.get('kind')}): use the version with which the study was run"
+            f"question {table.get('id')!r} in {where.id!r} has a type that this version does not support "
+            f"({table.get('kind')}): use the version that was used to run the study"
         ) from error

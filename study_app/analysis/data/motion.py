@@ -33,14 +33,14 @@ _SHORTEST: Final = 32
 """So many samples are needed to be filtered; a shorter reach is one submovement."""
 
 REACH_DEFINITIONS: Final = {
-    "movement_time_s": "from when a target lights up until the hand enters it for the last time, excluding the dwell "
-    "time",
+    "movement_time_s": "from the moment a target lights up until the hand enters it for the last time, excluding the "
+    "dwell time",
     "path_mm": "length of the hand's path during the movement time",
     "overshoot_mm": "largest distance beyond the far edge of the target, along the line between the targets; "
     "0 if there was no overshoot",
-    "submovements": "number of peaks in the hand's speed before the target was reached "
-    f"(low-pass filtered at {_CUTOFF_HZ:g} Hz) with a prominence of at least {100 * _PROMINENCE:g} % of the highest "
-    "peak; 1 for a single smooth movement",
+    "submovements": f"number of peaks in the hand's speed (low-pass filtered at {_CUTOFF_HZ:g} Hz) before the target "
+    f"was reached, with a prominence of at least {100 * _PROMINENCE:g} % of the highest peak; 1 for a single smooth "
+    "movement",
 }
 
 
@@ -152,7 +152,7 @@ TRIAL_DEFINITIONS: Final = {
     "path_m": "length of the hand's path during the trial",
     "force_mean_n": "mean force on the hand during the trial",
     "force_peak_n": "largest force on the hand during the trial",
-    "at_limit_percent": "proportion of the trial's ticks in which the force was reduced to the force limit",
+    "at_limit_percent": "proportion of the trial's ticks at which the force was reduced to the force limit",
 }
 
 
@@ -294,7 +294,7 @@ def _why_not(folder: Path, row: Mapping[Any, Any]) -> str:
         return "no recording was stored"
     if pd.isna(row["duration_s"]):
         return "the trial's duration was not recorded"
-    return "" if _file(folder, row).is_file() else "the recording is not in the folder"
+    return "" if _file(folder, row).is_file() else "the recording is missing from the folder"
 
 
 def _file(folder: Path, row: Mapping[Any, Any]) -> Path:

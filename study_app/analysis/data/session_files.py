@@ -70,7 +70,7 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
     except OSError as error:
         raise unreadable_error(path, error, _again(path)) from error
     except ValueError as error:
-        raise AnalysisError(f"{path} {error}: it has been cut off or changed; {_again(path)}") from error
+        raise AnalysisError(f"{path} {error}: it has been truncated or changed; {_again(path)}") from error
     held = tuple(column for column in columns if column.name in names or not column.sealed)
     if tuple(names) != header(held):
         raise AnalysisError(

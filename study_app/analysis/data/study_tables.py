@@ -267,7 +267,7 @@ class Study:
         if warn is None:
             return
         for doubt in self.doubts:
-            warn(f"warning: {doubt}; it has been used without correction")
+            warn(f"warning: {doubt}; it was used as it is")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
         """Return the blocks that compare liquids, delays or views."""

@@ -224,7 +224,7 @@ def _json(content: Any) -> bytes:
 def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
     blinded = (
-        "Conditions appear with their names."
+        "Conditions appear under their names."
         if study.revealed
         else ("Conditions appear as codes, because the study is blinded.")
     )
@@ -238,7 +238,7 @@ def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, byte
         "",
         *(f"- `data/{name}`" for name in tables),
         *([f"- `results/report.html`: the report{script}"] if "report.html" in report else []),
-        *(["", f"Add the files that are missing in `materials`: {', '.join(missing)}."] if missing else []),
+        *(["", f"Add the files that are missing from `materials`: {', '.join(missing)}."] if missing else []),
         "",
         *credit_lines(study),
     ]

@@ -62,8 +62,8 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "study": study_head(study),
         "program": f"liquid-study {__version__}",
-        "format": "CSV in UTF-8, with commas as separators, decimal points, and quoting as in RFC 4180; any text that "
-        f"begins with {COMPUTED} is preceded by an apostrophe",
+        "format": "CSV in UTF-8 with comma separators, decimal points and RFC 4180 quoting; an apostrophe precedes any "
+        f"text that begins with {COMPUTED}",
         "missing": MISSING,
         "blinded": not study.revealed,
         "sealed_columns": [] if study.revealed else sorted(SEALED | names_of_sealed(study)),
@@ -102,8 +102,8 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
             "agree_percent": f"percentage of valid answers at levels {AGREEMENT[0]} to {AGREEMENT[-1]}",
             "repeated": "the median of a participant's repeated answers is used; the detection threshold and the "
             "counts for each level use single answers",
-            "counted": "main trials in completed sessions that are not excluded; the last attempt if a trial was "
-            "repeated",
+            "counted": "main trials in completed sessions that are not excluded; if a trial was repeated, only its "
+            "last attempt",
         },
         "files": files,
     }

@@ -33,7 +33,7 @@ class Delivered:
     frame: pd.DataFrame
 
 
-SITE: Final = Column("site", "text", "The participant's site, which is the part of the ID before the dash.")
+SITE: Final = Column("site", "text", "The participant's site (the part of the ID before the dash).")
 
 
 def _with_site(study: Study, table: Delivered) -> Delivered:
@@ -125,7 +125,7 @@ _MEASURED: Final = (
     Column(
         "presented_excluded",
         "integer",
-        "Number of further presentations that exclusions.csv excludes individually, together with their answers.",
+        "Number of further presentations that exclusions.csv excludes individually; their answers are excluded too.",
         minimum=0,
     ),
     Column("n", "integer", "Number of valid answers.", minimum=0),

@@ -236,7 +236,7 @@ def draw_threshold(
     shares = np.array(threshold.yes)[there] / asked[there]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
-    sheet.text(MARGIN_PT, 28, "Proportion of answers that agree", size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, "Proportion of agreeing answers", size=SMALL, colour=style.TEXT_SOFT)
     below = (
         "Added delay in ms.   Small points: single participants; circles: all participants; diamond: threshold "
         "with 95 % interval."
@@ -313,7 +313,7 @@ def _sentences(study: Study, block: Block) -> Iterator[str]:
         which = counted(len(rows), "trial is", "trials are")
         yield f"{which} excluded, so {'its' if len(rows) == 1 else 'their'} answers are missing here."
     if invalid := int((~trials["valid"].fillna(value=True)).sum()):
-        yield f"{invalid} of {len(trials)} trials exceeded the protocol's timing limits and are included."
+        yield f"{invalid} of {len(trials)} trials exceeded the protocol's timing limits but are included."
     if study.doubts:
         names = sorted({doubt.path.relative_to(study.folder).as_posix() for doubt in study.doubts})
         more = f" and {len(names) - _FILES} more" if len(names) > _FILES else ""
@@ -334,7 +334,7 @@ def _marks_of_bars(block: Block) -> Iterator[str]:
 def _marks_of_delays(study: Study, block: Block) -> Iterator[str]:
     yield (
         f"Thin lines: {line_words(len(set(study.answers(block)['participant'])))}, shifted slightly where they "
-        f"coincide; thick line: median; band: interquartile range, by {QUARTILES}."
+        f"overlap; thick line: median; band: interquartile range, by {QUARTILES}."
     )
     yield f"Answers range from 1 ({block.labels[0]}) to 7 ({block.labels[-1]})."
 
@@ -533,14 +533,14 @@ def answers_picture(
             for participant, session, status, excluded in study.participants[columns].head(5).itertuples(index=False)
         )
         raise AnalysisError(
-            f"{study.folder}: no completed session has answers in {block.id!r} yet ({states}). Figures need "
-            "completed sessions; export writes all available data"
+            f"{study.folder}: no completed session has answers in {block.id!r} yet ({states}). Figures require "
+            "completed sessions; an export contains all available data"
         )
     words = _caption(study, block)
     if lowest:
         words += (
-            " Dashed line: lowest delay with a trend (step-down test, error rate controlled across all statements), "
-            "which is an upper bound for the noticeable delay."
+            " Dashed line: lowest delay with a trend (step-down test, error rate controlled across all statements); "
+            "it is an upper bound for the lowest noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)
     numbers = study.aggregate(block).to_csv(sep="\t", index=False)

@@ -168,11 +168,11 @@ def _panels(result: LevelsResult, banded: bool) -> str:
     crosses = "; crosses: catch trials" if any(answer.catch for answer in Answers.of(result)) else ""
     if Thresholds.own(result):
         return (
-            f"Curves: psychometric functions at the posterior medians{band}; bars: 95 % intervals for the "
-            "thresholds (stacked if there are several standards); circles: answers at each level, with an area "
-            f"proportional to their number{crosses}. First panel: all participants."
+            f"Curves: psychometric functions with posterior median parameters{band}; bars: 95 % intervals for the "
+            "thresholds (stacked if there are several standards); circles: answers at each level (area proportional "
+            f"to the number of answers){crosses}. First panel: all participants."
         )
-    units = " after removing differences between the participants' scale units" if result.own_units else ""
+    units = " after removing differences between participants' units" if result.own_units else ""
     return (
         f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); thin lines "
         f"show single participants{units}. Other panels: one participant each, with 95 % intervals for the "
@@ -409,7 +409,7 @@ def _draw_tracks(result: LevelsResult, shown: Sequence[TrackCourse], look: Look)
         _over_trials(axes, result, n, ends, first=first)
         _track_panel(axes, shown[place])
 
-    below = "Number of the trial at this standard" if standards else "Trial number"
+    below = "Trial number at this standard" if standards else "Trial number"
     return panels(look, level_words(result), names, draw, below)
 
 

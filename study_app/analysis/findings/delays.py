@@ -79,17 +79,18 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     first = against[0].found
     yield (
         f"Each comparison uses two one-sided t tests with equivalence bounds of {_points(first.bound)}, and a "
-        f"{percent(1 - 2 * first.alpha)} confidence interval. Equivalent: both the t tests and the bootstrap show that "
-        f"the mean difference lies within the bounds, with {min_sample_reason(first.alpha, first.bound)}. "
-        "Not equivalent: the whole confidence interval lies outside the bounds; this verdict is not corrected for the "
-        "number of comparisons. Inconclusive: neither was shown, which is not evidence of a difference. Out of reach: "
-        "with so few participants, no answers could have shown equivalence."
+        f"{percent(1 - 2 * first.alpha)} confidence interval. Equivalent: both the t tests and the bootstrap show "
+        "that the mean difference lies within the bounds, and the study has "
+        f"{min_sample_reason(first.alpha, first.bound)}. Not equivalent: the whole confidence interval lies outside "
+        "the bounds; this verdict is not corrected for the number of comparisons. Inconclusive: neither was shown, "
+        "which is not evidence of a difference. Out of reach: with so few participants, no answers could have shown "
+        "equivalence."
     )
     disagree = sum(tested.found.checks_agree is False for tested in against)
     if disagree:
         yield (
             f"* The t tests and the bootstrap disagree in {disagree} of {len(against)} comparisons. A comparison "
-            "counts as equivalent only if both agree."
+            "counts as equivalent only if both show equivalence."
         )
 
 
@@ -113,9 +114,9 @@ def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithCo
     if all(tested.verdict == "equivalent" for tested in here):
         not_excluded = _not_excluded([tested.found for tested in here])
         return f"Mean answers to these statements stay within the bounds, but {not_excluded}."
-    claim = f"“delays up to {ms(delay_ms)} do not matter”"
+    claim = f"the claim that delays up to {ms(delay_ms)} do not matter"
     if reasons := _evidence_up_to(result, delay_ms):
-        return f"These data speak against {claim}: {'; '.join(reasons)}."
+        return f"These data are evidence against {claim}: {'; '.join(reasons)}."
     return f"These data neither support nor refute {claim}."
 
 
@@ -137,8 +138,7 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
         if tested.verdict == "not equivalent" and tested.delay_ms <= delay_ms:
             beyond.setdefault(tested.delay_ms, []).append(f"“{short_text(result, tested.item)}”")
     differing = (
-        f"at {ms(at)}, {listed(items)} differ{'s' * (len(items) == 1)} by more than the bound"
-        for at, items in beyond.items()
+        f"at {ms(at)}, mean answers to {listed(items)} differ by more than the bound" for at, items in beyond.items()
     )
     return (*trends, *differing)
 
@@ -228,7 +228,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if against and result.n < fewest_participants((first := against[0].found).alpha, first.bound):
             yield (
                 f"{lead_phrase(result)}: a comparison can count as equivalent only with "
-                f"{min_sample_reason(first.alpha, first.bound)}. This study has {result.n}."
+                f"{min_sample_reason(first.alpha, first.bound)}. This study has {counted(result.n, 'participant')}."
             )
         open_ones = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
         if open_ones:
@@ -245,10 +245,10 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             yield (
                 f"Each delay was compared with {ms(self.value[0].control_ms)} using two one-sided t tests on paired "
                 f"differences, with equivalence bounds of {_points(first.bound)}{beforehand} and "
-                f"{percent(1 - 2 * first.alpha)} confidence intervals. A delay was called equivalent only if a "
-                "bootstrap that adds a participant as extreme as the most extreme one (Gaffke 2005) agreed, and only "
-                f"with {min_sample(first.alpha, first.bound)}. It was called not equivalent if the whole confidence "
-                "interval was outside the bounds."
+                f"{percent(1 - 2 * first.alpha)} confidence intervals. A delay was classified as equivalent only if a "
+                "bootstrap that adds a participant as extreme as the most extreme one (Gaffke 2005) also showed "
+                f"equivalence, and only with {min_sample(first.alpha, first.bound)}. It was classified as not "
+                "equivalent if the whole confidence interval lay outside the bounds."
             )
 
 
@@ -307,7 +307,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
                 row |= rows_alone(self.found, f"stepping down within {lowest.item}") | {
                     "members": len(lowest.steps.steps)
                 }
-                row |= {"correction": "none: tests in a fixed order that end at the first non-significant one"}
+                row |= {"correction": "none: fixed-sequence tests that stop at the first non-significant result"}
                 yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
 
     def section(self) -> Iterator[str]:
@@ -379,12 +379,14 @@ class DetectionThreshold(Finding[Threshold | None]):
             for level, yes, asked in zip(threshold.levels, threshold.yes, threshold.asked, strict=True)
         )
         if threshold.effect is None:
-            yield paragraph(f"There is no threshold: {threshold.note}. Answers that agree (5 to 7): {counts}.")
+            yield paragraph(
+                f"No threshold could be estimated: {threshold.note}. Answers that express agreement (5 to 7): {counts}."
+            )
             yield from self.drawn()
             return
         yield paragraph(
-            f"Detection threshold: {number(threshold.effect, 0)} ms, {_threshold_interval(threshold)}, "
-            f"n = {threshold.n}. {_half_way(threshold)} Answers that agree (5 to 7): {counts}. "
+            f"Detection threshold: {number(threshold.effect, 0)} ms, {_threshold_interval(threshold)}, n = "
+            f"{threshold.n}. {_half_way(threshold)} Answers that express agreement (5 to 7): {counts}. "
             f"{threshold.note[:1].upper()}{threshold.note[1:]}. Fit: {threshold.method}. Agreement is not the same as "
             "answering “yes”: a participant who “somewhat agrees” may have noticed little difference."
         )
@@ -410,8 +412,8 @@ class DetectionThreshold(Finding[Threshold | None]):
             else f" Dashed line: the shortest delay at which any statement shows a trend, {ms(lowest)}."
         )
         caption = (
-            f"Proportion of answers that agree (5 to 7), as a function of the requested delay ({drawing.simulated}n = "
-            f"{threshold.n}). Small points: single participants. {curve}{dashed}"
+            "Proportion of answers that express agreement (5 to 7), as a function of the requested delay "
+            f"({drawing.simulated}n = {threshold.n}). Small points: single participants. {curve}{dashed}"
         )
         draw = partial(answer_figures.draw_threshold, threshold, self._shares(drawing), lowest)
         return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",))
@@ -429,10 +431,10 @@ class DetectionThreshold(Finding[Threshold | None]):
         if self.value is not None:
             yield (
                 "The detection threshold is the delay at which a logistic function, fitted to agreement (5 to 7) in "
-                "single answers pooled over participants, lies halfway between the guess rate and one minus the lapse "
-                "rate (posterior median). Its 95 % interval is widened to allow for differences between participants. "
-                "The threshold is reported only if the statement shows a trend and the threshold lies within the range "
-                "of presented delays."
+                "single answers pooled across participants, lies halfway between the guess rate and one minus the "
+                "lapse rate (posterior median). Its 95 % interval is widened to allow for differences between "
+                "participants. The threshold is reported only if the statement shows a trend and the threshold lies "
+                "within the range of presented delays."
             )
 
 
@@ -446,8 +448,8 @@ def _half_way(threshold: Threshold) -> str:
     """Return a sentence that defines a detection threshold and gives the share of agreement there."""
     return (
         "The threshold is the delay at which the fitted function lies halfway between the guess rate "
-        f"({percent(threshold.guess or 0.0)}) and one minus the lapse rate ({percent(threshold.lapse or 0.0)}). "
-        f"At this delay, {percent(threshold.half_way or 0.0)} of the answers agree."
+        f"({percent(threshold.guess or 0.0)}) and one minus the lapse rate ({percent(threshold.lapse or 0.0)}). At "
+        f"this delay, {percent(threshold.half_way or 0.0)} of answers express agreement."
     )
 
 
@@ -488,9 +490,8 @@ class NoticedFrom(Finding[None]):
             if one.over_all_ms == at and (correlation := self._correlation(one, at))
         ]
         return (
-            f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants already tended to rate longer "
-            f"delays {listed(rated)}. They may also notice shorter delays. A trend does not imply that mean ratings "
-            "change."
+            f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
+            f"{listed(rated)}. They may also notice shorter delays. A trend does not imply that mean ratings change."
         )
 
     def _threshold_words(self) -> str:
@@ -500,8 +501,8 @@ class NoticedFrom(Finding[None]):
             return ""
         item = short_text(self.found, self.results.decided.noticed or "")
         return (
-            f"The detection threshold is {number(threshold.effect, 0)} ms ({_threshold_interval(threshold)}, "
-            f"n = {threshold.n}); at this delay, {percent(threshold.half_way or 0.0)} of the answers agree with "
+            f"The detection threshold is {number(threshold.effect, 0)} ms ({_threshold_interval(threshold)}, n = "
+            f"{threshold.n}); at this delay, {percent(threshold.half_way or 0.0)} of answers express agreement with "
             f"“{item}”. "
         )
 
@@ -518,7 +519,7 @@ class UnchangedUpTo(Finding[None]):
     key = "unchanged up to"
     place = 22
     kinds = ("delays",)
-    question = "Up to what delay do answers not change by a relevant amount?"
+    question = "Up to what delay do answers remain practically unchanged?"
     answer_figures = ("effects",)
 
     def answer(self) -> Answer:
@@ -529,7 +530,7 @@ class UnchangedUpTo(Finding[None]):
                 (not_tested.why for not_tested in self.found.absent if "equivalence" in not_tested.what),
                 "there was no comparison",
             )
-            return self.answered("not tested", f"There is no answer, because {why}.")
+            return self.answered("not tested", f"This was not tested, because {why}.")
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
             return self.answered(
@@ -561,7 +562,7 @@ def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
     """Return a sentence on the number of comparisons that are not equivalent, or on their absence."""
     beyond = sum(tested.verdict == "not equivalent" for tested in against)
     if not beyond:
-        return "This is not evidence that they change."
+        return "Failing to show equivalence is not evidence that answers change."
     return (
         f"In {beyond} of {number_text.counted(len(against), 'comparison')}, the whole confidence interval lies outside "
         "the equivalence bounds (not equivalent; not corrected for the number of comparisons)."
@@ -594,7 +595,7 @@ def _kept(block: Block, results: Results) -> str:
     judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
     if not judged:
         return "It was not measured whether trials met the protocol's timing limits."
-    return f"{valid} of {judged} trials met the protocol's timing limits; all are included."
+    return f"{valid} of {judged} trials met the protocol's timing limits; all trials are included."
 
 
 class Movement(Finding[None]):
@@ -620,14 +621,14 @@ class Movement(Finding[None]):
         people = medians["participant"].nunique()
         n = counted(people, "participant")
         foot = (
-            "Added delay in ms. Each point is a participant's median across the reaches of a trial, excluding the "
-            "first."
+            "Added delay in ms. Each point is a participant's median across the reaches in a trial, excluding the "
+            "first reach."
         )
         caption = (
             f"Reaching movements as a function of the requested delay ({drawing.simulated}n = {people} with "
-            f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: "
-            "interquartile range. Movement time runs from when a target lights up until the hand enters it for the "
-            f"last time. The scales do not begin at zero. {_kept(block, drawing.results)}"
+            f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: interquartile "
+            "range. Movement time runs from the moment a target lights up until the hand enters it for the last time. "
+            f"The scales do not begin at zero. {_kept(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
         draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=True)

@@ -258,7 +258,7 @@ TESTS: Final = (
     optional("statistic", "number", "Value of the test statistic."),
     optional("p", "number", "Uncorrected p value.", minimum=0, maximum=1),
     optional("p_adjusted", "number", "p value corrected within the family.", minimum=0, maximum=1),
-    optional("smallest_p", "number", "Smallest p value that these data could have given.", minimum=0, maximum=1),
+    optional("smallest_p", "number", "Smallest p value attainable with these data.", minimum=0, maximum=1),
     optional("family", "text", "Name of the family of tests that are corrected together."),
     optional("members", "integer", "Number of tests in the family.", minimum=1),
     optional("correction", "text", "Method used to correct the p value."),
@@ -269,7 +269,7 @@ TESTS: Final = (
     optional("low", "number", "Lower end of the effect's confidence interval."),
     optional("high", "number", "Upper end of the effect's confidence interval."),
     optional("level", "number", "Confidence level of the interval."),
-    optional("interval", "text", "Method used for the interval, or why there is none."),
+    optional("interval", "text", "Method used for the interval, or the reason why there is none."),
     Column("method", "text", "How the p value was calculated."),
     optional("note", "text", "Notes on the result."),
     Column(

@@ -60,7 +60,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         labels = answers.decided.names
         right = tuple(setting.label for setting in answers.block.settings)
         if not labels or not set(labels) <= answers.values.keys() or not any(right):
-            return None, (NotTested(cls.what, "the protocol does not say which statements name these liquids"),)
+            return None, (NotTested(cls.what, "the protocol does not state which statements name these liquids"),)
         if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
             return None, (NotTested(cls.what, f"the test needs 2 to {MOST_NAMED} conditions and at least two names"),)
         ratings = np.stack([answers.values[label] for label in labels], axis=2)
@@ -105,10 +105,10 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         )
         how = "" if outcome.interval is None else f" Confidence interval for kappa: {outcome.interval.method}."
         yield paragraph(
-            f"Confidence intervals for proportions are Clopper–Pearson intervals.{how} The p value is from a "
-            "within-participant test of whether the name is used more often for the liquid than for each other liquid "
-            "(McNemar's exact test, one-sided); the other liquid with the largest p value is the closest one. Adjusted "
-            "p values are Holm-corrected across the liquids.",
+            f"Confidence intervals for proportions are Clopper–Pearson intervals.{how} For each liquid, a "
+            "within-participant test (McNemar's exact test, one-sided) shows whether its name was used more often for "
+            "it than for each other liquid. The table shows the largest of these p values and the liquid that gave it "
+            "(the closest other liquid). Adjusted p values are Holm-corrected across the liquids.",
             "soft",
         )
 
@@ -146,11 +146,12 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     def methods(self) -> Iterator[str]:
         if self.value is not None:
             yield (
-                "Participants were taken to have named the liquid whose statement they rated highest; answers with "
-                "tied highest ratings are undecided and count as incorrect. The number of correct names was tested "
-                "by permuting the liquids within participants (exact, one-sided). In addition, a liquid was called "
-                "recognised only if its name was used more often for it than for each other liquid (McNemar's exact "
-                "test within participants, one-sided, with p values Holm-adjusted across the liquids)."
+                "Participants were taken to have named the liquid whose statement they rated highest; tied highest "
+                "ratings were treated as undecided and counted as incorrect. The number of correct names was tested "
+                "by permuting the liquids within participants (exact, one-sided). In addition, a liquid was "
+                "classified as recognised only if its name was used more often for it than for each other liquid "
+                "(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the "
+                "liquids)."
             )
 
 

@@ -109,7 +109,7 @@ def families(tests: Sequence[Tested]) -> str:
 def compared(answers: BlockAnswers) -> tuple[tuple[Tested, ...], Absent]:
     """Test for every statement whether the settings receive the same answers."""
     if answers.k < 2:
-        return (), (NotTested(SettingsDiffer.what, "the block has only one setting, so there is nothing to compare"),)
+        return (), (NotTested(SettingsDiffer.what, "the block has only one condition, so there is nothing to compare"),)
     outcomes = {item: _alike(answers, values) for item, values in answers.values.items()}
     return corrected_tests(outcomes, answers, f"{answers.block.id}: settings differ"), ()
 
@@ -157,7 +157,7 @@ class SettingsDiffer(StatementTests):
     key = "omnibus"
     place = 2
     row_place = 2
-    what = "test of differences between settings"
+    what = "test of differences between conditions"
     kinds = ("liquids", "views")
     sealed = KINDS
     statements = True
@@ -214,18 +214,18 @@ class DelayTrend(StatementTests):
     def methods(self) -> Iterator[str]:
         if trends := self.value:
             decided = self.results.decided
-            by, sides = TRENDS[decided.trends], [decided.direction(test.item) is not None for test in trends]
-            if decided.trends == "ranks":
-                by += f" ({_first_tested(trends).outcome.method.split(',')[0]})"
+            sides = [decided.direction(test.item) is not None for test in trends]
             stated = "before the first session" if decided.binding else "by the protocol"
             one_sided = f"one-sided in the direction stated {stated}" if all(sides) else "two-sided"
             if any(sides) and not all(sides):
                 one_sided = f"one-sided if a direction was stated {stated}, otherwise two-sided"
-            yield f"Trends over the delay were tested with {by} ({one_sided}), {families(trends)}."
+            if decided.trends == "ranks":
+                one_sided = f"{_first_tested(trends).outcome.method.split(',')[0]}; {one_sided}"
+            yield f"Trends across delays were tested with {TRENDS[decided.trends]} ({one_sided}), {families(trends)}."
             yield (
                 "If a statement showed a trend, the longest delay was dropped and the rank correlations were tested "
-                "again, until no trend remained. The shortest delay with a trend requires p ≤ alpha divided by the "
-                "number of statements at every step, and is an upper bound for the delay that participants notice."
+                "again, until no trend remained. At every step, a trend required p ≤ alpha divided by the number of "
+                "statements. The shortest delay with a trend is an upper bound for the shortest noticeable delay."
             )
 
 
@@ -258,7 +258,7 @@ class _SessionsDiffer(StatementTests):
         ungated = replace(answers, gate=0.0)  # sessions may differ even if settings do not
         tested = in_family(outcomes, ungated, f"{answers.block.id}: sessions", false_discovery, FDR, primary=False)
         if all(test.outcome.n == 0 for test in tested):
-            return (), (NotTested(cls.what, "no participant answered the same setting in all sessions"),)
+            return (), (NotTested(cls.what, "no participant rated the same condition in all sessions"),)
         return tested, ()
 
 
@@ -318,8 +318,8 @@ class OverAll(Finding[Outcome | None]):
         if self.value is not None:
             yield (
                 f"First, the {settings_noun(self.found)}s were compared across "
-                f"{all_of(len(self.found.items), 'statement')} together with a within-participant permutation test; "
-                "the statistic was the sum of the statements' Friedman statistics."
+                f"{all_of(len(self.found.items), 'statement')} with a within-participant permutation test; the "
+                "statistic was the sum of the statements' Friedman statistics."
             )
 
 
@@ -441,14 +441,14 @@ def pairs_of(answers: BlockAnswers, omnibus: tuple[Tested, ...]) -> tuple[tuple[
         return (), ()
     if (corrected := _smallest_of_pairs(k, n)) > alpha:
         why = (
-            f"{number_text.counted(n, 'participant')} cannot show a difference between two settings: the smallest "
+            f"{number_text.counted(n, 'participant')} cannot show a difference between two conditions: the smallest "
             f"attainable p is {p_value(_smallest_of_pairs(2, n))}, and {p_value(corrected)} after Holm's correction "
             f"for {math.comb(k, 2)} pairs, which is above {significant(alpha)}"
         )
         return (), (NotTested(Pairs.what, why),)
     opened = [test.item for test in omnibus if test.verdict in ("shown", "suggested")]
     if not opened:
-        return (), (NotTested(Pairs.what, "no statement shows a difference between the settings"),)
+        return (), (NotTested(Pairs.what, "no statement shows a difference between the conditions"),)
     each = [(item, *two) for item in opened for two in combinations(range(k), 2)]
     outcomes = {
         f"{item} {first} {second}": paired(answers.values[item][:, first], answers.values[item][:, second], alpha=alpha)
@@ -468,7 +468,7 @@ class Pairs(Finding[tuple[Pair, ...]]):
     key = "pairs"
     place = 3
     row_place = 7
-    what = "comparison of two settings"
+    what = "comparison of two conditions"
     kinds = ("liquids", "views")
     waits = ("liquids", "views")
     empty = ()
@@ -506,9 +506,9 @@ class Pairs(Finding[tuple[Pair, ...]]):
             "Test: Wilcoxon's signed-rank test, only for statements that show a difference between the "
             f"{settings_noun(self.found)}s ({pairs[0].tested.outcome.method}); p values are Holm-adjusted across the "
             f"{pairs[0].tested.members} pairs in this table. A rank-biserial correlation above 0 means that the first "
-            f"{settings_noun(self.found)} in the pair was rated higher. Nominal 95 % confidence intervals use Fisher's "
-            "z; with up to two dozen pairs their coverage is about 90 %. There is no interval if all differing pairs "
-            "differ in the same direction (the correlation is then −1 or 1), or if fewer than six pairs differ.",
+            f"{settings_noun(self.found)} in the pair was rated higher. Nominal 95 % confidence intervals use "
+            "Fisher's z; with up to 24 pairs, their coverage is about 90 %. There is no interval if all differing "
+            "pairs differ in the same direction (the correlation is then −1 or 1), or if fewer than six pairs differ.",
             "soft",
         )
 
@@ -516,8 +516,8 @@ class Pairs(Finding[tuple[Pair, ...]]):
         if self.value:
             yield (
                 "If a statement showed a difference, pairs were compared with Wilcoxon's signed-rank test (exact; "
-                "equal pairs were dropped), with p values Holm-adjusted across all pairs for all such statements; the "
-                "effect size is the matched-pairs rank-biserial correlation."
+                "pairs of equal answers were dropped), with p values Holm-adjusted across all pairs for all such "
+                "statements; the effect size is the matched-pairs rank-biserial correlation."
             )
 
 
@@ -531,7 +531,7 @@ def _pair_interval(pair: Pair) -> str:
     """Return the interval of the effect or, if all participants differ in one direction, their number."""
     outcome = pair.tested.outcome
     one_way = outcome.effect is not None and abs(outcome.effect) == 1.0
-    return f"– (all {_differing(pair)} one way)" if one_way else interval(outcome.interval)
+    return f"– (all {_differing(pair)} in one direction)" if one_way else interval(outcome.interval)
 
 
 class MeanTests(StatementTests):
@@ -548,7 +548,7 @@ class MeanTests(StatementTests):
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
         if answers.k < 2:
             return (), (
-                NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is only one setting"),
+                NotTested(cls.what, ONE_DELAY if answers.block.kind == "delays" else "there is only one condition"),
             )
         if answers.block.kind == "delays" and answers.decided.trends == "slopes":
             return (), ()  # it is the test of trends
@@ -570,7 +570,7 @@ class MeanTests(StatementTests):
             if isinstance(it := test.outcome, SlopeTest) and it.slopes
         ]
         if effects:
-            what = "Slopes per 100 ms of delay" if self.found.delays_ms else "Differences from the first setting"
+            what = "Slopes per 100 ms of delay" if self.found.delays_ms else "Differences from the first condition"
             yield paragraph(
                 f"{what}, in points, with 95 % confidence intervals and between-participant standard deviations: "
                 f"{'; '.join(effects)}.",
@@ -587,7 +587,7 @@ class MeanTests(StatementTests):
         tests = {test.outcome.test for block in blocks for test in cls.of(block) if test.outcome.p is not None}
         if tests:
             how = {
-                HOTELLING: "differences between the settings were tested with Hotelling's T²",
+                HOTELLING: "differences between the conditions were tested with Hotelling's T²",
                 T_TEST: "the participants' slopes were tested with Student's t test",
             }
             words = listed([how[test] for test in how if test in tests])

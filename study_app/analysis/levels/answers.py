@@ -141,9 +141,9 @@ class Settings(LevelStatistic[SettingEstimate]):
         error = " constant error: PSE − standard;" if self._are_compared else ""
         return (
             f"Settings are expressed as levels ({level_words(self.found)}). PSE (point of subjective equality): mean "
-            f"of the {in_u}, with a 95 % confidence interval (Student’s t); JND (just-noticeable difference): standard "
-            f"deviation;{error} hysteresis: settings that started high − settings that started low. Group values are "
-            "means across participants; the group PSE has a 95 % confidence interval."
+            f"of the {in_u}, with a 95 % confidence interval (Student’s t); JND (just-noticeable difference): their "
+            f"standard deviation;{error} hysteresis: mean of the settings that started high minus mean of those that "
+            "started low. Group values are means across participants; the group PSE has a 95 % confidence interval."
         )
 
     def compares(self, measure: str) -> bool:
@@ -154,8 +154,8 @@ class Settings(LevelStatistic[SettingEstimate]):
         if not (own := self.own(self.found)):
             return
         yield (
-            f"{title}: settings depend on each participant's criterion for calling two stimuli equal, so their "
-            "variability is not a criterion-free threshold."
+            f"{title}: settings depend on each participant's criterion for calling two stimuli equal, so the "
+            "variability of settings is not a criterion-free measure of the threshold."
         )
         if few := [str(estimate.participant) for estimate in own if estimate.hysteresis is None]:
             words = "all settings started near the same end, so hysteresis is unknown"
@@ -170,7 +170,8 @@ class Settings(LevelStatistic[SettingEstimate]):
         kind, (low, high) = KINDS[block.stimulus.level_kind], block.stimulus.levels
         yield (
             f"In “{self.found.title}”, participants set {self.found.quantity}{to} by {block.design.paper_name}; "
-            f"{kind} ranged from {low:g} to {high:g}, and settings started alternately near either end."
+            f"{kind} ranged from {low:g} to {high:g}, and settings started alternately near the lower and the upper "
+            "end of this range."
         )
 
     @classmethod
@@ -179,9 +180,10 @@ class Settings(LevelStatistic[SettingEstimate]):
             yield (
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
                 "difference is their standard deviation, the constant error is the difference between the mean and "
-                "the standard, and the hysteresis is the difference between settings that started high and settings "
-                "that started low; all use the logarithm of the level if levels are spaced logarithmically (Gescheider "
-                "1997). Group values are means across participants with 95 % confidence intervals (Student’s t)."
+                "the standard, and the hysteresis is the difference between the means of settings that started high "
+                "and of settings that started low. All of them are computed on the logarithm of the level if levels "
+                "are spaced logarithmically (Gescheider 1997). Group values are means across participants with 95 % "
+                "confidence intervals (Student’s t)."
             )
 
 
@@ -343,7 +345,7 @@ class Answers(LevelStatistic[LevelAnswers]):
             )
             yield paragraph(
                 f"The table shows the {mean_words(result)} across participants, with a 95 % confidence interval "
-                "(Student's t) unless all participants have the same value. The rows below show each participant with "
+                "(Student's t) unless all participants have the same value. The tables by participant also show "
                 "the number of answers." + (units if result.own_units else ""),
                 "soft",
             )

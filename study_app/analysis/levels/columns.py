@@ -21,7 +21,7 @@ JUDGED: Final = (
         "counted",
         "flag",
         "true if the row is included in the aggregate table and the figures, that is, if it is the last attempt of a "
-        "main trial in a completed session and is not excluded, whether valid or not.",
+        "main trial in a completed session and is not excluded. Invalid trials are included too.",
     ),
 )
 
@@ -44,10 +44,10 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     Column(
         "analysed",
         "flag",
-        "true if the row is analysed and does not present the modulus of a magnitude estimation; false if the "
-        "session's answers in the block are below chance, until somebody decides to keep the session.",
+        "true if the answer is analysed. It is false if the trial presents the modulus of a magnitude estimation, or "
+        "if the session's answers in the block are below chance and nobody has decided to keep the session.",
     ),
-    Column("track", "text", "Meaning of the code: the standard and the number of the track (8/1), or the condition."),
+    Column("track", "text", "Meaning of the code: the standard and the track number (such as 8/1), or the condition."),
     Column(
         "slot", "integer", "Position of the trial among the session's trials with the same code, from 1.", minimum=1
     ),
@@ -79,7 +79,7 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     optional("response", "text", "The answer; n/a if there is no answer."),
     optional("value", "number", "The answer as a number; n/a if it is not a number."),
     optional("right", "flag", "true if the answer was correct; n/a if answers are neither correct nor incorrect."),
-    optional("response_s", "number", "Time from the question to the first choice of an answer.", unit="s", minimum=0),
+    optional("response_s", "number", "Time from the question until an answer is first chosen.", unit="s", minimum=0),
     optional(
         "reversal",
         "flag",
@@ -124,7 +124,8 @@ _EXPONENTS: Final[tuple[Column, ...]] = (
     Column(
         "exponent",
         "number",
-        "Exponent of the power law: the slope of the mean ln answer at each level on ln level, for delivered levels.",
+        "Exponent of the power law: the regression slope of the mean ln answer at each level on ln level, using "
+        "delivered levels.",
     ),
 )
 
@@ -144,8 +145,8 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "open_end",
         "text",
-        "Which end of the interval the answers do not determine (the true limit lies further out); n/a if both ends "
-        "are determined.",
+        "End of the interval that the answers do not determine (the true limit lies further out); n/a if they "
+        "determine both ends.",
         levels=(("low", "the lower end"), ("high", "the upper end"), ("both", "both ends")),
     ),
     optional(
@@ -157,8 +158,8 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "width",
         "number",
-        "Posterior median of the function's width, from 5 to 95 % of its rise (in decades if levels are spaced "
-        "logarithmically, otherwise in the unit of the levels).",
+        "Posterior median of the width of the psychometric function, from 5 to 95 % of its rise (in decades if levels "
+        "are spaced logarithmically, otherwise in the unit of the levels).",
         minimum=0,
     ),
     optional("lapse", "number", "Posterior median of the lapse rate.", minimum=0, maximum=1),
@@ -212,8 +213,8 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "fit_p",
         "number",
-        "p value of the function's deviance, based on simulated sets of answers; below 0.05, the function does not "
-        "fit.",
+        "p value of the deviance of the fitted function, based on simulated data sets; a value below 0.05 means that "
+        "the function does not fit.",
         minimum=0,
         maximum=1,
     ),
@@ -221,7 +222,8 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "change",
         "number",
-        "Relative change in the threshold from the first to the last trial; 0 if it is within two standard errors.",
+        "Relative change in the threshold from the first to the last trial; 0 if the change is within two standard "
+        "errors.",
     ),
 )
 

@@ -131,11 +131,11 @@ class Delivery(LevelStatistic[_Row]):
         ]
         with_estimator = f", using the velocity estimator {self.estimator}" if self.estimator else ""
         kept = (
-            f"Some intervals exceeded limits: {listed(named)}." if reasons else "All intervals were within the limits."
+            f"Some intervals exceeded a limit: {listed(named)}." if reasons else "All intervals were within the limits."
         )
         mass = (
-            " Apparent mass is the m of a least-squares fit of F = −b v − m a to the force that was sent"
-            f"{with_estimator}."
+            " Apparent mass is the coefficient m in a least-squares fit of F = −b v − m a to the force sent to the "
+            f"device{with_estimator}."
         )
         mass = mass if any(row["apparent_mass_kg"] is not None for row in self.rows) else ""
         return (
@@ -195,8 +195,8 @@ class _Withheld(LevelStatistic[_Row]):
         return (
             f"{' '.join(self._up_to())} The table shows the proportion of the requested force that the limits, the "
             "passivity controller and the device held back in the comparisons, including repeated trials. A delayed "
-            "force pushes the hand, and the passivity controller limits the energy that this returns to the hand; the "
-            "force held back is then missing from the stimulus."
+            "force can return energy to the hand. The passivity controller limits this energy by holding back force, "
+            "which makes the stimulus weaker than requested."
         )
 
     def _up_to(self) -> Iterator[str]:
@@ -210,6 +210,6 @@ class _Withheld(LevelStatistic[_Row]):
                 f"In every comparison up to {kept[-1]['high']:.3g}{of}{at}, at most {WITHHELD_PERCENT:g} % of the "
                 "force was held back."
                 if kept
-                else f"More than {WITHHELD_PERCENT:g} % of the force was held back in some comparison at the "
-                f"lowest level{at}."
+                else f"More than {WITHHELD_PERCENT:g} % of the force was held back in at least one comparison at "
+                f"the lowest level{at}."
             )

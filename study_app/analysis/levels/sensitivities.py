@@ -33,8 +33,8 @@ from study_app.psychophysics.grid import Z_95
 
 _MODELS: Final = {
     "differencing": " d′ uses the differencing model, because standards vary from trial to trial.",
-    "independent": " d′ uses the model of independent observations; the column d_prime_other in the exported table "
-    "thresholds contains d′ for the differencing model.",
+    "independent": " d′ uses the model of independent observations; the column d_prime_other of the exported "
+    "thresholds table contains d′ for the differencing model.",
 }
 _FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
 """Designs whose d′ follows from the share of correct answers alone."""
@@ -44,10 +44,10 @@ _BIASES: Final = {
     "samedifferent": " k is the difference above which the answer is “different”.",
     **dict.fromkeys(
         _FROM_SHARE_CORRECT,
-        " d′ is calculated from the proportion correct, assuming that participants do not prefer any answer; a "
-        "preference, visible as unequal proportions of the answers, makes d′ too small. The participants' "
-        "confidence intervals for d′ are calculated from the Clopper–Pearson interval for the proportion correct; "
-        "there is no interval if all answers are correct.",
+        " d′ is calculated from the proportion correct, assuming that participants have no response bias; a bias, "
+        "visible as unequal proportions of the answers, makes d′ too small. The participants' confidence intervals "
+        "for d′ are calculated from the Clopper–Pearson interval for the proportion correct; there is no interval if "
+        "all answers are correct.",
     ),
 }
 
@@ -252,8 +252,8 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         if biased := preferences(self.own(self.found)):
             people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
-                f"{self.found.title}: {people} preferred one interval (the criterion c is beyond ±{_BIASED:g} and "
-                f"more than twice its standard error from 0). Their threshold fits allow for this."
+                f"{self.found.title}: {people} preferred one interval (the absolute value of the criterion c is above "
+                f"{_BIASED:g} and more than twice its standard error). Their threshold fits allow for this."
             )
 
     def explained(self) -> str:

@@ -26,7 +26,7 @@ R = TypeVar("R")
 Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
 """A column of a table of the report: its heading and what makes a cell of a row; None is one that is left out."""
 
-MOTORS: Final = "the motors are audible and were not masked, so participants may have used their sound."
+MOTORS: Final = "the motors are audible and were not masked, so participants may have relied on their sound."
 
 
 class LevelStatistic(Generic[R]):

@@ -537,28 +537,30 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         reversals = (
             ""
             if percent is None
-            else " The mean of the reversals is the classical estimate for an up–down track; it is the level with "
-            f"{percent:.1f} % {result.counts}."
+            else " The mean of the reversals is the classical estimate for an up–down track; it estimates the level "
+            f"with {percent:.1f} % {result.counts}."
         )
         level = (
-            "" if compared is None else f" “At {compared:g} %” is the level at which the published value was measured."
+            ""
+            if compared is None
+            else f" “At {compared:g} %” is the level with {compared:g} % {result.counts}, as for the published value."
         )
         function = FAMILIES[result.family or ""]
         return (
             f"A threshold is the level ({level_words(result)}) at which the {function} function lies halfway between "
             f"the guess rate and one minus the lapse rate{at}. The estimate is the posterior median with an "
-            "equal-tailed 95 % interval, based on all analysed answers at the levels delivered to the hand. The width, "
-            "from 5 to 95 % of the rise, has a log-normal prior; the next column shows the threshold under a flat "
-            "prior. “Above” and “below” mark thresholds outside the levels of the stimulus; “<” and “>” mark ends of "
-            "intervals that the answers do not determine. Intervals allow a person’s threshold to differ between "
-            f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation) and to change over the trials. The "
-            "group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp interval if there are at "
-            "least three participants. Each variance is replaced by its geometric mean with the median "
-            f"variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated sets of answers; for "
-            "the group, how far the clustering of errors exceeds expectation, in standard errors, marked “!” if above "
-            f"{MOST_CLUSTERED:g}. Drift: correlation between trial number and deviance residual, marked “!” if the "
-            f"threshold changes over the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the "
-            "rise or fall of thresholds after the first trials, in standard errors. n is the number of "
+            "equal-tailed 95 % interval, based on all analysed answers at the levels delivered to the hand. The "
+            "width, from 5 to 95 % of the rise, has a log-normal prior; the next column shows the threshold under a "
+            "flat prior. “Above” and “below” mark thresholds outside the levels of the stimulus; “<” and “>” mark "
+            "interval ends that the answers do not determine. Intervals allow a person’s threshold to differ between "
+            f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation) and to change over the trials. "
+            "The group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp interval if there are "
+            "at least three participants. Each variance is replaced by its geometric mean with the median "
+            f"variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated data sets; for the "
+            f"group, the excess clustering of errors in standard errors, marked “!” if above {MOST_CLUSTERED:g}. "
+            "Drift: correlation between trial number and deviance residual, marked “!” if the threshold changes over "
+            f"the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the rise or fall of "
+            "thresholds after the first trials, in standard errors. n is the number of "
             f"answers{catch}." + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
@@ -591,7 +593,10 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             )
 
         kinds: tuple[tuple[Callable[[ThresholdEstimate], bool], str], ...] = (
-            (shifted, f"with so few answers, the width's prior shifts a threshold by more than {100 * _SHIFT:.0f} %"),
+            (
+                shifted,
+                f"with so few answers, the prior on the width shifts a threshold by more than {100 * _SHIFT:.0f} %",
+            ),
             (
                 lambda estimate: estimate.beyond == "above",
                 "a threshold lies above the highest level of the stimulus, by an unknown amount",
@@ -619,10 +624,10 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             if row.participant is None and row.learned:
                 where = "" if row.standard is None else f" at standard {with_unit(self.found, row.standard)}"
                 yield (
-                    f"{title}: thresholds "
-                    f"{'rose' if (row.early_change or 0.0) > 0 else 'fell'} after the first trials{where} by "
-                    f"{abs(row.early_change or 0.0):.1f} standard errors. The group's threshold may be biased, because "
-                    "the analysis assumes that thresholds are constant or change at a constant rate."
+                    f"{title}: thresholds {'rose' if (row.early_change or 0.0) > 0 else 'fell'} by "
+                    f"{abs(row.early_change or 0.0):.1f} standard errors after the first trials{where}. The group's "
+                    "threshold may be biased, because the analysis assumes that thresholds are constant or change at "
+                    "a constant rate."
                 )
         if some := [estimate for estimate in own if estimate.drifts]:
             sizes = listed(
@@ -672,8 +677,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if own is None:
             return (
                 f"{result.title}: the device's own damping, friction and mass are unknown, because they were not "
-                "measured. Weber fractions refer to the force delivered by the motors; they would be smaller "
-                "relative to the sum of this force and the device's own resistance."
+                "measured. Weber fractions refer to the force delivered by the motors; they would be smaller if they "
+                "were relative to the sum of this force and the device's own resistance."
             )
         where = "" if own.sessions == own.of else f" (measured in {own.sessions} of {own.of} sessions)"
         words = (
@@ -709,24 +714,24 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
     def common_methods(cls, blocks: Sequence[LevelsResult]) -> Iterator[str]:
         if any(map(cls.of, blocks)):
             yield (
-                "Thresholds are posterior medians, computed on a grid, with equal-tailed 95 % intervals, based on "
-                "all analysed answers at the levels delivered to the hand. The deviance was compared with the "
-                f"deviances of {SETS} simulated sets of answers, and drift is the correlation between trial number "
-                "and deviance residual (Wichmann & Hill 2001). Intervals allow a person’s threshold to differ "
-                f"between sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation; from data in Jäkel &"
-                f" Wichmann 2006), and to change over the trials if the change exceeded {BEYOND_CHANCE:g} standard "
-                f"errors. The posterior averages over linear changes (prior: a factor of {CHANGE_PRIOR:g}), so the "
-                f"threshold refers to the middle of the trials. We assumed that {100 * ALIKE:.0f} % of the standard "
-                "deviation of log widths is due to differences between participants and that lapse rates vary "
-                "around a common mean, so each participant’s width and lapse rate depend on all participants’ "
-                f"answers; the posterior of the shared parameters was raised to the power of {NEAR_MODE}. Group "
-                "means are random-effects means with the between-participant variance of Paule and Mandel (1982), "
-                "after replacing each variance by its geometric mean with the median variance. With at least "
-                f"{FEWEST} participants, they have the interval of Hartung and Knapp (2001), widened to include the "
-                "uncertainty of the shared width and lapse rate. A score test for a change that fades over "
-                f"{EARLY_TRIALS:g} trials was used to test whether thresholds rose or fell after the first trials. "
-                "The clustering of errors was tested by comparing errors with those expected, weighting each error "
-                f"by the probability that the answers before it (at most {BURST_TRIALS - 1}) were random guesses."
+                "Thresholds are posterior medians, computed on a grid, with equal-tailed 95 % intervals, based on all "
+                "analysed answers at the levels delivered to the hand. The deviance was compared with the deviances "
+                f"of {SETS} simulated data sets, and drift is the correlation between trial number and deviance "
+                "residual (Wichmann & Hill 2001). Intervals allow a person’s threshold to differ between sessions by "
+                f"a factor of {10**SESSION_SD:.2f} (one standard deviation; from data in Jäkel & Wichmann 2006), and "
+                f"to change over the trials if the change exceeded {BEYOND_CHANCE:g} standard errors. The posterior "
+                f"averages over linear changes (prior: a factor of {CHANGE_PRIOR:g}), so the threshold refers to the "
+                f"middle of the trials. We assumed that {100 * ALIKE:.0f} % of the standard deviation of log widths "
+                "is due to differences between participants and that lapse rates vary around a common mean, so each "
+                "participant’s width and lapse rate depend on all participants’ answers; the posterior of the shared "
+                f"parameters was raised to the power of {NEAR_MODE}. Group means are random-effects means with the "
+                "between-participant variance of Paule and Mandel (1982), after replacing each variance by its "
+                f"geometric mean with the median variance. With at least {FEWEST} participants, they have the "
+                "interval of Hartung and Knapp (2001), widened to include the uncertainty of the shared width and "
+                f"lapse rate. A score test for a change that fades over {EARLY_TRIALS:g} trials was used to test "
+                "whether thresholds rose or fell after the first trials. The clustering of errors was tested by "
+                "comparing the observed errors with the expected errors, weighting each error by the probability that "
+                f"the answers before it (at most {BURST_TRIALS - 1}) were random guesses."
             )
 
 

@@ -38,6 +38,7 @@ from study_app.analysis.planning.simulated_studies import (
 )
 from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
+from study_app.analysis.wording import listed
 from study_app.protocol.model import Contrast
 from study_app.protocol.raters import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
@@ -286,7 +287,7 @@ OF_BLOCK: Final = (
     Column("block", "text", "ID of the block of trials."),
 )
 OF_STUDIES: Final = (
-    Column("participants", "integer", "Number of participants in each study.", minimum=2),
+    Column("participants", "integer", "Number of participants in each simulated study.", minimum=2),
     Column("studies", "integer", "Number of simulated studies.", minimum=1),
 )
 """Columns of all tables of power."""
@@ -403,7 +404,11 @@ def _preface(power: Powers) -> list[str]:
     decided = power.plan.decided
     low, high = interval(WANTED, power.studies)
     of_looks = ", ".join(f"{n}: {level:.2g}" for n, level in zip(decided.looks, decided.alphas, strict=False))
-    looks = f" across all looks ({of_looks}; an effect counts from the first look that detects it)" if of_looks else ""
+    looks = (
+        f" across all looks ({of_looks}; an effect counts as detected from the first look that detects it)"
+        if of_looks
+        else ""
+    )
     lines = [
         f"**SIMULATED.** {power.studies} studies of each size were simulated with the answer model that rehearsals use "
         f"(seed {power.seed}, liquid-study {__version__}). The model's effects are plausible but have not been "
@@ -416,12 +421,12 @@ def _preface(power: Powers) -> list[str]:
         f"model were simulated. A power of 80 % is uncertain by ±{50 * (high - low):.1f} percentage points.",
         "",
         f"The numbers are for {_people(next(iter(power.kinds)))}, with the lowest and highest values across all kinds "
-        "of people in parentheses: "
-        + "; ".join(f"**{kind}**: {people.described()}" for kind, people in power.plan.kinds.items())
+        "of people in parentheses. The kinds are "
+        + listed([f"**{kind}** ({people.described()})" for kind, people in power.plan.kinds.items()])
         + f". {_SOURCES}",
     ]
     if not power.complete:
-        lines += ["", f"**Ended early: {power.studies} of {power.asked} studies.**"]
+        lines += ["", f"**Ended early, after {power.studies} of {power.asked} studies.**"]
     if power.plan.unknown:
         named = ", ".join(power.plan.unknown)
         lines += [
@@ -435,7 +440,7 @@ def _preface(power: Powers) -> list[str]:
         for line in (
             "",
             f"{block.title}: n is the number of participants in {' and '.join(block.groups)}, because other groups do "
-            "not have this block.",
+            "not complete this block.",
         )
     ]
     return lines
@@ -444,7 +449,7 @@ def _preface(power: Powers) -> list[str]:
 _SOURCES: Final = (
     "The values for consistent, typical and noisy people come from published ratings, in points on a seven-point "
     "scale. Consistent: a trained panel (data set TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen "
-    "2017; medians across 15 attributes). Typical: panelists who rated chocolates (data set sensochoc, R package "
+    "2017; medians across 15 attributes). Typical: panellists who rated chocolates (data set sensochoc, R package "
     "SensoMineR, Lê and Husson 2008; medians across 14 descriptors). Noisy: the largest of these 14 values. The noise "
     "SD is the SD between identical trials; the slope SD is the between-person SD of effects, relative to the mean "
     "effect."
@@ -641,28 +646,30 @@ def _explained(question: Question, found: Powers) -> list[str]:
     match question:
         case "settings differ":
             return [
-                "Tested with Friedman's test (permutation), or with Wilcoxon's signed-rank test for two conditions."
+                "Differences are tested with Friedman's test (permutation), or with Wilcoxon's signed-rank test if "
+                "there are two conditions."
             ]
         case "trend":
             by = TRENDS[found.plan.decided.trends]
-            return [f"Trend tested with {by}; one-sided if the protocol states a direction."]
+            return [f"Trends are tested with {by}; the test is one-sided if the protocol states a direction."]
         case "lowest delay":
             return [
-                "As long as there is a trend, the longest delay is dropped and the rank correlations are tested again; "
-                "the result is an upper bound for the noticeable delay."
+                "As long as there is a trend, the longest delay is dropped and the rank correlations are tested "
+                "again; the result is an upper bound for the lowest noticeable delay."
             ]
         case "equivalence":
             bound = found.plan.decided.equivalence_bound or STEPS
             return [
-                f"Tested with two one-sided t tests (bounds ±{bound} points) and a bootstrap, which must agree, with "
-                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the model's difference is near or "
-                "outside the bounds, a finding of equivalence is wrong, so few studies should find it."
+                f"Equivalence is tested with two one-sided t tests (bounds ±{bound} points) and a bootstrap; both "
+                f"must show equivalence. It also requires {min_sample_reason(found.plan.decided.alphas[-1], bound)}. "
+                "If the model's difference is near or outside the bounds, few studies should find equivalence; "
+                "outside the bounds, such a finding is wrong."
             ]
         case "contrast":
             return [
-                "Tested with paired t tests on each participant's mean answers, Holm-corrected across the hypotheses; "
-                "the bootstrap and the t test corrected for skewness must agree. Equivalence is tested as in the "
-                f"report. {LEFT_OUT}"
+                "Hypotheses are tested with paired t tests on each participant's mean answers, Holm-corrected across "
+                "the hypotheses; the bootstrap and the t test corrected for skewness must also be significant. "
+                f"Equivalence is tested in the same way as in the report. {LEFT_OUT}"
             ]
 
 

@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__, number_text
-from study_app.analysis.contrasts import LEFT_OUT, RATIOS, equality_limits
+from study_app.analysis.contrasts import LEFT_OUT, RATIOS, equality_limits, t_test_name
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions, display_language
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
@@ -100,14 +100,15 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         stimuli = {block.id: stimulus_of(protocol, block) for block in protocol.main_blocks if block.stimulus}
         words = contrast.words({block: condition_of(protocol, stimulus) for block, stimulus in stimuli.items()})
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
-        test = _test_of(contrast, " on logarithms" if ratio else "")
+        test = t_test_name(contrast, ratio=ratio)
+        test += " and the degrees of freedom of the smaller group" if contrast.groups else ""
         sides = "two-sided" if contrast.expected is None else "one-sided"
         weighted = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
         yield (
             f"Hypothesis: {contrast.described(words)}. We test it with a {sides} {test}, using one value per "
-            f"participant.{weighted} A bootstrap that adds a participant as extreme as the most extreme one (Gaffke "
-            "2005) and a t test corrected for skewness (Hall 1992) must agree. The p value is Holm-adjusted across all "
-            f"hypotheses of this kind.{_equality_of(protocol, contrast)}"
+            f"participant.{weighted} We also use a bootstrap that adds a participant as extreme as the most extreme "
+            "one (Gaffke 2005) and a t test corrected for skewness (Hall 1992). The p value is the largest of the "
+            f"three, Holm-adjusted across all hypotheses of this kind.{_equality_of(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
         yield LEFT_OUT
@@ -118,16 +119,6 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
             yield from _of_statements(protocol, block, language)
     for published in () if protocol.analysis is None else protocol.analysis.published:
         yield f"Published value for comparison, block {published.described()}."
-
-
-def _test_of(contrast: Contrast, logarithms: str) -> str:
-    """Return the t test of a contrast."""
-    if contrast.groups is None:
-        return f"paired t test{logarithms}"
-    differences = " on within-participant differences" if contrast.is_interaction else ""
-    return (
-        f"two-sample t test{differences}{logarithms} with unequal variances and the smaller group's degrees of freedom"
-    )
 
 
 def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
@@ -153,7 +144,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
     what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit
     standards = [one for one in standards_of(protocol, block) if one is not None]
     if threshold_plan(protocol, block) is None:
-        asked = {"number": "With what exponent do estimates increase with", "rating": "How do ratings change with"}
+        asked = {"number": "What is the exponent of the power law for", "rating": "How do ratings change with"}
         yield f"Block {block.id}: {asked.get(design.reply, 'How do answers change with')} {what}?"
         return
     at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
@@ -180,7 +171,7 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
                 yield f"Hypothesis, block {block.id}: agreement with “{words}” ({name}) {moves} with the delay."
         if decided.noticed in texts:
             yield (
-                f"Block {block.id}: at what delay do participants notice a difference (agreement, 5 to 7, with the "
+                f"Block {block.id}: at what delay do participants notice a difference (answers of 5 to 7 to the "
                 f"statement “{decided.noticed}”)?"
             )
         if decided.equivalence_bound is not None:
@@ -195,10 +186,10 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
         f"{listed([f'“{texts[name]}” ({name})' for name in primary])}."
     )
     labels = [
-        f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label in texts
+        f"“{condition.label}” for {name}" for name, condition in protocol.conditions.items() if condition.label in texts
     ]
     if labels and protocol.analysis is not None:
-        yield f"Block {block.id}: are the liquids recognised above chance ({listed(labels)})?"
+        yield f"Block {block.id}: are the liquids recognised above chance (statements: {listed(labels)})?"
 
 
 def analyses(protocol: Protocol) -> Iterator[str]:
@@ -212,7 +203,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                 f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard, we "
                 f"estimate the threshold as the posterior median ({family} function) with its equal-tailed 95 % "
                 "interval, using the delivered levels, and also report the median under a flat prior on the width. "
-                "Goodness of fit is tested with 999 simulated sets of answers, and drift over the trials is reported."
+                "Goodness of fit is tested with 999 simulated data sets, and drift over the trials is reported."
                 + (f" {REMOVED.format('is')}" if design.kind == "2ifc" else "")
             )
             yield (
@@ -233,8 +224,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             )
             if design_of(protocol, block).reply == "rating":
                 yield (
-                    f"Block {block.id}: we report d_a for each level relative to the lowest, calculated from the area "
-                    "under the ROC curve."
+                    f"Block {block.id}: we report d_a for each level relative to the lowest level, calculated from "
+                    "the area under the ROC curve."
                 )
         elif block.design is not None:
             yield (
@@ -256,7 +247,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     if others := kinds - {None, "delays"}:
         yield (
             f"{' and '.join(sorted(map(str, others))).capitalize()}: we test each statement with Friedman's test "
-            "(permutation), and compare two conditions with Wilcoxon's signed-rank test."
+            "(permutation), and compare pairs of conditions with Wilcoxon's signed-rank test."
         )
     yield (
         "We claim a difference for a statement only if the permutation test over all statements in its block is "
@@ -277,8 +268,8 @@ def _equivalence_words(decided: Decided) -> str:
     if (bound := decided.equivalence_bound) is None:
         return ""
     return (
-        "We test equivalence to the shortest delay with two one-sided t tests and with a bootstrap, which must agree; "
-        f"this requires {min_sample(decided.alphas[-1], bound)}. "
+        "We test equivalence to the shortest delay with two one-sided t tests and with a bootstrap; both must show "
+        f"equivalence, which requires {min_sample(decided.alphas[-1], bound)}. "
     )
 
 
@@ -322,7 +313,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         describe(protocol),
         "```",
         "",
-        "## Values that the report compares with",
+        "## Values that the report checks",
         "",
         commitment_lines(one),
     ]
@@ -347,7 +338,7 @@ def _design(protocol: Protocol) -> Iterator[str]:
         )
     elif protocol.asks_group:
         yield (
-            f"Participants belong to the groups {names} because of an existing attribute, which is recorded at the "
+            f"Participants are assigned to the groups {names} by an existing attribute, which is recorded at the "
             f"start of their first session; the planned ratio is {ratio}. The groups are not randomised, so a "
             "difference between them may have other causes."
         )
@@ -357,7 +348,7 @@ def _design(protocol: Protocol) -> Iterator[str]:
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
         kind = "levels" if block.stimulus is not None else "conditions"
-        yield f"Block {block.id} compares {kind} that are described below." + (
+        yield f"Block {block.id} compares {kind}, which are described below." + (
             f" Expected precision: {rows['Expected precision']}." if rows else ""
         )
 
@@ -417,7 +408,8 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         if block.catch is not None:
             yield (
                 f'Rule "catch": a session with more than {100 * block.catch.wrong_most:g} % incorrect answers to the '
-                f"catch trials of block {block.id} is excluded; the program applies it when the data are unblinded."
+                f"catch trials of block {block.id} is excluded; the program applies this rule when the data are "
+                "unblinded."
             )
     limits = "; ".join(f"{what} ({value})" for value, what in limit_rows(protocol))
     has_intervals = any(block.design is not None for block in protocol.main_blocks)
@@ -430,7 +422,7 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         if (permitted := protocol.limits.missing_percent) is not None:
             yield (
                 f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of its main trials '
-                "with intervals remain unanswered because no presentation was within the limits for valid trials."
+                "with intervals remain unanswered because no presentation met the limits for valid trials."
             )
     if any(block.design is None for block in protocol.main_blocks):
         trials = "Other trials" if has_intervals else "Trials"
@@ -438,7 +430,7 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
     for rule in () if protocol.analysis is None else protocol.analysis.exclusions:
         yield (
             f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. The researchers decide '
-            "whether to exclude it; the report lists the session and the decision, and states the conclusions with and "
+            "whether to exclude it; the report lists the session and the decision, and gives the conclusions with and "
             "without all such sessions."
         )
     yield f"Limits: {limits}."

@@ -315,10 +315,11 @@ def threshold_markdown(precisions: Precisions) -> str:
         f"# Expected precision for {text_in(study.title, language)} ({study.name} {study.version})",
         "",
         f"**SIMULATED.** Each row summarises {precisions.studies} studies (seed {precisions.seed}, liquid-study "
-        f"{__version__}). People differ by a factor of {BETWEEN_PEOPLE:g}. Estimates are computed as in the report.",
+        f"{__version__}). True values differ between people by a factor of {BETWEEN_PEOPLE:g} (one standard "
+        "deviation). Estimates are computed as in the report.",
     ]
     if precisions.studies < precisions.asked:
-        lines += ["", f"**Ended early: {precisions.studies} of {precisions.asked} studies.**"]
+        lines += ["", f"**Ended early, after {precisions.studies} of {precisions.asked} studies.**"]
     wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
     heads = ["participants", "SD for one participant", "half-width of the group's 95 % interval", *wanted]
     planned = plans(precisions.protocol, ())
@@ -383,11 +384,9 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
             continue
         what = contrast.measure.replace("d_prime", "d′")
         share = "" if isinstance(first, ThresholdPlan) else f", relative to a mean {what} of {first.value:g}"
-        whose = f"for one participant's {what}, from the estimation error and differences between people"
+        whose = f"of one participant's {what}, due to estimation error and differences between people"
         if contrast.within is not None:
-            whose = (
-                "for one participant's difference, based on the two estimation errors and on differences between people"
-            )
+            whose = "of one participant's difference, due to the two estimation errors and differences between people"
         yield from smallest_differences(
             contrast, precisions.sizes, alpha, members, rows,
             f"trials{first.per}",
@@ -427,11 +426,11 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (
-            "Each study simulates one kind of people, and the kinds alternate: psychometric functions that are as wide "
-            "as the prior's median, or 0.5, 1.5 or 2.5 times as wide; 2 or 5 % random answers; "
-            f"{'a preference for one interval or for the last answer; ' if plan.two_intervals else ''}thresholds "
-            "that fall or rise. Their mean threshold lies in the middle half of the levels. The group "
-            "interval is the Hartung–Knapp interval for the mean across all standards."
+            "Each study simulates one kind of people, and the kinds alternate. They differ in the width of the "
+            "psychometric function (0.5, 1, 1.5 or 2.5 times the median of the prior), the rate of random answers (2 "
+            f"or 5 %), {'the preference for one interval or for the last answer, ' if plan.two_intervals else ''}and "
+            "the change of the threshold over the trials (a fall or a rise). The mean threshold lies in the middle "
+            "half of the levels. The group interval is the Hartung–Knapp interval for the mean across all standards."
         )
     group = "The group interval is a t-based confidence interval for the mean."
     if isinstance(plan, SensitivityPlan):

@@ -80,10 +80,9 @@ def _fewer_settings(study: Study) -> str:
         gone = study.excluded_trials(block)
         fewer |= {who for who, code in zip(gone["participant"], gone["code"], strict=True) if (who, code) not in left}
     if not fewer:
-        return ", not all of them in all conditions"
+        return ", but not all of them in all conditions"
     people = counted(len(fewer), "participant")
-    lack = "lacks" if len(fewer) == 1 else "lack"
-    return f"; {people} {lack} at least one condition because individual trials were excluded"
+    return f"; at least one condition is missing for {people}, because individual trials were excluded"
 
 
 def _groups(study: Study) -> str:
@@ -93,7 +92,7 @@ def _groups(study: Study) -> str:
     match group_assignment(study):
         case "pre-existing":
             return (
-                f"Participants belonged to the groups {named} because of an existing attribute, which was recorded at "
+                f"Participants were assigned to the groups {named} by an existing attribute, which was recorded at "
                 "the start of the session; the groups were not randomised."
             )
         case "randomised":
@@ -126,9 +125,11 @@ def _exclusions(study: Study) -> str:
     parts = [counted(count, noun) for count, noun in out if count]
     sentences = [f"The analysis does not include {listed(parts)}."] if parts else []
     if study.late:
-        sentences.append(f"Some decisions were made after the key was opened: {late_exclusions(study)}.")
+        sentences.append(
+            f"Some decisions about exclusions were made after the key was opened: {late_exclusions(study)}."
+        )
     elif study.revealed and any(exclusion.rule_or_person not in RULES for exclusion in study.exclusions):
-        sentences.append("Exclusions were decided while the key was sealed.")
+        sentences.append("All exclusions were decided while the key was sealed.")
     return " ".join(sentences)
 
 
@@ -164,9 +165,8 @@ def _apparatus(study: Study) -> str:
         study.estimator, f"; its velocity was estimated with the {study.estimator} filter"
     )
     return (
-        f"Participants used {device_words}. "
-        f"A ball with a diameter of {1000 * scene['body']['diameter_m']:g} mm moved {scene['scale']:g} times as far as "
-        f"the hand{velocity}."
+        f"Participants used {device_words}. A virtual ball with a diameter of {1000 * scene['body']['diameter_m']:g} "
+        f"mm moved {scene['scale']:g} times as far as the hand{velocity}."
     )
 
 
@@ -194,7 +194,7 @@ def _parameters(liquid: Mapping[str, Any]) -> str:
     numbers = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
     numbers += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
     if liquid["effects"] == "auto":
-        return ", ".join([*numbers, "effects selected by size"])
+        return ", ".join([*numbers, "effects selected automatically by size"])
     wake = liquid.get("wake") or {}
     of_wake = ", ".join(f"{key} {wake[key]:g}" for key in ("length", "scaling", "exponent") if key in wake)
     of = {"drag": f"drag (law: {liquid['drag']['law']})", "wake": f"wake ({of_wake})"}
@@ -225,8 +225,9 @@ def _presented(study: Study, block: Block, result: BlockResult) -> str:
     liquid = f" in {listed(of)}".replace("_", " ") if of else ""
     asked = counted(len(result.items), "statement")
     return (
-        f"In “{result.title}”, {which}{liquid} {'was' if len(names) == 1 else 'were'} presented"
-        f"{f' {order}' if order and len(names) > 1 else ''}; participants rated {asked} after each."
+        f"In “{result.title}”, {which}{liquid} {'was' if len(names) == 1 else 'were'} "
+        f"presented{f' {order}' if order and len(names) > 1 else ''}; participants rated {asked} after each "
+        "presentation."
     )
 
 
@@ -277,16 +278,16 @@ def _missing_trials(study: Study) -> str:
     if not study.levels or not asked:
         return ""
     if not count:
-        return "All main trials with intervals were presented within the limits for valid trials."
+        return "All main trials with intervals met the limits for valid trials."
     lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
-    return f"{lost} because no presentation was within the limits for valid trials."
+    return f"{lost} because no presentation met the limits for valid trials."
 
 
 def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     quartiles = QUARTILES.replace(" (", ", ").rstrip(")")
     yield (
-        "Statements were rated on seven-point scales and treated as ordinal; answers are summarised by medians and "
-        f"quartiles ({quartiles})."
+        "Statements were rated on seven-point scales. Answers were treated as ordinal and are summarised by medians "
+        f"and quartiles ({quartiles})."
     )
     yield from _means(results, blocks)
     for block in blocks:
@@ -300,7 +301,7 @@ def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) ->
 def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     """Yield sentences on the means shown, and on the tests that use them."""
     if any(Effects.of(block) for block in blocks):
-        yield "Mean differences from the first setting are shown with 95 % confidence intervals (Student's t)."
+        yield "Mean differences from the first condition are shown with 95 % confidence intervals (Student's t)."
     tested = [
         (
             "the hypotheses",
@@ -335,15 +336,15 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
             f"from the first session were used (alpha = {decided.alpha_words()})."
         )
     elif not decided.made:
-        yield f"No decisions were made beforehand, so all results are exploratory (alpha = {decided.alpha:g})."
+        yield f"The analysis was not specified beforehand, so all results are exploratory (alpha = {decided.alpha:g})."
     for finding in all_findings():
         yield from finding.common_methods(blocks)
     if gone := sorted({person for block in blocks for people in block.incomplete.values() for person in people}):
         were = "was" if len(gone) == 1 else "were"
         yield (
-            f"Missing answers were not replaced; {number_text.counted(len(gone), 'participant')} with a missing "
-            f"answer to a statement {were} excluded from that statement's tests over all conditions, and from "
-            "comparisons of two conditions that involve the missing answer."
+            f"Missing answers were not imputed; {number_text.counted(len(gone), 'participant')} with a missing answer "
+            f"to a statement {were} excluded from that statement's tests over all conditions, and from comparisons of "
+            "two conditions that involve the missing answer."
         )
     measured = results.performance
     if measured is not None and measured.recorded:

@@ -119,8 +119,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         yield "These are pilot sessions, so do not report them as results of the study."
     if not decided.made:
         yield (
-            "The protocol does not state decisions about the analysis (the [analysis] table is missing), so "
-            "all results are exploratory."
+            "The protocol does not specify the analysis (the [analysis] table is missing), so all results are "
+            "exploratory."
         )
     elif decided.changed:
         yield (
@@ -145,8 +145,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.late:
         yield (
             "Some decisions were made after the key was opened, when their effect on the results was visible: "
-            f"{late_exclusions(study)}. Compare this report with the report for a copy of the study in which `include` "
-            "or `exclude` reverses these decisions."
+            f"{late_exclusions(study)}. To see their influence, reverse these decisions in a copy of the study "
+            "(`include` or `exclude`) and compare the two reports."
         )
     if study.n == 1:
         yield "There is only one participant, so the results do not generalise to other people."
@@ -423,7 +423,7 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
     if study.left_out:
         were = "was" if study.left_out == 1 else "were"
         gone.append(f"{counted(study.left_out, 'session')} {were} not completed and therefore not analysed")
-    yield bullets(_first(gone)) if gone else paragraph("Nothing is excluded.")
+    yield bullets(_first(gone)) if gone else paragraph("There are no exclusions.")
     yield from _missing(study)
     if study.doubts:
         yield heading(3, "Files that have changed since recording")
@@ -450,7 +450,7 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
         return
     compared = by == "group" and any(contrast.contrast.groups for contrast in results.contrasts)
     tested = (
-        f"Differences between {by}s are tested only in the hypotheses."
+        f"Differences between {by}s are tested only as stated in the hypotheses."
         if compared
         else (f"Differences between {by}s are not tested.")
     )
@@ -593,7 +593,7 @@ def _violated_limits(study: Study, limits: Mapping[str, float]) -> str:
     if not any(broken):
         return ""
     counts = Counter(limit for one in broken for limit in one)
-    listed = ", ".join(f"{_limit(what, limits[what])} in {count}" for what, count in counts.items())
+    listed = ", ".join(f"{_limit(what, limits[what])} ({counted(count, 'trial')})" for what, count in counts.items())
     return f"{sum(map(bool, broken))} of {len(rows)} trials exceeded a limit: {listed}. "
 
 
@@ -628,11 +628,11 @@ def _orders(results: Results) -> Iterator[str]:
 
 def _evenness(counts: Evenness) -> str:
     cells, after = [count for line in counts.positions for count in line], counts.after_another
-    places = f"positions were not balanced; each setting occurred {min(cells)} to {max(cells)} times in each position"
+    places = f"positions were not balanced; each condition occurred {min(cells)} to {max(cells)} times in each position"
     if counts.positions_even:
-        places = f"each setting occurred {counted(cells[0], 'time')} in each position"
+        places = f"each condition occurred {counted(cells[0], 'time')} in each position"
     times = "equally often" if counts.follows_even else f"{min(after)} to {max(after)} times"
-    return f"{places} and followed each other setting {times}."
+    return f"{places} and followed every other condition {times}."
 
 
 def motion(results: Results) -> Iterator[str]:
@@ -717,5 +717,5 @@ def _recordings(measured: Performance) -> str:
     if not measured.invalid:
         return f"{text}. All measured trials met the protocol's timing limits."
     verb = "is" if measured.invalid == 1 else "are"
-    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's timing limits and {verb}"
+    invalid = f"{counted(measured.invalid, 'trial').capitalize()} exceeded the protocol's timing limits but {verb}"
     return f"{text}. {invalid} included."

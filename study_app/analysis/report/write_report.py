@@ -111,8 +111,8 @@ LIBRARIES: Final = ("numpy", "scipy", "pandas", "matplotlib", "pyarrow")
 
 _MOTION: Final = (
     Column("block", "text", "ID of the block."),
-    Column("code", "text", "Code of the setting."),
-    Column("setting", "text", "Name of the setting."),
+    Column("code", "text", "Code of the condition."),
+    Column("setting", "text", "Name of the condition."),
     Column("measure", "text", "Name of the measure, ending with its unit."),
     Column("n", "integer", "Number of participants with a value for the measure.", minimum=0),
     optional("median", "number", "Median across participants."),
@@ -353,7 +353,7 @@ def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
                 for proposal in proposals
             ]
         )
-        yield f"A rule proposes the exclusion of {who}; nobody has decided yet (see “Planned exclusions”)."
+        yield f"A planned rule proposes excluding {who}; no decision has been made yet (see “Planned exclusions”)."
 
 
 def _page(
@@ -458,7 +458,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     if len(hashes) <= _HASHES_SHOWN:
         yield table(("File", "SHA-256"), list(hashes.items()), words=2)
     yield paragraph(
-        f"The numbers come from {counted(len(hashes), 'file')}. The SHA-256 of their hashes and names is "
+        f"The numbers come from {counted(len(hashes), 'file')}. The combined SHA-256 of their hashes and names is "
         f"{together.hexdigest()}. report.json contains the hash of each file and the seed of each session."
     )
     yield paragraph(

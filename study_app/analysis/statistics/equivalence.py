@@ -193,7 +193,7 @@ def is_beyond(outcome: Outcome, bound: float, alpha: float) -> bool:
 def _described(kept: Array, bound: float, alpha: float, largest: float) -> Equivalence:
     """Return the descriptive part of a result, before any test."""
     n = len(kept)
-    people = f"{counted(n, 'participant')}: no spread"
+    people = f"{counted(n, 'participant')}: no variation"
     reason = f"all {n} differences are equal, so an interval cannot be computed" if n > 1 else people
     return Equivalence(
         test="equivalence, two one-sided t tests",

@@ -35,7 +35,7 @@ SAMPLES: Final = 1999
 FEW: Final = 10
 """Below so many participants there is no percentile bootstrap interval and no test of slopes."""
 
-_TOO_FEW: Final = f"no interval below {FEW} participants, because its coverage would be far too low"
+_TOO_FEW: Final = f"no interval for fewer than {FEW} participants, because its coverage would be far too low"
 NO_VARIATION: Final = "no variation: every participant gave the same answer in all conditions"
 
 
@@ -89,7 +89,7 @@ def complete_rows(values: ArrayLike, *, at_least: int, why: str) -> tuple[Array,
     """Return the participants (rows) with answers in all settings (columns), and the number of others."""
     array = checked_values(values, "participants, settings")
     if array.shape[1] < at_least:
-        raise AnalysisError(f"too few settings ({array.shape[1]}): at least {at_least} are needed{why}")
+        raise AnalysisError(f"too few conditions ({array.shape[1]}): at least {at_least} are needed{why}")
     whole = ~np.isnan(array).any(axis=1)
     return array[whole], int((~whole).sum())
 
@@ -193,7 +193,7 @@ def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike
     if np.ptp(samples) == 0.0:
         return None, alike
     low, high = np.quantile(samples, [0.025, 0.975])
-    method = f"percentile bootstrap over participants, {SAMPLES} samples"
+    method = f"percentile bootstrap over participants, {SAMPLES} resamples"
     return Interval(low=float(low), high=float(high), level=0.95, method=method), ""
 
 

@@ -137,20 +137,23 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     if effect is None:
         return None, "no interval: no pair differs"
     if n < _INTERVAL_FROM:
-        return None, f"no interval below {_INTERVAL_FROM} differing pairs, because its coverage would be far too low"
+        return (
+            None,
+            f"no interval for fewer than {_INTERVAL_FROM} differing pairs, because its coverage would be far too low",
+        )
     if abs(effect) == 1.0:
-        return None, f"no interval: all {n} pairs that differ went one way"
+        return None, f"no interval: all {n} differing pairs differ in the same direction"
     deviation = math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
     reach = float(norm.ppf(0.975)) * deviation
     low, high = math.tanh(math.atanh(effect) - reach), math.tanh(math.atanh(effect) + reach)
     return Interval(
-        low=low, high=high, level=0.95, method="Fisher z, approximate: covers about 90 % up to two dozen pairs"
+        low=low, high=high, level=0.95, method="Fisher z (approximate: coverage of about 90 % for up to 24 pairs)"
     ), ""
 
 
 def _note(n: int, different: int, smallest: float | None, effect: float | None, alpha: float) -> str:
     if n == 0:
-        return "no participant answered in both settings"
+        return "no participant answered in both conditions"
     if smallest is None:
         return f"all {n} pairs are equal"
     if smallest > alpha:
@@ -158,7 +161,11 @@ def _note(n: int, different: int, smallest: float | None, effect: float | None, 
             f"cannot reach p ≤ {significant(alpha)}: the smallest possible p with {different} differing pairs is "
             f"{p_value(smallest)}"
         )
-    return f"all {different} pairs that differ went one way" if effect is not None and abs(effect) == 1.0 else ""
+    return (
+        f"all {different} differing pairs differ in the same direction"
+        if effect is not None and abs(effect) == 1.0
+        else ""
+    )
 
 
 WORK: Final = 1_500_000
@@ -168,7 +175,7 @@ DRAWN_UP_TO: Final = 200
 """Beyond so many participants the chi-square p is used: nearer to the exact one, far from 0.5, than a drawn p, which
 cannot fall below 1 / (1 + draws)."""
 
-_APPROXIMATE: Final = f"chi-square approximation, corrected for ties, as always above {DRAWN_UP_TO} participants"
+_APPROXIMATE: Final = f"chi-square approximation, corrected for ties (always used above {DRAWN_UP_TO} participants)"
 
 _TABLED: Final = 7
 """Up to so many settings all their orders fit into a table."""
@@ -349,7 +356,7 @@ def global_permutation(values: ArrayLike, *, draws: int = DRAWS, seed: int = 1) 
     array = checked_values(values, "items, participants, settings")
     k = array.shape[2]
     if k < 2:
-        raise AnalysisError(f"too few settings ({k}): at least 2 are needed for a comparison")
+        raise AnalysisError(f"too few conditions ({k}): at least 2 are needed for a comparison")
     whole = np.asarray(~np.isnan(array).any(axis=2))
     used = whole.any(axis=0)
     array, whole = array[:, used], whole[:, used]

@@ -144,8 +144,8 @@ def _names(names: ArrayLike, truth: Sequence[int | None], labels: int) -> Whole:
     given = checked_values(names, "participants, settings")
     if given.shape[1] != len(truth) or not 2 <= len(truth) <= MOST:
         raise AnalysisError(
-            f"names were given to {given.shape[1]} settings, but there are {len(truth)} true names; specify the same "
-            f"number of each, from 2 to {MOST}"
+            f"names were given to {given.shape[1]} conditions, but there are {len(truth)} true names; specify the "
+            f"same number of each, from 2 to {MOST}"
         )
     if not np.isin(given, _columns(labels)).all() or not {*truth} <= {None, *range(labels)}:
         raise AnalysisError(
@@ -202,8 +202,8 @@ def _kappa(given: Whole, right: Whole, labels: int, seed: int | None) -> tuple[f
         for shares, end in ((lowest, 0.025), (highest, 0.975))
     )
     method = (
-        "bootstrap over participants with one additional participant who is always incorrect (lower end) or always "
-        "correct (upper end) (Gaffke 2005)"
+        "bootstrap over participants and one additional participant, who is always incorrect (lower end) or always "
+        "correct (upper end; Gaffke 2005)"
     )
     return whole, Interval(low=low, high=high, level=0.95, method=method), ""
 

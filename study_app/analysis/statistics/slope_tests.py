@@ -67,7 +67,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     covariance = np.atleast_2d(np.cov(own, rowvar=False)) if n > 1 else np.zeros((several, several))
     fewest = max(FEW, several + 1)
     if n < fewest or np.linalg.matrix_rank(covariance, tol=1e-12) < several:
-        few = f"no test of means below {fewest} participants, because it would rely on normally distributed slopes"
+        few = f"no test of means for fewer than {fewest} participants, because it relies on normally distributed slopes"
         note = few if n < fewest else _NO_SPREAD
         note = NO_VARIATION if n and not np.ptp(rows, axis=1).any() else note
         return replace(test, no_interval=note, note=note)
@@ -93,7 +93,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         interval=intervals[0] if several == 1 else None,
         no_interval=""
         if several == 1
-        else "there is no single effect size, because there is one difference per setting",
+        else "there is no single effect size, because there is one difference per condition",
         slopes=tuple(means.tolist()),
         intervals=intervals,
         sds=tuple(np.sqrt(np.diag(covariance)).tolist()),
@@ -101,7 +101,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     )
 
 
-_NO_SPREAD: Final = "no spread: some differences between settings are the same for every participant"
+_NO_SPREAD: Final = "no spread: some differences between conditions are the same for all participants"
 
 
 def _design(settings: int, columns: ArrayLike | None) -> Array:
@@ -111,7 +111,7 @@ def _design(settings: int, columns: ArrayLike | None) -> Array:
     centred = design - design.mean(axis=0) if len(design) else design
     if len(design) != settings or np.isnan(design).any() or np.linalg.matrix_rank(centred) < design.shape[1]:
         raise AnalysisError(
-            f"columns of shape {design.shape} do not distinguish {settings} settings; specify one row a setting, "
-            "without NaN, and columns of which none follows from the others"
+            f"columns of shape {design.shape} do not distinguish {settings} conditions; specify one row per "
+            "condition, without NaN, and linearly independent columns"
         )
     return design

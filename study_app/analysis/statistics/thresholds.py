@@ -126,7 +126,7 @@ def noticed(values: ArrayLike, levels: Sequence[float]) -> Threshold:
         n=int(used.sum()),
         dropped=int((~used).sum()),
         statistic_name="deviance",
-        method="posterior median of a logistic function of level",
+        method="posterior median of a logistic function of the level",
         effect_name="detection threshold",
         note=note,
         levels=tuple(order.tolist()),
@@ -141,7 +141,9 @@ def _impossible(levels: Array, yes: Array, asked: Array) -> str:
     if len(levels) < 3:
         return "there were answers at fewer than three levels"
     if not yes.any():
-        return f"no participant noticed anything up to {levels.max():g}, so the threshold is higher or does not exist"
+        return (
+            f"no participant noticed anything at up to {levels.max():g}, so the threshold is higher or does not exist"
+        )
     return "all participants noticed something at every level" if (yes == asked).all() else ""
 
 
@@ -240,7 +242,7 @@ def _remarks(levels: Array, lower: float | None, upper: float | None, people: in
 
 
 def _open(lower: float | None, upper: float | None) -> str:
-    end = "either end" if lower is None and upper is None else "its lower end" if lower is None else "its upper end"
+    end = "either end" if lower is None and upper is None else "the lower end" if lower is None else "the upper end"
     return f"no interval: the answers do not determine {end}"
 
 

@@ -76,7 +76,7 @@ def test_the_folder_has_all_that_is_needed_to_run_the_study_again(kitchen: Path,
     assert "Which views were distinguished?" in report
     assert "Do the views differ, statement by statement?" in report
     assert "Thin, waves.mp4" in report
-    assert "Missing" not in (folder / "README.md").read_text(encoding="utf-8")
+    assert "missing from" not in (folder / "README.md").read_text(encoding="utf-8")
     assert "questionnaires" in json.loads((folder / "materials" / "protocol.json").read_bytes())
     assert (folder / "results" / "report.html").is_file()
     assert not [path for path in (folder / "results").iterdir() if path.name.endswith("_data.csv")]
@@ -94,7 +94,7 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
     footage = tmp_path / "protocols" / "waves.mp4"
     for change, why in (
         (lambda: footage.write_bytes(b"other waves"), "the file with this name has a different SHA-256"),
-        (footage.unlink, "cannot be read: No such file or directory"),
+        (footage.unlink, "it cannot be read: No such file or directory"),
     ):
         change()
         export(kitchen, tmp_path / "out", extras=["psych-ds"])
@@ -102,7 +102,7 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
         assert (folder / "materials" / "kitchen.toml").is_file()
         assert not (folder / "materials" / "waves.mp4").exists()
         readme = (folder / "README.md").read_text(encoding="utf-8")
-        assert f"Missing in `materials`: waves.mp4 (SHA-256 {digest}; {why}). Add them." in readme
+        assert f"Add the files that are missing from `materials`: waves.mp4 (SHA-256 {digest}; {why})." in readme
 
 
 def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) -> None:

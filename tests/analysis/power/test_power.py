@@ -189,14 +189,14 @@ def test_a_block_of_some_groups_counts_their_participants() -> None:
     assert {block.id: block.groups for block in study_plan.blocks} == {"thin": (), "thick": ("b",)}
     studies, counts = swept(study_plan)
     found = powers(study_plan, SIZES, studies, studies, 1, counts)
-    words = "n is the number of participants in b, because other groups do not have this block."
+    words = "n is the number of participants in b, because other groups do not complete this block."
     assert power_markdown(found).count(words) == 1
 
 
 def test_a_protocol_that_compares_nothing_is_refused() -> None:
     protocol = load("demo")
     alone = {name: block.model_copy(update={"questionnaire": None}) for name, block in protocol.blocks.items()}
-    with pytest.raises(AnalysisError, match="does not compare anything"):
+    with pytest.raises(AnalysisError, match="does not make any comparison"):
         plan(protocol.model_copy(update={"blocks": alone}), felt_in(protocol))
 
 

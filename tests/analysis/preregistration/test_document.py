@@ -18,7 +18,7 @@ HEADS = (
     "Exclusions",
     "Analysis",
     "The protocol in words",
-    "Values that the report compares with",
+    "Values that the report checks",
 )
 
 
@@ -68,7 +68,7 @@ def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() ->
     more = FIVE_POINTS + '\n[blocks.rate]\ntask = "stir"\nstimulus = "value"\ndesign = "rated"\nmethod = "few"\n'
     edits = [('sequence = ["viscosity"]', 'sequence = ["viscosity", "rate"]'), ("[0.2, 0.4, 0.8]", "[0.5, 0.6, 0.8]")]
     text = preregistration(study(*edits, ("part = 1\n", ""), ('code_prefix = "V"\n', ""), more=more), "0" * 64)
-    assert "- Block rate: we report d_a for each level relative to the lowest, calculated from the area" in text
+    assert "- Block rate: we report d_a for each level relative to the lowest level, calculated from" in text
     assert "Block viscosity: d_a" not in text
     assert "at d_a = 1: ±" in text
 

@@ -50,7 +50,7 @@ def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
     for device in ("mouse", "falcon:12", "answers-only"):
         told = methods(replace(study, participants=study.participants.assign(device=device)), results)
         said[device] = told.partition("Participants used a ")[2].partition(
-            " A ball with a diameter of 68 mm moved 10 times"
+            " A virtual ball with a diameter of 68 mm moved 10 times"
         )[0]
     assert said == {
         "mouse": "device without force (mouse).",
@@ -76,12 +76,12 @@ def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_sta
     report(small.folder, tmp_path / "report")
     told = " ".join((tmp_path / "report" / "methods.txt").read_text("utf-8").split())
     assert (
-        "from 2 different files); 1 participant lacks at least one condition because individual trials were excluded. "
-        "The analysis does not include 1 excluded session and two excluded trials." in told
+        "from 2 different files); at least one condition is missing for 1 participant, because individual trials were "
+        "excluded. The analysis does not include 1 excluded session and two excluded trials." in told
     )
     assert (
-        f"Some decisions were made after the key was opened: 1 of {len(gone) + 1} exclusions and the reversal of "
-        "1 exclusion."
+        f"Some decisions about exclusions were made after the key was opened: 1 of {len(gone) + 1} exclusions "
+        "and the reversal of 1 exclusion."
     ) in told
     rows = json.loads((tmp_path / "report" / "report.json").read_text("utf-8"))["exclusions"]
     assert [row["participant"] for row in rows if row["after_unblinding"]] == ["B"]
@@ -148,7 +148,7 @@ def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp
     assert group_counts(load_study(study)) == {"first_thick": 2, "first_thin": 3}, "dealt in turn"
     report(study, tmp_path / "sealed")
     methods = (tmp_path / "sealed" / "methods.txt").read_text("utf-8")
-    assert "to the groups first_thin (n = 3) and first_thick (n = 2) because of an existing attribute" in methods
+    assert "to the groups first_thin (n = 3) and first_thick (n = 2) by an existing attribute" in methods
     assert "groups were not randomised" in methods
     assert "The groups were not randomised, so a difference may have other causes" in (
         tmp_path / "sealed" / "report.html"

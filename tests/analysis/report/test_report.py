@@ -29,7 +29,7 @@ def test_every_answer_stands_beside_its_figure_and_the_page_is_small(of_twelve: 
     assert [re.search(r"<h2>(.*?) <span", card)[1].partition(": ")[2] for card in cards] == [  # type: ignore[index]
         "Which liquids were distinguished?",
         "At what delay do participants begin to notice a difference?",
-        "Up to what delay do answers not change by a relevant amount?",
+        "Up to what delay do answers remain practically unchanged?",
     ]
     for card in cards:
         drawing = card[card.index("<svg") :]
@@ -83,7 +83,7 @@ def test_the_exclusions_and_what_was_not_completed_are_listed(rek: Results, tmp_
     told = read(tmp_path / "report")
     assert "participant P001, session 1: fell <asleep> & left" in told
     assert "participant P002, session 1, trial 2: the phone rang" in told
-    assert "1 session not completed" in told
+    assert "1 session was not completed and therefore not analysed" in told
     assert numbers(tmp_path / "report")["study"]["participants"] == 5
 
 

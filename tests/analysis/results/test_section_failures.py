@@ -17,7 +17,7 @@ from tests.analysis.conftest import Results, make_results, twelve
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 TESTS = {
-    "findings.statement_tests.friedman": ("liquids", "test of differences between settings"),
+    "findings.statement_tests.friedman": ("liquids", "test of differences between conditions"),
     "findings.statement_tests.global_permutation": ("liquids", "test over all statements"),
     "findings.recognition.recognition": ("liquids", "recognition test"),
     "findings.statement_tests.slope_tests": ("liquids", "test of means"),
@@ -87,7 +87,7 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
         "Do answers change with the delay?",
         "Lowest delay",
         "How the study was run",
-        "Not there: its computation failed",
+        "Not available: its computation failed",
     ):
         assert title in page
     names = {path.name for path in to.iterdir()}

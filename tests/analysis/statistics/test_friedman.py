@@ -59,7 +59,7 @@ def test_seven_settings_are_drawn_and_many_people_approximated() -> None:
     assert seven.smallest_p == 1 / 10000
     for k in (3, 7):
         many = friedman(rng.integers(1, 8, (300, k)), draws=499)
-        assert many.method == "chi-square approximation, corrected for ties, as always above 200 participants"
+        assert many.method == "chi-square approximation, corrected for ties (always used above 200 participants)"
         assert (many.p, many.smallest_p) == (many.p_chi2, None)
 
 

@@ -200,7 +200,7 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
     less = performance(load_study(folder))
     assert (less.trials, less.recorded) == (7, 4)
     assert less.unread == (
-        "1 × the recording is not in the folder",
+        "1 × the recording is missing from the folder",
         "1 × the recording is damaged (liquid-study verify shows which one)",
         "1 × the recording is sealed (liquid-study unblind opens it)",
     )

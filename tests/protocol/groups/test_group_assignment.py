@@ -87,7 +87,7 @@ def test_the_preregistration_says_how_groups_are_formed() -> None:
     assert randomised in preregistration(experts(), "0" * 64)
     text = preregistration(experts(PREEXISTING), "0" * 64)
     assert "permuted blocks" not in text
-    assert "belong to the groups experts and novices because of an existing attribute" in text
+    assert "assigned to the groups experts and novices by an existing attribute" in text
     assert "groups are not randomised" in text
     assert "The order of blocks is balanced: 2 orders, assigned by the position in the group" in text
 

@@ -82,7 +82,7 @@ pair <- function(what, d, row) {
   same(paste(what, "p"), row$p, signed_ranks_p(d))
 }
 equivalent <- function(what, d, row) {
-  bound <- number(sub(".*bound ±([0-9.e-]+) .*", "\\1", row$method))
+  bound <- number(sub(".*bounds ±([0-9.e-]+) .*", "\\1", row$method))
   if (is.na(bound) || !startsWith(row$method, "t(")) return(invisible())
   p <- c(t.test(d, mu = -bound, alternative = "greater")$p.value, t.test(d, mu = bound, alternative = "less")$p.value)
   same(paste(what, "equivalence p"), row$p, max(p))

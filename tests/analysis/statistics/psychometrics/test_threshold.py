@@ -83,7 +83,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
 @pytest.mark.parametrize(
     ("yes", "note"),
     [
-        ([0] * 7, "no participant noticed anything up to 300"),
+        ([0] * 7, "no participant noticed anything at up to 300"),
         ([5] * 7, "all participants noticed something at every level"),
         ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the presented levels"),
     ],
