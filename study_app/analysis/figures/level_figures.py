@@ -164,7 +164,7 @@ def _bands(study: Study, result: LevelsResult, tracked: _Tracked) -> Mapping[str
 
 
 def _panels(result: LevelsResult, banded: bool) -> str:
-    band = " with 95 % bands" if banded else ""
+    band = " and 95 % bands" if banded else ""
     crosses = "; crosses: catch trials" if any(answer.catch for answer in Answers.of(result)) else ""
     if Thresholds.own(result):
         return (
