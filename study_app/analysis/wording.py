@@ -34,6 +34,11 @@ def counted(number: int, noun: str) -> str:
     return f"{text} {noun}" + ("" if number == 1 else "s")
 
 
+def bound_text(bound: float) -> str:
+    """Return "±1 point", "±0.5 points"."""
+    return f"±{bound:g} {'point' if bound == 1 else 'points'}"
+
+
 def all_of(number: int, noun: str) -> str:
     """Return "all three statements", "both statements", "the one statement"."""
     if number < 3:

@@ -39,7 +39,7 @@ from study_app.analysis.statistics.equivalence import Equivalence, fewest_partic
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
-from study_app.analysis.wording import all_of, counted, interval, listed, ms, number, p_value, percent
+from study_app.analysis.wording import all_of, bound_text, counted, interval, listed, ms, number, p_value, percent
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     """Yield sentences on how the comparisons with the shortest delay were made, and on their limits."""
     first = against[0].found
     yield (
-        f"Each comparison uses two one-sided t tests with equivalence bounds of {_points(first.bound)}, and a "
+        f"Each comparison uses two one-sided t tests with equivalence bounds of {bound_text(first.bound)}, and a "
         f"{percent(1 - 2 * first.alpha)} confidence interval. Equivalent: both the t tests and the bootstrap show "
         "that the mean difference lies within the bounds, and the study has "
         f"{min_sample_reason(first.alpha, first.bound)}. Not equivalent: the whole confidence interval lies outside "
@@ -244,7 +244,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             beforehand = " (stated before the first session)" if self.results.decided.binding else ""
             yield (
                 f"Each delay was compared with {ms(self.value[0].control_ms)} using two one-sided t tests on paired "
-                f"differences, with equivalence bounds of {_points(first.bound)}{beforehand} and "
+                f"differences, with equivalence bounds of {bound_text(first.bound)}{beforehand} and "
                 f"{percent(1 - 2 * first.alpha)} confidence intervals. A delay was classified as equivalent only if a "
                 "bootstrap that adds a participant as extreme as the most extreme one (Gaffke 2005) also showed "
                 f"equivalence, and only with {min_sample(first.alpha, first.bound)}. It was classified as not "
@@ -577,12 +577,8 @@ def _not_excluded(tested: Sequence[Equivalence]) -> str:
     return f"the data do not rule out that up to {100 * most:.0f} % of people differ by more"
 
 
-def _points(bound: float) -> str:
-    return f"±{bound:g} {'point' if bound == 1 else 'points'}"
-
-
 def _within(against: ContrastWithControl) -> str:
-    return f"within {_points(against.found.bound)} of those at {ms(against.control_ms)}"
+    return f"within {bound_text(against.found.bound)} of those at {ms(against.control_ms)}"
 
 
 _MEASURES: Final = ("Movement time, s", "Path, mm", "Overshoot, mm", "Submovements")

@@ -38,7 +38,7 @@ from study_app.analysis.planning.simulated_studies import (
 )
 from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
-from study_app.analysis.wording import listed
+from study_app.analysis.wording import bound_text, listed
 from study_app.protocol.model import Contrast
 from study_app.protocol.raters import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
@@ -660,7 +660,7 @@ def _explained(question: Question, found: Powers) -> list[str]:
         case "equivalence":
             bound = found.plan.decided.equivalence_bound or STEPS
             return [
-                f"Equivalence is tested with two one-sided t tests (bounds ±{bound} points) and a bootstrap; both "
+                f"Equivalence is tested with two one-sided t tests (bounds {bound_text(bound)}) and a bootstrap; both "
                 f"must show equivalence. It also requires {min_sample_reason(found.plan.decided.alphas[-1], bound)}. "
                 "If the model's difference is near or outside the bounds, few studies should find equivalence; "
                 "outside the bounds, such a finding is wrong."

@@ -20,7 +20,7 @@ from study_app.analysis.results import min_sample
 from study_app.analysis.statistics.equivalence import fewest_participants
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
-from study_app.analysis.wording import counted, listed, percent, significant
+from study_app.analysis.wording import bound_text, counted, listed, percent, significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.describe import describe, limit_rows
@@ -177,7 +177,7 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
         if decided.equivalence_bound is not None:
             yield (
                 f"Block {block.id}: which delays are equivalent to the shortest one, within "
-                f"±{decided.equivalence_bound:g} {'point' if decided.equivalence_bound == 1 else 'points'}?"
+                f"{bound_text(decided.equivalence_bound)}?"
             )
         return
     primary = [name for name in texts if not decided.primary or name in decided.primary]

@@ -197,7 +197,7 @@ def _parameters(liquid: Mapping[str, Any]) -> str:
         return ", ".join([*numbers, "effects selected automatically by size"])
     wake = liquid.get("wake") or {}
     of_wake = ", ".join(f"{key} {wake[key]:g}" for key in ("length", "scaling", "exponent") if key in wake)
-    of = {"drag": f"drag (law: {liquid['drag']['law']})", "wake": f"wake ({of_wake})"}
+    of = {"drag": f"drag law: {liquid['drag']['law']}", "wake": f"wake ({of_wake})"}
     return ", ".join([*numbers, *(of.get(effect, effect.replace("_", " ")) for effect in liquid["effects"])])
 
 

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, resamples_for
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked_values, clopper_pearson
+from study_app.analysis.wording import bound_text
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
 
@@ -150,7 +151,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             equivalence,
             statistic=min(t_lower, -t_upper),
             p=max(p_lower, p_upper),
-            method=f"t({equivalence.n - 1}), bounds ±{bound:g} points",
+            method=f"t({equivalence.n - 1}), bounds {bound_text(bound)}",
             interval=Interval(low=float(low[0]), high=float(high[0]), level=level, method="t"),
             no_interval="",
             t_lower=t_lower,
@@ -159,7 +160,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             p_upper=p_upper,
         )
     else:
-        equivalence = replace(equivalence, method=f"bootstrap, bounds ±{bound:g} points; all differences are equal")
+        equivalence = replace(equivalence, method=f"bootstrap, bounds {bound_text(bound)}; all differences are equal")
     by_tests = max(p_lower, p_upper, by_bootstrap) <= alpha
     beyond = is_beyond(equivalence, bound, alpha)
     if equivalence.interval is not None:
