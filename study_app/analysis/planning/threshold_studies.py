@@ -237,7 +237,7 @@ COLUMNS: Final = (
         "spread",
         "number",
         "Standard deviation of the logarithm of one participant's threshold (median across the studies); for d′, d_a "
-        "and exponents, relative to their value; empty if limits clip the levels.",
+        "and exponents, the standard deviation relative to their value; empty if limits clip the levels.",
         minimum=0,
     ),
     optional(

@@ -310,5 +310,5 @@ def _known(ps: Sequence[float | None]) -> dict[int, float]:
     known = {member: p for member, p in enumerate(ps) if p is not None}
     for p in known.values():
         if not 0.0 <= p <= 1.0:
-            raise AnalysisError(f"p = {p} cannot be adjusted; specify a p between 0 and 1, or None if a test gave none")
+            raise AnalysisError(f"p = {p} cannot be adjusted; specify a p value from 0 to 1, or None if there is none")
     return known

@@ -142,7 +142,8 @@ def _impossible(levels: Array, yes: Array, asked: Array) -> str:
         return "there were answers at fewer than three levels"
     if not yes.any():
         return (
-            f"no participant noticed anything at up to {levels.max():g}, so the threshold is higher or does not exist"
+            f"no participant noticed anything at levels up to {levels.max():g}, so the threshold is higher or does not "
+            "exist"
         )
     return "all participants noticed something at every level" if (yes == asked).all() else ""
 

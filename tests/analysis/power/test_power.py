@@ -196,7 +196,7 @@ def test_a_block_of_some_groups_counts_their_participants() -> None:
 def test_a_protocol_that_compares_nothing_is_refused() -> None:
     protocol = load("demo")
     alone = {name: block.model_copy(update={"questionnaire": None}) for name, block in protocol.blocks.items()}
-    with pytest.raises(AnalysisError, match="does not make any comparison"):
+    with pytest.raises(AnalysisError, match="does not contain any comparison"):
         plan(protocol.model_copy(update={"blocks": alone}), felt_in(protocol))
 
 

@@ -55,7 +55,7 @@ def test_the_effect_is_the_mean_rank_correlation() -> None:
     result = trend(SIEGEL)
     assert result.effect == pytest.approx(np.mean([spearmanr(row, range(6)).statistic for row in SIEGEL]))
     assert result.interval is None
-    assert "below 10 participants" in result.no_interval
+    assert "fewer than 10 participants" in result.no_interval
     assert trend([[1, 2, 3]] * 12).no_interval == "no interval: all participants have the same correlation"
 
 

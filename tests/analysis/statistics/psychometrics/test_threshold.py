@@ -83,7 +83,7 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
 @pytest.mark.parametrize(
     ("yes", "note"),
     [
-        ([0] * 7, "no participant noticed anything at up to 300"),
+        ([0] * 7, "no participant noticed anything at levels up to 300"),
         ([5] * 7, "all participants noticed something at every level"),
         ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the presented levels"),
     ],
@@ -107,7 +107,7 @@ def test_an_open_interval_says_which_end_is_open() -> None:
     assert result.interval is None
     assert result.lower is not None
     assert result.upper is None
-    assert result.no_interval == "no interval: the answers do not determine its upper end"
+    assert result.no_interval == "no interval: the answers do not determine the upper end"
     far = noticed(pooled([0, 0, 0, 0, 1, 2, 8], 20), DELAYS)
     assert far.upper is not None
     assert far.upper > 300
