@@ -78,7 +78,7 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     assert "Hypothesis, block delays: agreement with" in text
     assert "(comfortable) decreases with the delay." in text
     assert "within ±1 point?" in text
-    assert "above chance (water by like_water, honey by like_honey and light_oil by like_oil)?" in text
+    assert "above chance (statements: “like_water” for water, “like_honey” for honey and “like_oil” for" in text
     assert "Alpha is 0.05. The p values of primary statements (all) are Holm-adjusted" in text
     assert "exploratory tests of means require at least 10 participants." in text
     assert "The number of participants has not been decided, and there is no stopping rule." in text
