@@ -40,7 +40,7 @@ from study_app.analysis.statistics.mean_tests import SAME, Means, means_of, p_di
 from study_app.analysis.statistics.outcome import SIDES, Array, Interval, clopper_pearson, holm
 from study_app.analysis.statistics.thresholds import random_effects_weights
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value, significant
-from study_app.protocol.model import Contrast
+from study_app.protocol.model import Contrast, quoted_title
 
 _STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
     "threshold": (Thresholds, "threshold"),
@@ -384,16 +384,42 @@ def _tested(
         standardised=standardised.effect,
         ordinal=standardised.ordinal,
         bayes_factor=standardised.bayes_factor,
+        within_names=_within_names(study, contrast),
+        measure_name=_measure_name(study, contrast),
     )
 
 
 def _side_names(study: Study, contrast: Contrast) -> tuple[str, str]:
     """Return the names of the two sides: block titles, unless these are the same."""
-    titles = {block.id: block.title for block in study.levels} | {block.id: block.title for block in study.blocks}
-    first, second = (titles.get(block, block) for block in (*contrast.blocks, *contrast.blocks)[:2])
+    first, second = _block_titles(study, contrast)
     if first != second and contrast.groups is None:
         return first, second
     return contrast.words({block.id: block.stimulus.condition for block in study.levels if block.stimulus})
+
+
+def _block_titles(study: Study, contrast: Contrast) -> tuple[str, str]:
+    """Return the titles of the first and the last block of a contrast."""
+    titles = {block.id: block.title for block in study.levels} | {block.id: block.title for block in study.blocks}
+    first, last = (titles.get(block, block) for block in (contrast.blocks[0], contrast.blocks[-1]))
+    return first, last
+
+
+def _within_names(study: Study, contrast: Contrast) -> tuple[str, str] | None:
+    """Return the names of the blocks of an interaction; None for conditions, which have no titles."""
+    if not contrast.is_interaction or contrast.conditions is not None:
+        return None
+    return _block_titles(study, contrast)
+
+
+def _measure_name(study: Study, contrast: Contrast) -> str:
+    """Return the measure with the short text of its statement or question; "" if it has none."""
+    if contrast.form is not None:
+        asked = (one for one in study.others.questions if (one.where.id, one.id) == (contrast.form, contrast.measure))
+        question = next(asked, None)
+        return "" if question is None else f"“{question.short}” ({question.where.title})"
+    items = (item for block in study.blocks if block.id in contrast.blocks for item in block.items)
+    item = next((item for item in items if item.id == contrast.measure), None)
+    return "" if item is None else f"agreement with “{item.short}”"
 
 
 def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
@@ -415,7 +441,7 @@ def _not_excluded(contrast: Contrast, compared: Compared, *, ratio: bool) -> flo
 
 def question(contrast: ContrastResult) -> str:
     """Return the hypothesis in words."""
-    words = contrast.contrast.described(contrast.compared)
+    words = contrast.hypothesis
     return f"{words[:1].upper()}{words[1:]}"
 
 
@@ -454,8 +480,8 @@ def _lies_beyond(contrast: ContrastResult, bound: float) -> bool:
 
 
 def _difference_words(contrast: ContrastResult) -> str:
-    first, second = contrast.compared
-    what, expected = number_text.capitalised(contrast.contrast.effect_words), contrast.contrast.expected
+    first, second = map(quoted_title, contrast.compared)
+    what, expected = number_text.capitalised(contrast.effect_words), contrast.contrast.expected
     if contrast.verdict in FOUND:
         side = "higher" if (contrast.effect or 0.0) > (1.0 if contrast.ratio else 0.0) else "lower"
         said = f"{what} was {side} in {first} than in {second}"
@@ -508,7 +534,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
         test = t_test_name(contrast.contrast, ratio=contrast.ratio)
         sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
         label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
-        yield f"{label} ({contrast.contrast.described(contrast.compared)}) was tested with a {sides} {test}."
+        yield f"{label} ({contrast.hypothesis}) was tested with a {sides} {test}."
     if any(contrast.contrast.groups for contrast in contrasts):
         yield "Comparisons between groups used the degrees of freedom of the smaller group (Hsu 1938)."
     holm_words = f", Holm-adjusted across {len(contrasts)} hypotheses"

@@ -147,16 +147,23 @@ class Sheet:
         self.figure.add_artist(line)
 
     def heading(self, title: str, marks: Sequence[Mark], counts: Sequence[str]) -> None:
-        """Draw the title, the marks next to it and, at the right, the first of ``counts`` that fits."""
-        baseline, x = 15.0, MARGIN_PT
+        """Draw the title, the marks next to it and, at the right, the first of ``counts`` that fits.
+
+        A title that leaves no room for the marks and the last count is cut.
+        """
+        baseline, x, right = 15.0, MARGIN_PT, self.width_pt - MARGIN_PT
+        widths = [self.text_width(mark.words, SMALL, "bold") + 11 for mark in marks]
+        room = right - x - 18 - sum(widths) - 5 * len(widths) - self.text_width(counts[-1], 7.5)
+        whole = title
+        while title and self.text_width(title, 10, "bold") > room:
+            whole = whole[:-1]
+            title = f"{whole.rstrip()}…" if whole else ""
         self.text(x, baseline, title, size=10, weight="bold")
         x += self.text_width(title, 10, "bold") + 8
-        for mark in marks:
-            width = self.text_width(mark.words, SMALL, "bold") + 11
+        for mark, width in zip(marks, widths, strict=True):
             self.box(x, baseline - 9.6, width, 13.2, mark.ground, rounding=4)
             self.text(x + 5.5, baseline - 0.6, mark.words, size=SMALL, weight="bold", colour=mark.ink)
             x += width + 5
-        right = self.width_pt - MARGIN_PT
         fitting = [words for words in counts if x + 10 + self.text_width(words, 7.5) <= right]
         words = fitting[0] if fitting else counts[-1]
         self.text(right, baseline, words, size=7.5, colour=style.TEXT_SOFT, ha="right")

@@ -276,7 +276,8 @@ class ContrastResult(Outcome):
     None without a bound. ``not_excluded`` is then the upper limit of the 95 % interval of the share of participants
     that differ by more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the
     differences within participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a
-    statement, and ``bayes_factor`` the ratio of the likelihoods with and without a difference.
+    statement, and ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the
+    names of the blocks or conditions of an interaction, ``measure_name`` is the measure in words.
     """
 
     contrast: Contrast
@@ -297,6 +298,18 @@ class ContrastResult(Outcome):
     standardised: EffectSize | None = None
     ordinal: EffectSize | None = None
     bayes_factor: float | None = None
+    within_names: tuple[str, str] | None = None
+    measure_name: str = ""
+
+    @property
+    def effect_words(self) -> str:
+        """What the two sides are compared in, with the titles that participants or operators see."""
+        return self.contrast.effect_words(self.within_names, self.measure_name)
+
+    @property
+    def hypothesis(self) -> str:
+        """The hypothesis as a sentence."""
+        return self.contrast.described(self.compared, self.within_names, self.measure_name)
 
     @property
     def largest_p(self) -> float | None:

@@ -446,13 +446,17 @@ class Contrast(Table):
             words.get(self.measure, self.measure) if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
         )
 
-    @property
-    def effect_words(self) -> str:
-        """What the two sides are compared in: the measure, or in an interaction the difference within participants."""
+    def effect_words(self, within: tuple[str, str] | None = None, measure: str = "") -> str:
+        """Return what the two sides are compared in: the measure, or in an interaction the difference in it.
+
+        ``within`` are the names of what differs within participants, ``measure`` the measure in words; by default ids.
+        """
+        measure = measure or self.measure_words
         if self.groups is None or self.within is None:
-            return self.measure_words
+            return measure
         where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
-        return f"the difference in {self.measure_words} between {self.within[0]} and {self.within[1]}{where}"
+        first, second = map(quoted_title, within or self.within)
+        return f"the difference in {measure} between {first} and {second}{where}"
 
     def words(self, conditions: Mapping[str, str | None]) -> tuple[str, str]:
         """Return the labels of the two sides; blocks get the conditions of their stimuli if these differ."""
@@ -462,14 +466,21 @@ class Contrast(Table):
         of = [conditions.get(block) for block in self.blocks]
         return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
 
-    def described(self, names: tuple[str, str] | None = None) -> str:
-        """Return a sentence with the hypothesis; ``names`` are the names of the two sides, by default their ids."""
-        first, second = names or self.compared
+    def described(
+        self, names: tuple[str, str] | None = None, within: tuple[str, str] | None = None, measure: str = ""
+    ) -> str:
+        """Return a sentence with the hypothesis; ``names`` are those of the two sides, others as in `effect_words`."""
+        first, second = map(quoted_title, names or self.compared)
         where = "" if len(self.blocks) == 2 or self.is_interaction else f" in block {self.blocks[0]}"
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
         near = "" if self.bound is None else f"; equivalent within {self.bound:g}"
-        return f"{self.effect_words} {moves} {first} {joint} {second}{where}{near}"
+        return f"{self.effect_words(within, measure)} {moves} {first} {joint} {second}{where}{near}"
+
+
+def quoted_title(name: str) -> str:
+    """Return a title of several words in quotation marks, so that a sentence can contain it."""
+    return f"“{name}”" if " " in name and not name.endswith(")") else name
 
 
 BELOW_CHANCE_P: Final = 0.001

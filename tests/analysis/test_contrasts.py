@@ -195,8 +195,9 @@ def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
     other = Contrast(measure=ITEMS[1], blocks=("b",), conditions=("c3", "c1"), expected="higher")
     made = replace(statements(contrast), contrasts=(contrast, other))
     told = methods(made, evaluate(made))
-    assert f"Hypothesis 1 ({contrast.described()}) was tested with a two-sided paired t test." in told
-    assert f"Hypothesis 2 ({other.described()}) was tested with a one-sided paired t test." in told
+    for place, (stated, item, sides) in enumerate([(contrast, ITEMS[0], "two"), (other, ITEMS[1], "one")], start=1):
+        words = stated.described(measure=f"agreement with “{item.capitalize()}”")
+        assert f"Hypothesis {place} ({words}) was tested with a {sides}-sided paired t test." in told
     assert "The reported p value is the largest of the three, Holm-adjusted across 2 hypotheses." in told
     assert "Equivalence was tested with two one-sided t tests" in told
     assert "Means were tested in the hypotheses" in told
@@ -270,6 +271,15 @@ def test_two_groups_are_compared_with_unequal_variances() -> None:
     assert found.effect == pytest.approx(one.mean() - two.mean())
 
 
+def test_a_hypothesis_names_titles_of_several_words_in_quotation_marks() -> None:
+    interaction = Contrast(measure="d_prime", blocks=("prompt", "late"), groups=("novice", "expert"))
+    difference = "the difference in sensitivity (d′) between “No delay” and “80 ms late”"
+    assert interaction.described(within=("No delay", "80 ms late")) == f"{difference} differs between novice and expert"
+    paired = Contrast(measure="sure", form="after", blocks=("prompt", "late"), expected="higher")
+    words = paired.described(("No delay", "Late"), measure="“Sure” (Your impression)")
+    assert words == "“Sure” (Your impression) is higher in “No delay” than in Late"
+
+
 def test_an_interaction_compares_groups_in_the_difference_of_each_participant() -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"), groups=("one", "two"))
     made = statements(contrast)
@@ -293,7 +303,7 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
     assert (result.statistic, result.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
     assert result.effect == pytest.approx(one.mean() - two.mean())
     assert result.verdict == "shown"
-    difference = f"difference in agreement with “{ITEMS[0]}” between c2 and c1 in block b"
+    difference = f"difference in agreement with “{ITEMS[0].capitalize()}” between c2 and c1 in block b"
     assert f"The {difference} was higher in one than in two" in answer(result)
     assert f"the {difference} differs between one and two" in methods(made, evaluate(made))
     assert [len(side.values) for side in result.sides] == [len(one), len(two)]

@@ -492,6 +492,7 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
 
 
 START: Final = "0"
+AFTER: Final = "After "
 """The code of a form before the first block, which no block has as its id."""
 
 
@@ -606,7 +607,7 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
             title = text_in(table["title"], language) if titled else step.replace("_", " ").capitalize()
             after = follows_in(protocol, step)
             titles = {name: text_in(block["title"], language) for name, block in protocol["blocks"].items()}
-            labels = ((START, "At the start") if name is None else (name, f"After {titles[name]}") for name in after)
+            labels = ((START, "At the start") if name is None else (name, f"{AFTER}{titles[name]}") for name in after)
             settings = tuple(Setting(code=name, condition=name, label=label) for name, label in labels)
             yield QuestionPlace(step, title, True, settings), table
 

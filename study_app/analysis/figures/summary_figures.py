@@ -132,7 +132,7 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
     weighted = " Means are weighted as in the test." if contrast.contrast.measure == "threshold" else ""
     lines = "Each line joins a participant's two values. " if within else ""
     caption = (
-        f"{capitalised(contrast.contrast.described(contrast.compared))}. {lines}Right: {_effect_name(contrast)}"
+        f"{capitalised(contrast.hypothesis)}. {lines}Right: {_effect_name(contrast)}"
         f"{', for each participant and on average' if within else ''}; dashed line: no difference.{band}{weighted} "
         f"{sample_words(study, contrast.n)}"
     )
@@ -141,7 +141,7 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
         partial(draw_people, panels, above=_scale_words(contrast, result), members=shown),
         numbers_of_panels(panels),
     )
-    title = f"{capitalised(contrast.contrast.effect_words)}"
+    title = capitalised(contrast.measure_name or contrast.contrast.measure_words)
     return picture_of(
         study, contrast.contrast.blocks[0], name, title, caption, draw, forms, (f"n = {contrast.n}",), numbers
     )
@@ -160,10 +160,11 @@ def _differences(contrast: ContrastResult) -> dict[str, float]:
 
 def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
-    if contrast.contrast.form is not None:
-        return contrast.contrast.measure
+    measure = contrast.measure_name or contrast.contrast.measure_words
     if contrast.contrast.is_interaction:
-        return f"{'Ratio' if contrast.ratio else 'Difference'}, {contrast.contrast.measure_words}"
+        return f"{'Ratio' if contrast.ratio else 'Difference'}, {measure}"
+    if contrast.contrast.form is not None:
+        return measure
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:
         return level_words(result)
     return {"d_prime": "d′", "exponent": "Exponent"}.get(contrast.contrast.measure, "Points on the scale")

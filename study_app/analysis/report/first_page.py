@@ -9,15 +9,18 @@ import numpy as np
 from markupsafe import Markup
 
 from study_app.analysis.contrasts import answer, question
+from study_app.analysis.data.blocks import AFTER
+from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.figures.people_figures import Mean, mean_of
 from study_app.analysis.figures.summary_figures import MOST_PANELS, Numbers, estimates_of, place_of
 from study_app.analysis.findings import all_findings
 from study_app.analysis.html_page import picture, render
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.report.sections import answers, empty_studies, none_found
-from study_app.analysis.results import LevelsResult, QuestionResult, Results
+from study_app.analysis.results import BlockResult, LevelsResult, QuestionResult, Results
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, number, significant
+from study_app.protocol.model import quoted_title
 
 _LIMITS_SHOWN: Final = 6
 """So many limits are listed on the first page; the others are folded."""
@@ -78,6 +81,28 @@ def _statements(results: Results) -> Iterator[Card]:
             block=given.block,
             figures=finding.answer_figures,
         )
+    for result in results.blocks:
+        if result.n and len(result.names) == 1:
+            yield Card(
+                question=f"{result.title}: statements",
+                verdict="",
+                sentences=tuple(_agreement_words(result)),
+                block=result.id,
+                figures=(result.kind,),
+            )
+
+
+def _agreement_words(result: BlockResult) -> Iterator[str]:
+    """Yield how many answers to each statement of a block with one setting express agreement."""
+    once = result.presentations == (1, 1)
+    for item, row in zip(result.items, result.measures, strict=True):
+        n, agreed = int(row["n"]), sum(int(row[f"count_{level}"]) for level in AGREEMENT)
+        if not n:
+            continue
+        share = clopper_pearson(agreed, n)
+        ends = f", 95 % confidence interval [{100 * share.low:.0f}, {100 * share.high:.0f}] %" if once else ""
+        who = "participants agreed" if once else "answers expressed agreement"
+        yield f"{agreed} of {n} {who} with “{item.short}” ({100 * agreed / n:.0f} %{ends}; median {row['median']:g})."
 
 
 def _levels(results: Results) -> Iterator[Card]:
@@ -155,7 +180,7 @@ def _number_words(numbers: Numbers) -> str:
     what = f"The mean score ({numbers.title})" if numbers.is_score else f"The mean of “{numbers.title}”"
     means = [(name, mean, len(held)) for name, held in numbers.by_setting.items() if (mean := mean_of(held.values()))]
     parts = [
-        f"{number(mean.value)}{f' for {name.lower()}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
+        f"{number(mean.value)}{f' {_setting_words(name)}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
     ]
     n = max(count for *_, count in means)
     text = f"{what} was {listed(parts)} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
@@ -165,9 +190,14 @@ def _number_words(numbers: Numbers) -> str:
     away = mean_of(np.array([other[who] - one[who] for who in one if who in other]))
     if away is None or away.low is None:
         return text
-    return (
-        f"{text} The mean difference ({second.lower()} − {first.lower()}) was {number(away.value)}{_mean_ends(away)}."
-    )
+    pair = " − ".join(_setting_words(name).removeprefix("for ") for name in (second, first))
+    return f"{text} The mean difference ({pair}) was {number(away.value)}{_mean_ends(away)}."
+
+
+def _setting_words(name: str) -> str:
+    """Return the name of a setting in a sentence: "for water", or "after “80 ms late”" for a form after a block."""
+    block = name.removeprefix(AFTER)
+    return f"for {name.lower()}" if block == name else f"{AFTER.lower()}{quoted_title(block)}"
 
 
 def _mean_ends(mean: Mean) -> str:

@@ -75,6 +75,9 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
         if not result.n:
             lines.append(f"{lead_phrase(result)}: no answers are included yet.")
             continue
+        if len(result.names) == 1:
+            lines.append(f"{lead_phrase(result)}: there is only one {settings_noun(result)}, so nothing was compared.")
+            continue
         lines += [f"{lead_phrase(result)}: {sentence}" for sentence in missing_sentences(result)]
         decisive = [one for finding in all_findings() if finding.statements for one in finding.of(result)]
         out = [f"“{short_text(result, one.item)}”" for one in decisive if one.verdict == "out of reach"]
@@ -223,7 +226,7 @@ def _conclusions_by_question(results: Results) -> dict[str, str]:
 
 
 def answers(results: Results) -> tuple[Answer, ...]:
-    """Return the answers of a study, block by block; none for a block without valid answers.
+    """Return the answers of a study, block by block; none for a block without valid answers or with a single setting.
 
     They make a claim about a block only if the global test over all its statements is significant; it gates every
     verdict of the block.
@@ -232,7 +235,7 @@ def answers(results: Results) -> tuple[Answer, ...]:
         _answer(finding(result, results))
         for result in results.blocks
         for finding in all_findings()
-        if result.n and finding.question and result.kind in finding.kinds
+        if result.n and len(result.names) > 1 and finding.question and result.kind in finding.kinds
     )
 
 

@@ -15,7 +15,7 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from scipy.stats import binom
+from scipy.stats import binom, binomtest
 
 from study_app import __version__
 from study_app.analysis.data.study_tables import Study
@@ -305,7 +305,27 @@ def no_statement_differs(_match: re.Match[str], told: Told) -> bool:
     return not shown or (_recognition_shown(told) and all(row["verdict"] == "suggested" for row in shown))
 
 
+def agreed(match: re.Match[str], told: Told) -> bool:
+    """Check how many answers to a statement are above the neutral level, with the exact interval of their share."""
+    (item,) = (one["id"] for one in told.block["items"] if one["short"] == match["short"])
+    values = told.study.responses.loc[told.study.responses["item"] == item, "response"].dropna().astype(int)
+    above, n = int((values > 4).sum()), len(values)
+    exact = binomtest(above, n).proportion_ci()
+    ends = (exact.low, exact.high)
+    shown = [match[end] for end in ("low", "high")]
+    return (
+        (int(match["agreed"]), int(match["n"])) == (above, n)
+        and abs(float(match["share"]) - 100 * above / n) <= 0.5
+        and (shown[0] is None or all(abs(int(text) - 100 * end) <= 0.5 for text, end in zip(shown, ends, strict=True)))
+    )
+
+
 # ------------------------------------------------------------------------------------------------------- hypotheses
+
+
+def short_of(told: Told, item: str) -> str:
+    """Return the short text of a statement."""
+    return next(one["short"] for one in told.block["items"] if one["id"] == item)
 
 
 def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
@@ -317,7 +337,7 @@ def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
     mean = float(differences.mean()) if within else float(sides[0].mean() - sides[1].mean())
     standard = mean / differences.std(ddof=1) if within else hedges_g(*sides)
     return (
-        f"“{one['contrast']['measure']}”" in match[0]
+        f"“{short_of(told, one['contrast']['measure'])}”" in match[0]
         and all(name in match[0] for name in one["compared"])
         and (not within or np.allclose(np.sort(sides[0] - sides[1]), np.sort(differences)))
         and all(is_number(text, side.mean()) for text, side in zip(means.split(" and "), sides, strict=True))
@@ -534,7 +554,7 @@ def hypothesis(match: re.Match[str], told: Told) -> bool:
     return (
         ("two-sample" in match[4]) == (contrast["groups"] is not None)
         and (match[3] == "two-sided") == (contrast["expected"] is None)
-        and contrast["measure"] in match[2]
+        and f"“{short_of(told, contrast['measure'])}”" in match[2]
     )
 
 
@@ -654,6 +674,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Rated differently: (.*)\.", pairs_differ),
     (r"The liquids were rated differently on (.*), but the tests do not show which ones\.", statements_differ),
     (r"No statement showed a difference between any two liquids\.", no_statement_differs),
+    # First page: a block with a single setting
+    (rf"(?P<agreed>\d+) of (?P<n>\d+) (?:participants agreed|answers expressed agreement) with “(?P<short>.*)” "
+     rf"\((?P<share>{R}) %(?:, 95 % confidence interval \[(?P<low>\d+), (?P<high>\d+)\] %)?; median {R}\)\.", agreed),
     # Hypotheses
     (rf"Agreement with {ITEM} was (?:(?P<shown>higher|lower) in .* than in .*|not shown to (?:differ between .* and .*"
      rf"|be (?P<lower>higher|lower) in .* than in .*)) \(means (?P<means>{R} and {R}); mean difference (?P<effect>{R})"
@@ -700,6 +723,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"liquid-study validate-report\)\.", claims),
     (r"No answers are included yet\.", when(lambda told: told.block["n"] == 0)),
     (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
+    (rf"{LEAD}there is only one (?:liquid|delay|setting), so nothing was compared\.",
+     when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
     (r"The protocol does not specify the analysis \(the \[analysis\] table is missing\), so all results are "
