@@ -113,12 +113,15 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
     with pytest.raises(StoreError, match="has already been kept"):
         keep(pairs, "P002", 1, rule="below_chance", by="AB", reason="left-handed")
+    assert keep(pairs, "P002", 1, rule="fast_answers", by="AB", reason="practised").rule_or_person == "fast_answers"
     study = load_study(pairs)
     (found,) = proposals(study, evaluate(study, recordings=False))
     assert (found.decision, found.by.partition(": ")[2]) == ("kept", "left-handed")
     assert thresholds(study) == [None, "P001", "P002"]
 
     exclude(pairs, "P002", 1, by="below_chance", reason="keys exchanged")
+    with pytest.raises(StoreError, match="is excluded: include it without --rule"):
+        keep(pairs, "P002", 1, rule="constant_answers", by="AB", reason="left-handed")
     study = load_study(pairs)
     planned = planned_exclusions(study, evaluate(study, recordings=False))
     assert planned is not None

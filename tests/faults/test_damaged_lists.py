@@ -150,6 +150,16 @@ def test_a_damaged_file_is_an_error_for_people_and_never_a_traceback(
     assert all(len(str(error)) < 1000 and "\n" not in str(error) for error in errors), max(map(str, errors), key=len)
 
 
+@pytest.mark.parametrize("field", ["participant", "at", "by", "reason", "session", "begun", "checksums", "fingerprint"])
+def test_a_withdrawal_with_a_value_of_another_type_is_refused(tmp_path: Path, field: str) -> None:
+    held = asdict(TOMBSTONE)
+    of_field = held if field in held else held["sessions"][0]
+    of_field[field] = "1" if field == "session" else 1
+    (tmp_path / "withdrawals.jsonl").write_text(f"{json.dumps(held)}\n", encoding="utf-8", newline="\n")
+    with pytest.raises(StudyError, match="line 1 is not a withdrawal"):
+        tombstones(StudyFolder(tmp_path))
+
+
 def test_a_workspace_that_no_folder_can_be_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("LIQUID_STUDY_WORKSPACE", raising=False)
     monkeypatch.chdir(tmp_path)

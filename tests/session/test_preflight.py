@@ -59,47 +59,83 @@ def timing(
 
 
 LIVE = OutletStatus(title="LSL markers", listens=True)
-FACTS: tuple[tuple[str, dict[str, Any]], ...] = (
-    *(("small", {"fresh_share": share}) for share in (0.49, 0.5)),
-    ("small", timing(0.0, ticks=0)),
-    *(("small", timing(hz)) for hz in (490.0, 501.0, 979.0, 981.0, 1019.0, 1021.0, 1499.0, 1501.0)),
-    *(("small", timing(1000.0, p99_s=p99_s)) for p99_s in (2e-3, 2.01e-3)),
-    *(("small", timing(1000.0, gap_s=gap_s, late=9)) for gap_s in (20e-3, 20.1e-3)),
-    *(("small", {"grant": Grant(*words)}) for words in (("raised", "nice -15"), ("normal", "refused"))),
-    ("small", {"grant": Grant("raised", "nice -15", advice=("do this",)).with_memory(locked=False, advice="do that")}),
-    ("small", {"grant": Grant("normal", "refused", locked=False)}),
-    *(("small", {"sample_age_s": age_s}) for age_s in (0.002, 0.005, 0.01, 0.03)),
-    *(("small", {"screen": Screen(hz, 1.0)}) for hz in (30.0, 49.9, 50.0, 144.0)),
-    *(("small", {"screen": Screen(60.0, scaling)}) for scaling in (1.25, 1.5, 2.0)),
-    ("small", {"probe_s": None, "probe_fault": "the folder is read-only"}),
-    *(("small", {"probe_s": probe_s}) for probe_s in (0.1, 0.101)),
-    *(("small", {"free_bytes": count}) for count in (None, 19_000_000, 50_000_000, 60_500_000, 10**8, 3 * 10**8)),
-    *(("small", {"free_bytes": count, "recordings": False}) for count in (19_000_000, 59_000_000, 60_500_000)),
-    *(
-        ("small", {"dynamics": Dynamics(delay_s), "delay_ticks": ticks})
-        for delay_s, ticks in ((None, 1), (0.00093, 1), (0.0018, 2), (0.00093, 3))
-    ),
-    *((name, {"withheld": {"thin": 0.001, "thick": share}}) for name in ("small", "single-blind")
-      for share in (0.032, 0.05, 0.051)),
-    *(("small", {"delivery": PredictedDelivery(missing=missing, asked=asked, out=out, judged=5, limit_percent=25)})
-      for missing, asked, out in ((0, 40, 0), (26, 40, 0), (1, 1, 2), (0, 0, 1))),
-    *(("small", {"tick_s": tick_s}) for tick_s in (1e-4, 2e-4, 2.01e-4, 1e-3)),
-    *(("small", {"outlets": (one,)}) for one in (
-        LIVE, replace(LIVE, listens=False), OutletStatus(title="LSL samples", withheld=True),
-        OutletStatus(title="LSL samples", listens=True, shows_force=True),
-        OutletStatus(title="LSL samples", listens=False, shows_force=True), OutletStatus(title="Serial port"),
-        OutletStatus(title="Serial port", lost="it is gone"))),
-    *(("small", {"key_hash": key, "participant": who}) for key, who in (("0" * 64, "P001"), (None, "Anna"))),
-    *((
-        "small", {"device": device, "dynamics": dynamics, "velocity_errors": errors})
-        for device in ("force-dimension:7", "mouse")
-        for dynamics, errors in ((UNKNOWN, (0.121, 0.0101)), (Dynamics(1e-3, assumed=("mass_kg",)), (0.01, 0.01)),
-                                 (Dynamics(1e-3, assumed=("mass_kg",)), (0.012, 0.01)))
-    ),
-    *(("dealt", {"participant": who}) for who in ("P001", "Anna")),
-    *((f"{hz} Hz", timing(float(hz), ticks=800)) for hz in (400, 499, 500)),
-    *((name, {"delay_ticks": ticks, "dynamics": Dynamics(delay_s=1e-3 * ticks)}) for name in ("dampers", "delays")
-      for ticks in (1, 2, 3, 4)),
+FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
+    ("small", {"fresh_share": 0.49}, "failure Device: not responding; mouse sends a new sample on 49 % of ticks"),
+    ("small", {"fresh_share": 0.5}, "ok Device: responding; mouse sends a new sample on 50 % of ticks"),
+    ("small", timing(0.0, ticks=0), "failure Servo rate: 0.0 Hz"),
+    *(("small", timing(hz), f"{verdict} Servo rate: {hz} Hz; requested: 1000 Hz") for hz, verdict in (
+        (490.0, "failure"), (501.0, "warning"), (979.0, "warning"), (981.0, "ok"),
+        (1019.0, "ok"), (1021.0, "warning"), (1499.0, "warning"), (1501.0, "failure"))),
+    ("small", timing(1000.0, p99_s=2e-3), "ok Servo lateness: 2.00 ms; 99th percentile of ticks (limit: 2 ms)"),
+    ("small", timing(1000.0, p99_s=2.01e-3), "warning Servo lateness: 2.01 ms; 99th percentile of ticks (limit: 2 ms)"),
+    *(("small", timing(1000.0, gap_s=gap_s, late=9), f"{verdict} Servo lateness: 0.10 ms; 99th percentile of ticks "
+       f"(limit: 2 ms); largest gap {1e3 * gap_s:.1f} ms (limit: 20 ms); 9 overruns")
+      for gap_s, verdict in ((20e-3, "ok"), (20.1e-3, "warning"))),
+    *(("small", {"grant": Grant(*words)}, f"warning Priority: {'; '.join(words)}")
+      for words in (("raised", "nice -15"), ("normal", "refused"))),
+    ("small", {"grant": Grant("raised", "nice -15", advice=("do this",)).with_memory(locked=False, advice="do that")},
+     "warning Priority: raised; nice -15, memory not locked"),
+    ("small", {"grant": Grant("normal", "refused", locked=False)}, "warning Priority: normal; refused, memory not"),
+    *(("small", {"sample_age_s": age_s}, f"{verdict} Visual delay: up to {1000 / 60 + 1000 * age_s:.1f} ms")
+      for age_s, verdict in ((0.002, "ok"), (0.005, "ok"), (0.01, "warning"), (0.03, "warning"))),
+    *(("small", {"screen": Screen(hz, 1.0)}, f"{verdict} Screen: {hz} Hz, 100 %")
+      for hz, verdict in ((30.0, "warning"), (49.9, "warning"), (50.0, "ok"), (144.0, "ok"))),
+    *(("small", {"screen": Screen(60.0, scaling)}, f"warning Screen: 60.0 Hz, {100 * scaling:.0f} %")
+      for scaling in (1.25, 1.5, 2.0)),
+    ("small", {"probe_s": None, "probe_fault": "the folder is read-only"}, "failure Results folder: not usable"),
+    ("small", {"probe_s": 0.1}, "ok Results folder: 100.0 ms; time to write a file"),
+    ("small", {"probe_s": 0.101}, "warning Results folder: 101.0 ms; time to write a file"),
+    ("small", {"free_bytes": None}, "warning Free space: not known; a session needs about 64 MB"),
+    *(("small", {"free_bytes": count}, f"{verdict} Free space: {count / 1e6:.0f} MB free; a session needs about 64 MB")
+      for count, verdict in ((19_000_000, "failure"), (60_500_000, "failure"), (10**8, "ok"), (3 * 10**8, "ok"))),
+    *(("small", {"free_bytes": count, "recordings": False}, f"{verdict} Free space: {count / 1e6:.0f} MB free; a "
+       "session needs about 60 MB")
+      for count, verdict in ((19_000_000, "failure"), (59_000_000, "failure"), (60_500_000, "ok"))),
+    *(("small", {"dynamics": Dynamics(delay_s), "delay_ticks": ticks}, told) for delay_s, ticks, told in (
+        (None, 1, "ok Loop delay: 1 tick; assumed"),
+        (0.00093, 1, "ok Loop delay: 1 tick; a force acts after 0.93 ms"),
+        (0.0018, 2, "warning Loop delay: 2 ticks; a force acts after 1.80 ms"),
+        (0.00093, 3, "warning Loop delay: 3 ticks; a force acts after 0.93 ms"))),
+    *((name, {"withheld": {"thin": 0.001, "thick": share}}, f"{verdict} Force withheld: at most {percent} %; in the "
+       f"fastest stroke of a task (limit: 5 %){of_each.format(percent)}")
+      for name, of_each in (("small", ""), ("single-blind", ": thick {} %, thin 0.1 %"))
+      for share, percent, verdict in ((0.032, "3.2", "ok"), (0.05, "5.0", "ok"), (0.051, "5.1", "warning"))),
+    *(("small", {"delivery": PredictedDelivery(missing=missing, asked=asked, out=out, judged=5, limit_percent=25)},
+       f"{told}; predicted for a delay of 1 tick") for missing, asked, out, told in (
+        (0, 40, 0, "ok Trials delivered: all"),
+        (26, 40, 0, "warning Trials delivered: 26 of 45 trials beyond the limit"),
+        (1, 1, 2, "warning Trials delivered: 3 of 6 trials beyond the limit"),
+        (0, 0, 1, "warning Trials delivered: 1 of 5 trials beyond the limit"))),
+    *(("small", {"tick_s": tick_s}, f"{verdict} Scene cost: {1e9 * tick_s:.0f} ns per tick; the most expensive scene "
+       f"takes {percent} % of each tick")
+      for tick_s, percent, verdict in ((1e-4, "10", "ok"), (2e-4, "20", "ok"), (2.01e-4, "20", "warning"))),
+    *(("small", {"outlets": (one,)}, told) for one, told in (
+        (LIVE, "ok LSL markers: listener"), (replace(LIVE, listens=False), "warning LSL markers: no listener"),
+        (OutletStatus(title="LSL samples", withheld=True), "ok LSL samples: off; because the study is double-blind"),
+        (OutletStatus(title="LSL samples", listens=True, shows_force=True), "warning LSL samples: listener"),
+        (OutletStatus(title="LSL samples", listens=False, shows_force=True), "warning LSL samples: no listener"),
+        (OutletStatus(title="Serial port"), "ok Serial port: ready; open"),
+        (OutletStatus(title="Serial port", lost="it is gone"), "warning Serial port: not available; it is gone"))),
+    ("small", {"key_hash": "01234567" + 56 * "8"}, "ok Blinding: double-blind; the key is sealed; its hash begins with "
+     "01234567"),
+    ("small", {"key_hash": None}, "ok Blinding: double-blind; the key is drawn"),
+    *(("small", {"device": device, "dynamics": dynamics, "velocity_errors": errors},
+       f"{told}{unknown}" if device != "mouse" else "")
+      for device in ("force-dimension:7", "mouse")
+      for dynamics, errors, told, unknown in (
+        (UNKNOWN, (0.121, 0.0101), "warning Velocity: 12 % instead of 1 %; error at 2 Hz, because the device's ",
+         "delay, encoder count and mass are unknown"),
+        (Dynamics(1e-3, assumed=("mass_kg",)), (0.01, 0.01), "ok Velocity: 1 %; error at 2 Hz, although the device's ",
+         "mass is unknown"),
+        (Dynamics(1e-3, assumed=("mass_kg",)), (0.012, 0.01), "warning Velocity: 1.2 % instead of 1 %; error at 2 Hz, ",
+         "because the device's mass is unknown"))),
+    ("dealt", {"participant": "P012"}, "ok Balance: participant number 12"),
+    ("dealt", {"participant": "Anna"}, "warning Balance: drawn; row of the Latin square"),
+    *((f"{hz} Hz", timing(float(hz), ticks=800), f"{verdict} Servo rate: {hz}.0 Hz; requested: {hz} Hz")
+      for hz, verdict in ((400, "failure"), (499, "failure"), (500, "ok"))),
+    *((name, {"delay_ticks": ticks, "dynamics": Dynamics(delay_s=1e-3 * ticks)}, f"{'ok' if ticks == 1 else 'failure'} "
+       f"Levels: up to {highest} N·s/m; with a delay of {ticks} tick")
+      for name, highest in (("dampers", "25.6"), ("delays", "30")) for ticks in (1, 2, 3, 4)),
 )  # fmt: skip
 
 
@@ -107,8 +143,12 @@ def test_both_sides_of_each_limit(pytestconfig: pytest.Config) -> None:
     known, lines = studies(), list[str]()
     for name, study in known.items():
         lines += [f"== {name}", *(f"{check} {check.share}" for check in preflight_checks(small.WELL, study))]
-    for name, changed in FACTS:
+    for name, changed, told in FACTS:
         found = preflight_checks(replace(small.WELL, **changed), known[name])
+        checks = [f"{check.verdict} {check.name}: {check.value}; {check.about}" for check in found]
+        assert [line.startswith(told) for line in checks].count(True) == 1 if told else "Velocity" not in str(checks), (
+            f"{changed} is not told as {told!r}: {checks}"
+        )
         usual = {str(check) for check in preflight_checks(small.WELL, known[name])}
         lines.append(f"== {name} {changed}")
         lines += [f"{check} {check.share} {check.entry}" for check in found if str(check) not in usual]
@@ -123,12 +163,19 @@ def test_a_session_needs_what_its_sealed_recordings_take(study: str, needed: int
     assert room.about == f"a session needs about {needed} MB"
 
 
-@pytest.mark.parametrize(("recorded", "who"), [("ab" * 32, "P001"), (protocol_hash(source_bytes("rek2024")), "")])
-def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded: str, who: str) -> None:
+@pytest.mark.parametrize(
+    ("recorded", "version", "who"),
+    [
+        ("ab" * 32, load("rek2024").study.version, "P001"),
+        ("ab" * 32, "0.0.1", ""),
+        (protocol_hash(source_bytes("rek2024")), load("rek2024").study.version, ""),
+    ],
+)
+def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded: str, version: str, who: str) -> None:
     study = load("rek2024")
     place = StudyFolder(tmp_path).session("P001", 1)
     place.path.mkdir(parents=True)
-    ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": study.study.version}}}
+    ran = {"key_hash": "", "protocol_hash": recorded, "protocol": {"study": {"version": version}}}
     receipt.write(place.receipt, ran)
     chosen = NewSession(
         source="rek2024",

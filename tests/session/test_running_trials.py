@@ -77,6 +77,17 @@ def test_the_target_is_drawn_where_it_was() -> None:
     assert trial.task.elapsed_s - drawn.elapsed_s == pytest.approx(DELAY_S + SETTLED_S, abs=0.0011)
 
 
+def test_a_task_is_over_when_its_end_was_drawn_with_the_longest_delay() -> None:
+    trial, servo = painted(Explore(kind="explore", instruction="Move", min_s=1, max_s=1), hides_ball=False)
+    lasted_ms = 0
+    while trial.outcome() is None:
+        servo.run(0.001)
+        trial.follow(servo.telemetry.read())
+        lasted_ms += 1
+    assert lasted_ms == pytest.approx(1000 * (1 + DELAY_S + SETTLED_S), abs=2)
+    assert trial.outcome() == "complete"
+
+
 def frame(number: int, due_ns: int, age_ns: int | None = None) -> VideoFrame:
     return VideoFrame(
         number=number, width=2, height=2, stride=8, pixels=bytes(16), due_ns=due_ns, age_ns=age_ns, period_ns=PERIOD_NS

@@ -74,22 +74,22 @@ def test_what_happens_in_a_task(pytestconfig: pytest.Config) -> None:
     compare(file, played(file, acts(begun, PLACES)), pytestconfig)
 
 
-def slowly(task: Reach, rows: Any) -> tuple[list[tuple[int, int]], Any]:
-    """Follow a reaching task sample by sample, in plain Python."""
+def slowly(task: Reach, rows: Any) -> tuple[list[tuple[int, int]], tuple[str | None, int | None]]:
+    """Return what is reached and when, and how and when the task ends, sample by sample in plain Python."""
     start, reached, entered, found = int(rows.time_ns[0]), 0, None, []
     for row in rows:
         time = int(row.time_ns)
-        if reached == task.count:
-            break
         target = task.targets_m[reached % len(task.targets_m)]
         inside = sum((a - b) ** 2 for a, b in zip(row.position_m.tolist(), target, strict=True)) <= task.radius_m**2
         entered = (time if entered is None else entered) if inside else None
         if entered is not None and time - entered >= round(task.dwell_s * 1e9):
-            found.append((reached % len(task.targets_m), time))
+            found.append((reached % len(task.targets_m), time - start))
             reached, entered = reached + 1, None
-        if reached != task.count and time - start >= round(task.timeout_s * 1e9):
-            break
-    return found, start
+        if reached == task.count:
+            return found, ("complete", time)
+        if time - start >= round(task.timeout_s * 1e9):
+            return found, ("timeout", time)
+    return found, (None, None)
 
 
 @pytest.mark.slow
@@ -110,7 +110,5 @@ def test_however_the_samples_are_cut_the_result_is_that_of_one_at_a_time(
     for cut in [*cuts, len(rows)]:
         found += tracker.feed(rows[first : first + cut])
         first += cut
-    expected, start = slowly(task, rows)
-    assert [(reached.target, round(reached.t_task_s * 1e9)) for reached in found] == [
-        (target, time - start) for target, time in expected
-    ]
+    came = [(reached.target, round(reached.t_task_s * 1e9)) for reached in found]
+    assert (came, (tracker.outcome, tracker.end_ns)) == slowly(task, rows)

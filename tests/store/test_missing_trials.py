@@ -90,7 +90,9 @@ def test_a_session_is_incomplete_if_more_trials_are_missing_than_stated(lost: in
     trials = [failed(n, "withheld_percent") if n <= lost else answered(n) for n in range(1, 41)]
     found = missing_after(*trials, missing_percent=percent)
     assert (found.count, found.asked, found.exceed) == (lost, 40, exceed)
+    assert found.brief == f"{lost} of 40 not delivered"
 
 
 def test_a_session_of_an_earlier_version_which_stated_no_number_is_never_incomplete() -> None:
     assert not missing_after(failed(1, "withheld_percent")).exceed
+    assert missing_after(answered(1)).brief == ""

@@ -11,6 +11,7 @@ from study_app.errors import ProtocolError, StoreError
 from study_app.haptics.model.estimators import Ewma
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.source.files import shipped_file
+from study_app.store.folder_lock import lock_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.recovery import check_resumable
 from study_app.store.tables.study_files import check_study
@@ -128,16 +129,32 @@ def test_earlier_results_are_refused_until_they_are_upgraded(results: Path, tmp_
     assert upgrade(tmp_path) == []
 
 
-def test_a_changed_table_of_an_earlier_version_is_refused_and_nothing_is_written(results: Path) -> None:
-    session = StudyFolder(results).session("P001", 1)
-    table = session.table("rek2024", "responses")
-    table.write_bytes(table.read_bytes().replace(b",4,", b",5,", 1))
+@pytest.mark.parametrize(
+    ("person", "changed", "said"),
+    [
+        ("P001", lambda table: table.replace(b",4,", b",5,", 1), r"differs from its journal.*rebuild \S+ses-01"),
+        ("P002", lambda table: table + table.splitlines(keepends=True)[-1], r"has \d+ rows, but the journal contains"),
+    ],
+    ids=["ended", "unfinished"],
+)
+def test_a_changed_table_of_an_earlier_version_is_refused_and_nothing_is_written(
+    results: Path, person: str, changed: Callable[[bytes], bytes], said: str
+) -> None:
+    table = StudyFolder(results).session(person, 1).table("rek2024", "responses")
+    table.write_bytes(changed(table.read_bytes()))
     before = contents(results)
-    with pytest.raises(
-        StoreError, match=r"responses_data\.csv differs from its journal.*liquid-study rebuild \S+ses-01"
-    ):
+    with pytest.raises(StoreError, match=rf"responses_data\.csv {said}"):
         upgrade(results)
     assert contents(results) == before
+
+
+def test_a_session_that_is_open_is_not_upgraded_and_may_be_afterwards(results: Path) -> None:
+    before = contents(results)
+    with lock_folder(results / "data" / "sub-P001" / "ses-01"), pytest.raises(StoreError, match="is open in another"):
+        upgrade(results)
+    assert contents(results) == before
+    assert upgrade(results) != []
+    lock_folder(results / "data" / "sub-P001" / "ses-01").release()
 
 
 def test_other_files_are_left_alone(tmp_path: Path) -> None:

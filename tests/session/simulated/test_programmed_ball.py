@@ -11,7 +11,7 @@ REACH = Reach(
     kind="reach",
     targets_mm=((-30.0, 0.0, 0.0), (30.0, 10.0, 0.0)),
     radius_mm=5.0,
-    dwell_s=0.3,
+    dwell_s=0.8,
     count=4,
     instruction="-",
 )

@@ -67,6 +67,17 @@ def test_a_study_that_resumes_by_blocks_goes_on_within_one(tmp_path: Path) -> No
     assert started(tmp_path / "by-blocks", study, source, third, exactly=False).step < third
 
 
+def test_levels_of_a_block_that_is_presented_again_do_not_follow_its_earlier_answers(tmp_path: Path) -> None:
+    source = source_bytes("viscosityjnd").replace(b"[study]", b'[study]\nresume = "block"', 1)
+    study = parse(source, "viscosityjnd")
+    exactly, again = (started(tmp_path / f"{how}", study, source, 60, exactly=how) for how in (True, False))
+    first = preview(study, 4).schedule.steps[again.step]
+    assert isinstance(first, Trial)
+    assert first.index == 1
+    assert max(result.trial for result in exactly.heard) > first.number
+    assert all(result.trial < first.number for result in again.heard)
+
+
 def test_a_step_behind_a_criterion_that_is_missed_is_not_reached(tmp_path: Path) -> None:
     source = source_bytes("viscosityjnd")
     for old, new in (

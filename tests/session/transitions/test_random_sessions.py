@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import SessionError
-from study_app.protocol.load import load
+from study_app.protocol.load import load, parse, source_bytes
 from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.tracks import design_of
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (
@@ -41,6 +42,7 @@ from study_app.session.transitions.events import (
 from study_app.session.transitions.page_builder import Moment, pages_of_step, preview, previewed_page
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, initial_state
+from tests.protocol.edited_studies import text_of
 from tests.session import small
 from tests.session.transitions.states import EVENTS, event_of
 
@@ -84,6 +86,7 @@ def test_whatever_happens_no_answer_is_lost_and_the_session_can_be_ended(events:
     assert {trial: {row.item: row.value for row in rows if row.given} for trial, rows in confirmed.items()} == kept
     chosen = [write for write in disk if write.line.event == "choice"]
     assert len(chosen) >= sum(len(answers) for answers in kept.values())
+    assert all(write.waits for write in disk if write.line.event in {"choice", "answer_removed", "responses", "repeat"})
     if state.phase is Phase.STALLED:
         state, _ = advance(state, WriteCompleted(998.0))
     if state.phase not in FINAL:
@@ -186,16 +189,20 @@ def test_every_page_of_a_preview_is_that_of_a_session_with_its_seed(name: str, l
     assert [plain(page) for page in previewed] == [plain(page) for page in held]
 
 
-def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback() -> None:
-    shown = preview(load("viscosityjnd"))
+@pytest.mark.parametrize("text", [source_bytes("viscosityjnd").decode(), text_of("compared")], ids=["levels", "liquids"])
+def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(text: str) -> None:
+    shown = preview(parse(text.encode(), "study.toml"))
     blocks = shown.protocol.blocks
     index, trial = next((at, one) for at, one in enumerate(shown.schedule.steps)
                         if getattr(one, "block", "") and blocks[one.block].design is not None)  # fmt: skip
     found = pages_of_step(shown, index)
-    assert found[:3] == (Moment("tank", 1), Moment("tank", 2), Moment("questions"))
+    count = design_of(shown.protocol, blocks[trial.block]).intervals
+    assert found[: count + 1] == (*(Moment("tank", number) for number in range(1, count + 1)), Moment("questions"))
     pages = [previewed_page(shown, index, moment, "en") for moment in found]
-    assert [page.interval.number for page in pages[:2]] == [1, 2]
-    assert pages[2].trial == trial.number
+    assert [(page.interval.number, page.interval.of) for page in pages[:count]] == [
+        (number, count) for number in range(1, count + 1)
+    ]
+    assert pages[count].trial == trial.number
     assert not any(isinstance(page, PausePage) for page in pages)
 
 

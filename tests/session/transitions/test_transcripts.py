@@ -1,16 +1,26 @@
 """What each event of a session commands: whole sequences, as files that people review."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from study_app.errors import SessionError
+from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.table import text_in
 from study_app.session.pages import EndPage, TroublePage
+from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (
+    Begin,
+    Continue,
+    FadeIn,
     ForceStopped,
+    LanguageChosen,
+    PauseRequested,
     Rest,
+    ResumeRequested,
     StopForce,
     StopTrial,
     Write,
@@ -18,6 +28,7 @@ from study_app.session.transitions.events import (
     WriteFailed,
     WriteRetried,
 )
+from study_app.session.transitions.page_builder import preview
 from study_app.session.transitions.state import FINAL, Phase
 from study_app.session.transitions.table import advance, initial_state
 from tests.golden import compare
@@ -47,6 +58,41 @@ def test_a_disk_that_takes_nothing_stops_the_force_and_keeps_what_is_left_from_e
         assert (after, commands) == advance(before, ForceStopped(10.0, "program"))
     else:
         assert (after, commands) == (before, ())
+
+
+@pytest.mark.parametrize(
+    ("paused_by", "stopped_by", "refusal"),
+    [
+        (None, "operator", "the force was stopped"),
+        (None, "program", ""),
+        ("participant", "operator", "the force was stopped"),
+        ("participant", "program", ""),
+        ("operator", "participant", "the force was stopped"),
+        ("operator", "program", "the operator paused the session"),
+    ],
+)
+def test_who_may_resume_after_a_pause_and_a_stop(paused_by: Any, stopped_by: Any, refusal: str) -> None:
+    state = state_in(Phase.READING)
+    if paused_by:
+        state, _ = advance(state, PauseRequested(1.0, paused_by))
+    state, _ = advance(state, ForceStopped(2.0, stopped_by))
+    if refusal:
+        with pytest.raises(SessionError, match=f"{refusal}: only the operator can resume it, not the participant"):
+            advance(state, ResumeRequested(3.0, "participant"))
+    state, commands = advance(state, ResumeRequested(4.0, "operator" if refusal else "participant"))
+    assert (state.phase, state.force_off, FadeIn() in commands) == (Phase.READING, False, True)
+
+
+def test_a_chosen_language_is_that_of_the_page_and_of_all_after_it() -> None:
+    shown_study = preview(load("rek2024"))
+    plan = (shown_study.protocol, shown_study.schedule, shown_study.codes, "en", FIRST, shown_study.secret)
+    state, commands = advance(initial_state(*plan), Begin(0.0))
+    english = shown(commands)
+    state, commands = advance(state, LanguageChosen(1.0, "nl"))
+    assert (english.language, shown(commands).language) == ("en", "nl")
+    assert shown(commands).title == text_in(shown_study.protocol.pages[english.id].title, "nl") != english.title
+    _, commands = advance(state, Continue(2.0))
+    assert shown(commands).language == "nl"
 
 
 def test_a_language_that_the_study_is_not_written_in_is_refused(protocol: Protocol) -> None:

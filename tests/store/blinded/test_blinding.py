@@ -125,9 +125,22 @@ def test_a_block_with_another_of_the_studys_methods_has_other_conditions(tmp_pat
 
 def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, protocol: Protocol) -> None:
     open_or_draw_key(tmp_path, protocol)
-    later = base64.encodebytes(json.dumps(content_of(tmp_path) | {"format": 3}).encode())
+    held = content_of(tmp_path)
+    later, *wrong = (
+        base64.encodebytes(json.dumps(held | changed).encode())
+        for changed in (
+            {"format": 3},
+            {"drawn": "dice"},
+            {"codes": {"liquids": {"A": 1}}},
+            {"files": {"honey.toml": 1}},
+            {"groups": {"experts": 0}},
+            {"groups": {"experts": 1.5}},
+            {"tables": held["tables"] | {"liquids": []}},
+            {"tables": held["tables"] | {"conditions": {"late": {"delay_ms": "50"}}}},
+        )
+    )
     no_key = r"key\.sealed is no longer a sealed key"
-    contents = dict.fromkeys((b"", b"not base64 \xff", b"aGVsbG8=\n", b"W10=\n", b"e30=\n"), no_key)
+    contents = dict.fromkeys((b"", b"not base64 \xff", b"aGVsbG8=\n", b"W10=\n", b"e30=\n", *wrong), no_key)
     for content, sentence in (contents | {later: "has format 3, but this version reads only formats 1 and 2"}).items():
         sealed(tmp_path).write_bytes(content)
         with pytest.raises(StoreError, match=sentence):

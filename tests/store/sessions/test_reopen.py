@@ -82,6 +82,19 @@ def test_it_goes_on_after_the_last_line_and_says_so(start: Start, again: Again) 
     assert since == pytest.approx(timedelta(seconds=72_000.25), abs=timedelta(seconds=0.01))
 
 
+@pytest.mark.parametrize(("table", "spare"), [("responses", 0), ("trials", 1), ("intervals", 1)])
+def test_a_power_cut_may_leave_a_trial_and_an_interval_more_than_the_journal_and_no_answer(
+    start: Start, again: Again, table: str, spare: int
+) -> None:
+    with start() as store:
+        path = store.folder.table("brackish", table)
+    path.write_text("a,b\n" + (spare + 1) * "1,2\n", encoding="utf-8", newline="\n")
+    with pytest.raises(StoreError, match=rf"{table}_data\.csv has {spare + 1} rows, but the journal contains 0"):
+        again()
+    path.write_text("a,b\n" + spare * "1,2\n", encoding="utf-8", newline="\n")
+    again().close()
+
+
 def test_times_never_go_back_whatever_the_clocks_do(start: Start, again: Again) -> None:
     """The wall clock was set back an hour, and the machine was started anew: its own clock begins at nought."""
     with start() as store:

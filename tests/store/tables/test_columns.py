@@ -42,6 +42,17 @@ def test_a_new_version_of_the_study_renews_it(tmp_path: Path, protocol: Protocol
     assert (content["version"], content["description"]) == ("1.1", "What liquids feel like.")
 
 
+@pytest.mark.parametrize("intervals", [False, True])
+def test_only_sessions_with_trials_of_intervals_can_be_incomplete(
+    tmp_path: Path, protocol: Protocol, intervals: bool
+) -> None:
+    folder = StudyFolder(tmp_path)
+    write_description(folder, protocol.study, intervals=intervals)
+    variables = json.loads(folder.description.read_text(encoding="utf-8"))["variableMeasured"]
+    described = {variable["name"]: str(variable) for variable in variables}
+    assert ("trials_missing" in described, "incomplete" in described["status"]) == (intervals, intervals)
+
+
 def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Protocol) -> None:
     (tmp_path / "dataset_description.json").write_text(
         "{}", encoding="utf-8", newline="\n"

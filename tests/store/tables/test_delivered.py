@@ -14,6 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.store.delivered import (
+    beyond_limits,
     broken_interval_limits,
     broken_trial_limits,
     delivered_error,
@@ -119,6 +120,31 @@ def test_delays_are_judged_by_the_difference_of_their_errors(
         *broken_trial_limits(limits, Presentation(10.0, 50.0, 0, (DELAY, DELAY)), holds, errors_ms, 1000.0)
     ] == broken
     assert [*broken_trial_limits(limits, Presentation(0.1, 8.0, 0, (DAMPING, DAMPING)), holds, errors_ms, 1000.0)] == []
+
+
+@pytest.mark.parametrize(
+    ("measured", "broken"),
+    [
+        ({"targets_reached": 5, "targets": 10}, ()),
+        ({"targets_reached": 4, "targets": 10}, ("targets_reached", 40, 50)),
+        ({"targets_reached": 0, "targets": 0}, ()),
+        ({"targets_reached": None, "targets": 10, "withheld_share": None}, ()),
+        ({"withheld_share": 0.05}, ()),
+        ({"withheld_share": 0.06}, ("withheld_share", 6, 5)),
+        ({"lateness_p99_ms": 2.0}, ()),
+        ({"lateness_p99_ms": 2.1}, ("lateness_p99_ms", 2.1, 2)),
+        ({"worst_gap_ms": 21.0}, ("worst_gap_ms", 21, 20)),
+        ({"delay_error_p95_ms": -25.0}, ()),
+        ({"delay_error_p95_ms": -26.0}, ("delay_error_p95_ms", -26, 25)),
+        ({"first_frame_gap_ms": 251.0}, ("first_frame_gap_ms", 251, 250)),
+        ({"worst_frame_gap_ms": 251.0}, ("worst_frame_gap_ms", 251, 250)),
+    ],
+)
+def test_a_share_is_compared_with_a_limit_in_percent_and_targets_have_a_least_one(
+    measured: dict[str, Any], broken: tuple[Any, ...]
+) -> None:
+    limits = {"lateness_ms": 2, "worst_gap_ms": 20, "delay_error_ms": 25, "frame_gap_ms": 250, "withheld_percent": 5}
+    assert beyond_limits(measured, limits | {"targets_percent": 50}) == ((broken,) if broken else ())
 
 
 def error(found: Any, fade_s: float = 0.3, b_nspm: float = 8.0) -> float | None:

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from study_app.errors import StoreError
 from study_app.store.columns import TRIALS
 from study_app.store.csv_files import MISSING, Column, csv_bytes, guard_formula, has_same_cells, header, read_table
 from study_app.store.journals.journal_events import Event
@@ -76,6 +77,34 @@ def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str
     content = csv_bytes(TRIALS, rows)
     assert b",'-1 and more," in content
     assert read_table(content, TRIALS) == rows
+
+
+def test_the_row_of_an_answer_says_what_was_chosen_and_when() -> None:
+    script, times = Script(), {"onset_s": 1.0, "first_s": 2.0, "last_s": 4.0, "changes": 3}
+    script.trial(1)
+    script.end(1)
+    given: dict[str, Any] = {"scale": 5, "unsure": None, "words": "thick", "several": ["a", "b"], "part": 0.5}
+    items = [{"item": item, "number": n, "value": value, **times} for n, (item, value) in enumerate(given.items(), 1)]
+    script.add("responses", trial=1, attempt=1, items=[*items, {"item": "left", "number": 6, "value": None}])
+    columns = ("item", "response", "value", "cannot_judge", "onset_s", "first_choice_s", "last_change_s", "changes")
+    rows = SessionRows(script.lines).responses
+    assert [tuple(row[name] for name in columns) for row in rows] == [
+        ("scale", "5", 5, False, 1.0, 2.0, 4.0, 3),
+        ("unsure", None, None, True, 1.0, 2.0, 4.0, 3),
+        ("words", "thick", None, False, 1.0, 2.0, 4.0, 3),
+        ("several", "a b", None, False, 1.0, 2.0, 4.0, 3),
+        ("part", "0.5", 0.5, False, 1.0, 2.0, 4.0, 3),
+        ("left", None, None, False, None, None, None, None),
+    ]
+    assert [row["number"] for row in rows] == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_line_of_a_trial_that_never_started_is_named() -> None:
+    script = Script()
+    script.trial(1)
+    script.end(4)
+    with pytest.raises(StoreError, match="^line 3 of the journal refers to trial 4, which never started"):
+        SessionRows(script.lines)
 
 
 def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_gives() -> None:

@@ -176,6 +176,9 @@ def test_every_copy_and_output_in_the_workspace_is_erased_without_being_named(st
     with begun(other, PERSON) as store:  # another person with the same ID
         store.finish("completed")
     unrelated = contents(other)
+    notes = [folder / "notes.txt" for folder in (pooled / "sites" / "A", study, saved)]
+    for path in notes:
+        path.write_text(f"{PERSON} was late\n", encoding="utf-8", newline="\n")
     report(study, results.parent / "report")
 
     done = erase(pooled / "sites" / "A")
@@ -183,7 +186,7 @@ def test_every_copy_and_output_in_the_workspace_is_erased_without_being_named(st
     assert set(done.folders) == {pooled / "sites" / "A", study, saved}
     assert not [path for path in results.parent.rglob(f"sub-{PERSON}") if not path.is_relative_to(other)]
     assert results.parent / "report" / "report.html" in done.outputs
-    assert (done.left, done.elsewhere) == ((), ())
+    assert (set(done.left), done.elsewhere) == ({f"{path} still names {PERSON}" for path in notes}, ())
     assert contents(other) == unrelated
     assert verify_study(pooled).is_sound
 
