@@ -16,6 +16,7 @@ class Collector:
     def __init__(self) -> None:
         self.markers: list[Marker] = []
         self.lost: dict[str, str] = {}
+        self.described: dict[str, Any] = {}
 
     def mark(self, marker: Marker) -> None:
         self.markers.append(marker)

@@ -29,6 +29,7 @@ from study_app.store.verification.reproduction import reproduce_session
 from study_app.store.verification.verify_study import verify_study
 from tests import golden
 from tests.journal_lines import event_from, event_of
+from tests.outlets.collector import Collector
 from tests.session import small
 
 STARTED = {"event": "session_started", "t_s": 0.0}
@@ -225,6 +226,10 @@ def test_resumed_session_keeps_the_row(square: Path) -> None:
     planned = build_schedule(protocol, "P025", SEED, 2)
     assert begun_schedule(protocol, start_of(journal.read(store.folder.journal)), store.key) == planned
     assert planned != build_schedule(protocol, "P025", SEED)
+    outlets: Any = Collector()
+    with open_store(chosen, protocol, square.read_bytes(), RIG, {}, outlets=outlets) as resumed:
+        assert resumed.lines[-1].event == "session_resumed"
+    assert outlets.events == ["session_resumed"]
 
 
 def test_session_without_a_row_of_another_has_no_such_key(square: Path) -> None:

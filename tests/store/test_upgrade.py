@@ -157,6 +157,21 @@ def test_a_session_that_is_open_is_not_upgraded_and_may_be_afterwards(results: P
     lock_folder(results / "data" / "sub-P001" / "ses-01").release()
 
 
+@pytest.mark.parametrize("step", ["replace_checksums", "write_file"])
+def test_an_upgrade_that_a_full_disk_interrupts_is_completed_by_the_next(
+    results: Path, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    def disk_is_full(*_: object) -> None:
+        raise StoreError("the disk is full")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(f"study_app.store.upgrade.{step}", disk_is_full)
+        with pytest.raises(StoreError, match="the disk is full"):
+            upgrade(results)
+    assert upgrade(results) != []
+    assert verify_study(results).errors == ()
+
+
 def test_other_files_are_left_alone(tmp_path: Path) -> None:
     written(tmp_path / "pyproject.toml", "[project]\nname = 'x'\n")
     written(tmp_path / "new.toml", f"format = 2\n{LIQUID}")

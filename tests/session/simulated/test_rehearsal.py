@@ -24,7 +24,7 @@ from study_app.session.tasks import TankView, TaskView
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Journal
-from study_app.store.journals.journal_events import Responses
+from study_app.store.journals.journal_events import Responses, SessionResumed
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
 from tests.compiled import needs_servo
@@ -203,5 +203,8 @@ def test_a_rehearsal_that_was_interrupted_and_resumed_answers_like_one_that_was_
         with pytest.raises(KeyboardInterrupt):
             rehearsal.rehearse("demo", participants=1, seed=seed, results=parted.path, recordings=False)
     rehearsal.resume_rehearsal(parted.session("P001", 1).path)
-    answers, others = (confirmed(raw(journal.read(folder.session("P001", 1).journal))) for folder in (whole, parted))
+    lines = [journal.read(folder.session("P001", 1).journal) for folder in (whole, parted)]
+    answers, others = (confirmed(raw(each)) for each in lines)
     assert answers == others
+    (resumed,) = (line for line in lines[1] if isinstance(line, SessionResumed))
+    assert resumed.gap_s == 0.0, "its simulated clock is ahead of the wall clock and must not go back"

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from study_app.errors import SessionError
-from study_app.protocol.load import load, parse, source_bytes
+from study_app.protocol.load import load, parse
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.tracks import design_of
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
@@ -189,9 +189,9 @@ def test_every_page_of_a_preview_is_that_of_a_session_with_its_seed(name: str, l
     assert [plain(page) for page in previewed] == [plain(page) for page in held]
 
 
-@pytest.mark.parametrize("text", [source_bytes("viscosityjnd").decode(), text_of("compared")], ids=["levels", "liquids"])
-def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(text: str) -> None:
-    shown = preview(parse(text.encode(), "study.toml"))
+@pytest.mark.parametrize("name", ["viscosityjnd", "compared"])
+def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(name: str) -> None:
+    shown = preview(parse(text_of(name).encode(), "study.toml"))
     blocks = shown.protocol.blocks
     index, trial = next((at, one) for at, one in enumerate(shown.schedule.steps)
                         if getattr(one, "block", "") and blocks[one.block].design is not None)  # fmt: skip

@@ -87,6 +87,21 @@ def test_a_broken_a_missing_and_a_doubled_line_are_damage_and_a_torn_tail_is_non
             read(path)
 
 
+def test_a_journal_whose_chain_was_removed_is_damaged(start: Start) -> None:
+    with start() as store:
+        path = store.folder.journal
+    path.write_bytes(re.sub(rb',\s*"previous":\s*"[0-9a-f]{64}"', b"", path.read_bytes()))
+    with pytest.raises(StoreError, match="line 1 does not contain the key previous"):
+        read(path)
+
+
+@pytest.mark.parametrize("name", ["n", "t_s", "at", "kind", "text"])
+def test_a_field_that_every_line_has_is_never_null(name: str) -> None:
+    line = {"n": 1, "event": "note", "t_s": 0.0, "at": "2026-03-01T10:00:12.345+01:00", "kind": "note", "text": "x"}
+    assert line_problem(line) is None
+    assert f"(note) has {name} " in str(line_problem(line | {name: None}))
+
+
 def test_a_journal_is_neither_written_over_nor_continued_after_another_program(tmp_path: Path) -> None:
     path = three_answers(tmp_path / "journal.jsonl")
     contents = scan(path)

@@ -103,7 +103,7 @@ def test_a_line_of_a_trial_that_never_started_is_named() -> None:
     script = Script()
     script.trial(1)
     script.end(4)
-    with pytest.raises(StoreError, match="^line 3 of the journal refers to trial 4, which never started"):
+    with pytest.raises(StoreError, match=r"^line 3 of the journal refers to trial 4, which never started"):
         SessionRows(script.lines)
 
 
