@@ -36,7 +36,8 @@ def test_each_kind_of_question_has_its_level_of_measurement_in_sav(tmp_path: Pat
     unblind(folder, "AB", "to analyse")
     export(folder, tmp_path / "out", extras=["wide", "sav"])
     (file,) = (tmp_path / "out").glob("*wide_data.sav")
-    measure = pyreadstat.read_sav(str(file), metadataonly=True)[1].variable_measure
+    found, about = pyreadstat.read_sav(str(file))
+    measure, labels = about.variable_measure, about.variable_value_labels
     levels = {
         "start__age": "scale",
         "start__hand": "nominal",
@@ -50,3 +51,8 @@ def test_each_kind_of_question_has_its_level_of_measurement_in_sav(tmp_path: Pat
         "usability__sus": "scale",
     }
     assert {name: measure[name] for name in levels} == levels
+    words = {code: label for code, label in labels["start__hand"].items() if code < 90}
+    assert words == {1: "Left", 2: "Right", 3: "Both"}
+    (file,) = (tmp_path / "out").glob("*wide_data.csv")
+    written = pd.read_csv(file)["start__hand"].str.capitalize()
+    assert [words[code] for code in found["start__hand"]] == [*written]

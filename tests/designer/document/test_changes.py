@@ -120,6 +120,23 @@ def test_liquids_are_named_as_conditions_where_a_study_has_none() -> None:
         assert not changed.problems
 
 
+@pytest.mark.parametrize(
+    ("name", "recorded", "free"),
+    [
+        ("Butter", {"oil"}, "butter"),
+        ("Butter", {"oil", "butter"}, "butter_2"),
+        ("Oil", {"oil"}, "oil"),
+        ("honey", {"oil"}, "honey_2"),
+    ],
+)
+def test_a_refused_name_comes_with_one_that_neither_the_study_nor_other_answers_use(
+    name: str, recorded: set[str], free: str
+) -> None:
+    study = read_study((FOLDER / "compare-liquids.toml").read_bytes(), FOLDER)
+    with pytest.raises(StudyError, match=f'"{free}" is free$'):
+        edits_to_rename(study.document, ("liquids", "oil"), name, frozenset(recorded))
+
+
 @pytest.mark.parametrize("name", ["", "Water", "2nd", "with blank", "é", "a" * (MAX_ID + 1)])
 def test_check_id_refuses_what_is_no_id(name: str) -> None:
     with pytest.raises(StudyError, match="is not a valid ID: use at most"):

@@ -14,7 +14,7 @@ import pytest
 from study_app.designer.document.document import Document, check_version, next_version, version_standing
 from study_app.designer.document.fields import rows
 from study_app.designer.document.study import read_study
-from study_app.designer.document.toml_edits import Set
+from study_app.designer.document.toml_edits import Insert, Set
 from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped
@@ -54,6 +54,18 @@ def test_steps_of_one_key_join_until_the_keyboard_rests(monkeypatch: pytest.Monk
     for _ in range(5):
         opened.undo()
     assert opened.study.text == DEMO.text
+
+
+def test_a_step_of_several_edits_is_undone_and_redone_as_one() -> None:
+    opened = Document(DEMO, ("blocks", "liquids"))
+    edits = Set(("study", "title"), "New"), Set(("study", "version"), "9.9"), Insert(("sequence", 0), "liquids")
+    opened.edit("All three", *edits, select=("study",))
+    after = opened.study.text
+    assert [opened.study.document["study"][name] for name in ("title", "version")] == ["New", "9.9"]
+    opened.undo()
+    assert (opened.study.text, opened.selected) == (DEMO.text, ("blocks", "liquids"))
+    opened.redo()
+    assert (opened.study.text, opened.selected) == (after, ("study",))
 
 
 def test_a_step_that_changes_nothing_is_none() -> None:
@@ -133,7 +145,25 @@ def test_a_draft_that_cannot_be_written_stays_due(tmp_path: Path, monkeypatch: p
     with pytest.raises(StoreError, match="there is a file where a folder is needed"):
         keeper.write()
     (tmp_path / "file").unlink()
-    assert keeper.write()
+    assert keeper.write_if_due(REST_S)
+
+
+def test_a_draft_that_could_not_be_deleted_is_deleted_as_soon_as_that_is_possible(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    keeper = Keeper(file, "")
+    keeper.note_edit("x", (), 100.0)
+    assert keeper.write_if_due(100.0 + REST_S)
+    (path,) = (data_folder() / "drafts").glob("*.json")
+    content = path.read_bytes()
+    path.unlink()
+    path.mkdir()
+    (path / "in the way").touch()
+    keeper.note_saved("saved")
+    (path / "in the way").unlink()
+    path.rmdir()
+    path.write_bytes(content)
+    assert not keeper.write_if_due(0.0)
+    assert not path.exists()
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b'{"text": 1, "base": "", "selected": [], "kept_at": ""}'])

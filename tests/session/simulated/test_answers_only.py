@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
-from study_app.protocol.load import load
+from study_app.protocol.load import load, parse
 from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import condition_features, rehearse
 from study_app.store import receipt
 from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
+from tests.protocol.edited_studies import text_of
 from tests.store.forging import cover_up
 from tests.studies import made_up
 
@@ -108,6 +109,14 @@ def test_what_is_felt_is_what_each_condition_gives(tmp_path: Path) -> None:
             assert one.force_mean_n > 0
             assert one.delay_s == pytest.approx(study.delay_s(condition), abs=0.015)
     assert not any(tmp_path.iterdir())
+
+
+@needs_servo
+def test_each_liquid_of_a_pair_is_felt_in_its_own_interval() -> None:
+    text = text_of("compared").replace("repetitions = 40", "repetitions = 2").replace("nspm = 9", "nspm = 16")
+    felt = condition_features(parse(text.encode(), "compared.toml"), seed=1, people=1)
+    thin, thick = ([one.force_mean_n for one in felt["pairs", liquid]] for liquid in ("thin", "thick"))
+    assert max(thin) < min(thick)
 
 
 def test_ended_by_the_user_it_leaves_whole_sessions_and_their_table(
