@@ -72,6 +72,7 @@ def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Resul
     codebook = json.loads((to / "codebook.json").read_text("utf-8"))
     assert (codebook["study"]["participants"], codebook["study"]["sessions"]) == (2, 3)
     assert (codebook["study"]["sessions_excluded"], codebook["study"]["sessions_left_out"]) == (1, 0)
+    assert {"condition", "liquid", "delay_ms"}.isdisjoint(codebook["blocks"][0]["settings"][0])
     assert codebook["exclusions"][1] == {
         "participant": "P002",
         "session": 1,
@@ -81,6 +82,22 @@ def test_what_is_excluded_is_exported_with_its_reason_and_not_counted(rek: Resul
         "excluded_at": "2026-01-06T10:00:00.000+01:00",
         "key_open": None,
     }
+    rek.open()
+    export(rek.folder, to)
+    blocks = json.loads((to / "codebook.json").read_text("utf-8"))["blocks"]
+    names = {one["condition"]: (one["liquid"], one["delay_ms"], one["code"]) for it in blocks for one in it["settings"]}
+    assert names["delay_50"] == ("water", 50, rek.code("delay_50", "delays"))
+    assert names["honey"] == ("honey", 0, honey)
+
+
+def test_the_codebook_counts_answers_that_were_given(small: Results, to: Path) -> None:
+    found = []
+    for participant, answer in (("A", None), ("B", 5)):
+        small.add(participant, lambda *_, answer=answer: answer)
+        export(small.folder, to)
+        (block,) = json.loads((to / "codebook.json").read_text("utf-8"))["blocks"]
+        found.append((block["answers_per_participant_setting_and_item"], block["sessions"]))
+    assert found == [([0, 0], []), ([2, 2], [1])], "each setting is presented twice"
 
 
 def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(rek: Results, to: Path) -> None:

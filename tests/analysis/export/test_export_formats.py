@@ -138,6 +138,8 @@ def test_the_psych_ds_folder_keeps_the_rules(small: Results, to: Path, opened: b
         small.open()
     export(small.folder, to, extras=["psych-ds"])
     assert undescribed(to / FOLDER) == set()
+    tables = [path.name for path in (to / FOLDER).rglob("*.csv")]
+    assert sorted(set(tables)) == sorted(tables), "no table is there twice"
     responses = to / FOLDER / "data" / table(to, "small", "responses", "csv").name
     assert responses.read_bytes() == table(to, "small", "responses", "csv").read_bytes()
     assert b"All participants are simulated" in (to / FOLDER / "README.md").read_bytes()

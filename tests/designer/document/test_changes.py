@@ -8,6 +8,7 @@ import pytest
 from study_app.designer.document.additions import (
     check_values,
     edits_to_add,
+    edits_to_copy_with,
     edits_to_fill_in,
     edits_to_move,
     number_row,
@@ -176,6 +177,27 @@ def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, .
     row = number_row(study.document, NO_DELAY, (*NO_DELAY, "delay_ms"))
     with pytest.raises(StudyError, match=f"^{why}$"):
         check_values(study.document, row, values)
+
+
+@pytest.mark.parametrize(
+    ("title", "copied"),
+    [
+        ("Twice 2", "Twice 7"),
+        ("Part 1", "Part 1, 7"),
+        ("Liquids", "Liquids, 7"),
+        ("2 liquids", "2 liquids, 7"),
+    ],
+)
+def test_a_copy_with_another_number_has_it_in_its_title_and_fits_the_study(title: str, copied: str) -> None:
+    path = ("blocks", "liquids")
+    study, _ = DEMO.with_edits(Set((*path, "title"), title), Set((*path, "repetitions"), 2))
+    edits, copy = edits_to_copy_with(study, path, number_row(study.document, path, (*path, "repetitions")), 7)
+    after, _ = study.with_edits(*edits)
+    block = at(after.document, copy)
+    assert (copy, block["title"], block["repetitions"]) == (("blocks", "liquids_7"), copied, 7)
+    assert block["code_prefix"] not in {"L", "D"}
+    assert [step for step in after.document["sequence"] if "liquids" in step] == ["liquids", "liquids_7"]
+    assert {fault.kind for fault in after.faults} == {"part"}, "which part it belongs to is for the author to say"
 
 
 TEXTS = texts()

@@ -8,7 +8,7 @@ from pathlib import Path as File
 import pytest
 
 from study_app.designer.document.additions import additions_for, repairs
-from study_app.designer.document.elements import found_fields
+from study_app.designer.document.elements import CHOSEN, LABEL, OTHER, found_fields
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.measures.measures_view import measures_view
@@ -52,11 +52,22 @@ def test_the_outline_shows_each_element_once_with_its_name(name: str) -> None:
 def test_what_is_found_has_the_words(words: str) -> None:
     ((_, study),) = studies(("slime",))
     found = outline_rows(study, facts(study).steps_s, words)
-    assert {row.path for row in found} <= {row.path for row in outline_rows(study, facts(study).steps_s)}
+    everything = outline_rows(study, facts(study).steps_s)
+    assert {row.path for row in found} <= {row.path for row in everything}
+    assert outline_rows(study, facts(study).steps_s, f"  {words} ") == found
+    assert outline_rows(study, facts(study).steps_s, "  ") == everything
     fields = found_fields(study, words)
     assert found or fields
     for row in (*found, *fields):
         assert words in one_line(row).lower() or any(words in one_line(other).lower() for other in found), row
+
+
+@pytest.mark.parametrize(("words", "rank"), [("repetitions", LABEL), ("double", CHOSEN), ("kalman", OTHER)])
+def test_other_choices_are_found_only_where_no_label_and_no_chosen_one_is(words: str, rank: int) -> None:
+    ((_, study),) = studies(("slime",))
+    found = found_fields(study, words)
+    assert found[0].rank == rank
+    assert all(field.rank <= max(rank, CHOSEN) for field in found)
 
 
 def card_lines() -> Iterator[str]:

@@ -9,13 +9,16 @@ import pytest
 
 from study_app import __version__
 from study_app.errors import StoreError
+from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.atomic import sync_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
+from study_app.store.journals.journal_events import SessionStarted
 from study_app.store.sessions.begin import UsedIds, used_ids
 from tests.platforms import files_up_to
+from tests.protocol.edited_studies import text_of
 from tests.store.conftest import Start, study_tables
 from tests.store.sessions.conftest import every_byte
 
@@ -44,6 +47,19 @@ def test_everything_is_there_before_the_first_trial(tmp_path: Path, start: Start
         "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv",
     }
     store.close()
+
+
+@pytest.mark.parametrize("design", [None, "2ifc"])
+def test_one_block_of_intervals_among_others_gives_the_session_their_table(start: Start, design: str | None) -> None:
+    pairs = 'title = "Pairs"\ntask = "feel"\nconditions = ["feel_quagmire", "feel_mildew"]\n'
+    pairs += f'design = "{design}"\nstandard = "feel_quagmire"\n' if design else 'code_prefix = "P"\n'
+    text = text_of("brackish").replace('"liquids", "delays"]', '"liquids", "delays", "pairs"]', 1)
+    with start(protocol=parse(f"{text}\n[blocks.pairs]\n{pairs}".encode(), "brackish.toml")) as store:
+        started = store.lines[0]
+        assert isinstance(started, SessionStarted)
+        assert (started.intervals, store.folder.table("brackish", "intervals").exists()) == (
+            (True, True) if design else (None, False)
+        )
 
 
 def test_the_entry_of_every_folder_that_is_created_is_flushed(
