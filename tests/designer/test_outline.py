@@ -182,6 +182,8 @@ def expanded(designer: Any) -> set[Any]:
 def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: Any, small: Any) -> None:
     outline, tree = small.place.outline, small.place.outline.tree
     small.editing.select(("blocks", "liquids"))
+    small.click_on(small.place.parts.path.outline)
+    assert outline.isVisible()
     for _ in range(2):
         open_drawer(qtbot, small)
         index = index_of(small, "blocks", "liquids")

@@ -1,4 +1,4 @@
-"""Repairs that are pressed one after another while the pointer stays over the list of problems."""
+"""The list of problems: repairs that are pressed one after another, and the counts of problems and warnings."""
 
 from typing import Any
 
@@ -8,6 +8,7 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtWidgets import QApplication
 
 from study_app.designer.document.steps import RetypeFile
+from study_app.designer.document.toml_edits import Set, Unset
 from tests.designer.support.designer import DEMO
 
 pytestmark = pytest.mark.slow
@@ -34,3 +35,20 @@ def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer:
         assert [one.isEnabled() for one in lines] == [False] * number + [True] * (len(lines) - number)
         assert [one.row for one in lines[number:]] == list(problems.problems)
     assert designer.study.faults == ()
+
+
+def test_header_and_list_count_problems_and_warnings_after_each_step(designer: Any, qtbot: Any) -> None:
+    designer.open()
+    header, heading = designer.place.header.problems, designer.place.problems.heading
+    sound = header.words
+    designer.editing.make_step("Fix the order", Set(("blocks", "liquids", "order"), "fixed"))
+    qtbot.waitUntil(lambda: header.words == "1 warning")
+    assert heading.text() == "1 warning"
+    for key in (("tasks", "reach", "dwell_s"), ("liquids", "thin", "density_kg_m3")):
+        designer.editing.make_step("Remove a key", Unset(key))
+    qtbot.waitUntil(lambda: len(designer.place.problems.problems) == 2)
+    assert heading.text().startswith("2 problems"), heading.text()
+    for _ in range(3):
+        designer.editing.undo()
+    qtbot.waitUntil(lambda: header.words == sound)
+    assert heading.text() == "No problems"

@@ -14,9 +14,13 @@ from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.main_controller import MainController
 from study_app.designer.controller import DesignerController
+from study_app.designer.document.document import Standing
 from study_app.designer.document.steps import SetValue
+from study_app.designer.version_rows import Comparison
+from study_app.designer.versions import SaveCard
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.protocol.source.files import protocol_hash, shipped_file
+from study_app.store.study_runs import Run
 from study_app.store.study_versions import kept_content, kept_versions
 from tests.designer.support.designer import Designer
 from tests.designer.support.runs import run
@@ -91,6 +95,24 @@ else:
 
 
 @pytest.mark.nightly
+def test_the_card_for_saving_lists_what_was_run_and_asks_for_what_its_buttons_say(qtbot: Any) -> None:
+    runs = (Run(hash="a" * 64, version="1.0", sessions=3), Run(hash="b" * 64, version="0.9", pilots=2))
+    card = SaveCard(Standing(version="1.1"), runs, Comparison(("-old", "+new")), 0)
+    qtbot.addWidget(card)
+    words = " ".join(part.text() for part in card.findChildren(QLabel))
+    assert ("with version 1.0" in words, "0.9" in words) == (True, False), "no session was run with 0.9"
+    with qtbot.waitSignal(card.changes_asked):
+        card.changes.click()
+    with qtbot.waitSignal(card.save_asked) as asked:
+        card.save.click()
+    assert asked.args == ["1.1"]
+    card.another.click()
+    card.name.setText("mine")
+    with qtbot.waitSignal(card.another_asked) as asked:
+        card.save.click()
+    assert asked.args == ["mine"]
+
+
 def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     def other(words: str, then: str) -> None:
         command = [sys.executable, "-c", OTHER, str(designer.results), words, then]

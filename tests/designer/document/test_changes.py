@@ -181,12 +181,7 @@ def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, .
 
 @pytest.mark.parametrize(
     ("title", "copied"),
-    [
-        ("Twice 2", "Twice 7"),
-        ("Part 1", "Part 1, 7"),
-        ("Liquids", "Liquids, 7"),
-        ("2 liquids", "2 liquids, 7"),
-    ],
+    [("Twice 2", "Twice 7"), ("Part 1", "Part 1, 7"), ("Liquids", "Liquids, 7"), ("2 liquids", "2 liquids, 7")],
 )
 def test_a_copy_with_another_number_has_it_in_its_title_and_fits_the_study(title: str, copied: str) -> None:
     path = ("blocks", "liquids")

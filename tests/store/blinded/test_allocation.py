@@ -1,5 +1,6 @@
 """Participants come into groups: one entry each, whoever begins at the same time or is killed, and sealed."""
 
+import contextlib
 import json
 import re
 import signal
@@ -197,6 +198,23 @@ def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_cl
     with pytest.raises(StudyError, match="permitted: 1 to 2"):
         studies.begun(tmp_path / "s", "P001", study, SOURCE, session=3)
     assert not (tmp_path / "s").exists()
+
+
+def test_a_session_that_the_participants_own_group_does_not_have_is_refused(tmp_path: Path) -> None:
+    """The second group has three sessions and the first one two; a participant's group is drawn in session 1."""
+    groups = GROUPS.replace('sequence = ["hello", "thin", "thick", "end"]', 'sequences = [["hello", "thin"], ["end"]]')
+    groups = groups.replace('sequence = ["hello", "thick", "thin"]', 'sequences = [["hello"], ["thick"], ["thin"]]')
+    protocol, folder = grouped(groups=groups), StudyFolder(tmp_path / "s")
+    permitted = {}
+    for participant in ("P001", "P002"):
+        with studies.begun(folder.path, participant, protocol, (STUDY + groups).encode()) as store:
+            found = allocation_of(folder, store.key, participant)
+        assert found is not None
+        allocation.check_session(folder, protocol, participant, 2)
+        with contextlib.suppress(StudyError):
+            allocation.check_session(folder, protocol, participant, 3)
+            permitted[found.group] = participant
+    assert permitted.keys() == {"first_thick"}
 
 
 @pytest.mark.slow

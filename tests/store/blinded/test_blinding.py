@@ -13,7 +13,8 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import check_conditions, open_or_draw_key
+from study_app.store.blinded.blinding import check_conditions, open_or_draw_key, reveals, unreadable_reveals
+from study_app.store.folders import StudyFolder
 from tests.protocol.trials.level_studies import study
 from tests.store.conftest import Tables
 
@@ -121,6 +122,14 @@ def test_a_block_with_another_of_the_studys_methods_has_other_conditions(tmp_pat
     check_conditions(tmp_path, study(more=many))
     with pytest.raises(StoreError, match="was sealed for conditions that differ"):
         check_conditions(tmp_path, study(('method = "few"', 'method = "many"'), more=many))
+
+
+def test_lines_of_unblinding_that_cannot_be_read_are_numbered_from_1(tmp_path: Path) -> None:
+    path = StudyFolder(tmp_path).reveals
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b'\nrubbish\n{"at": "2026-03')
+    assert unreadable_reveals(tmp_path) == ((2, False), (3, True)), "only the last may be of a power cut"
+    assert reveals(tmp_path) == ()
 
 
 def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, protocol: Protocol) -> None:

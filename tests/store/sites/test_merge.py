@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
+from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
+from study_app.store.exclusions import reversals
 from study_app.store.folder_lock import lock_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import read_merged
@@ -70,6 +73,16 @@ def test_a_folder_that_changes_while_it_is_copied_is_refused(
     with pytest.raises(StoreError, match="was changed while it was being copied"):
         merge_sites({"A": lab}, results / "pooled")
     assert list(results.iterdir()) == []
+
+
+def test_commands_name_an_excluded_participant_with_the_site(labs: dict[str, Path], results: Path) -> None:
+    pooled = results / "pooled"
+    merge_sites({"A": labs["A"], "B": labs["B"]}, pooled)
+    asked = [str(pooled), "--participant", "B-P001", "--by", "AB", "--reason", "asleep"]
+    for command in ("exclude", "include"):
+        done = CliRunner().invoke(commands, [command, *asked])
+        assert (done.exit_code, "B-P001, session 1" in done.output) == (0, True), done.output
+    assert [row.participant for row in reversals(pooled / "sites" / "B")] == ["P001"]
 
 
 def test_the_proof_of_a_merged_study_has_the_sessions_of_every_site(labs: dict[str, Path], results: Path) -> None:

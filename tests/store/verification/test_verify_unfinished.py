@@ -54,6 +54,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
         "data/.x.csv.0123abcd.tmp: is being written, or is an incomplete file left by a program that was killed",
     ):
         assert sentence in warned(findings)
+    assert "does not state why" not in warned(findings), "trial 1 was lost, and trial 2 may still be recorded"
     assert told(findings) == ""
 
 

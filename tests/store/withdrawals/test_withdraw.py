@@ -132,6 +132,7 @@ def test_a_killed_withdrawal_is_reported_and_finished_by_the_same_command(
         next(folder.rglob("journal.jsonl")).unlink()
         die()
 
+    before = contents(study)
     with monkeypatch.context() as patched:
         patched.setattr(shutil, "rmtree", half)
         assert forked(lambda: erase(study)) == -signal.SIGKILL
@@ -143,6 +144,12 @@ def test_a_killed_withdrawal_is_reported_and_finished_by_the_same_command(
     assert verify_study(study).is_sound
     again = erase(study)
     assert (again.folders, again.outputs) == ((), ())
+    for path in (study / "exclusions.csv", study / "exclusions_reversed.jsonl", *study.glob("data/*.csv")):
+        erased = path.read_bytes()
+        path.write_bytes(before[path])
+        told = "\n".join(map(str, verify_study(study).errors))
+        assert f"{path.name}: still lists {PERSON}, although {PERSON} withdrew" in told
+        path.write_bytes(erased)
 
 
 @pytest.mark.nightly
