@@ -136,6 +136,7 @@ def test_groups_are_reported_after_unblinding_alone(folder: Path, tmp_path: Path
     text = (tmp_path / "opened" / "report.html").read_text("utf-8")
     assert ">Groups</h2>" in text
     assert "first_thin" in text
+    assert "Differences between groups are not tested.<" in text
 
 
 def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp_path: Path) -> None:
@@ -149,6 +150,8 @@ def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp
     report(study, tmp_path / "sealed")
     methods = (tmp_path / "sealed" / "methods.txt").read_text("utf-8")
     assert "to the groups first_thin (n = 3) and first_thick (n = 2) by an existing attribute" in methods
+    page = (tmp_path / "sealed" / "report.html").read_text("utf-8")
+    assert "Differences between groups are not tested. The groups were not randomised, so" in page
     assert "groups were not randomised" in methods
     assert "The groups were not randomised, so a difference may have other causes" in (
         tmp_path / "sealed" / "report.html"
