@@ -38,6 +38,7 @@ def test_a_shown_text_that_qt_normalises_is_no_edit(
     qtbot.wait(300)
     assert designer.value(*path) == {"en": text}
     line.insertPlainText("c")
+    line.show_text("a text that is shown meanwhile")
     line.flush()
     assert designer.value(*path) == {"en": "ca\nb"}
 

@@ -94,7 +94,6 @@ else:
 """
 
 
-@pytest.mark.nightly
 def test_the_card_for_saving_lists_what_was_run_and_asks_for_what_its_buttons_say(qtbot: Any) -> None:
     runs = (Run(hash="a" * 64, version="1.0", sessions=3), Run(hash="b" * 64, version="0.9", pilots=2))
     card = SaveCard(Standing(version="1.1"), runs, Comparison(("-old", "+new")), 0)
@@ -113,6 +112,7 @@ def test_the_card_for_saving_lists_what_was_run_and_asks_for_what_its_buttons_sa
     assert asked.args == ["mine"]
 
 
+@pytest.mark.nightly
 def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     def other(words: str, then: str) -> None:
         command = [sys.executable, "-c", OTHER, str(designer.results), words, then]

@@ -150,6 +150,7 @@ def test_preexisting_groups_are_reported_before_unblinding_as_not_randomised(tmp
     report(study, tmp_path / "sealed")
     methods = (tmp_path / "sealed" / "methods.txt").read_text("utf-8")
     assert "to the groups first_thin (n = 3) and first_thick (n = 2) by an existing attribute" in methods
+    assert "The analysis was not specified beforehand, so all results are exploratory (alpha = 0.05)." in methods
     page = (tmp_path / "sealed" / "report.html").read_text("utf-8")
     assert "Differences between groups are not tested. The groups were not randomised, so" in page
     assert "groups were not randomised" in methods

@@ -2,12 +2,16 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from PySide6.QtWidgets import QDialog, QWidget
 
 from study_app.devices.descriptor import DRIVER_READY, NONE, NOT_AVAILABLE, READY, Backend
 from study_app.devices.registry import backends, list_devices
+from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.kit.devices import device_before_look, device_named, devices_shown
+from study_app.store.workstation import DEFAULTS
 from tests.golden import compare, each_once
 from tests.golden_values import value_lines
 
@@ -52,3 +56,24 @@ def test_every_device_is_shown_once_and_those_that_people_feel_with_first() -> N
     assert set(list_devices()) <= set(names)
     assert len(names) == len(set(names))
     assert set(names[:5]) == {"mouse", "spacemouse", "falcon", "force-dimension", "inverse3"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("preferred", "examined"), [("falcon:FT123", "falcon:FT123"), ("falcon", "falcon"), ("mouse", "falcon")]
+)
+def test_of_several_devices_the_one_with_the_preferred_serial_number_is_examined(
+    qtbot: Any, monkeypatch: pytest.MonkeyPatch, preferred: str, examined: str
+) -> None:
+    asked: list[str] = []
+
+    def open_diagnosis(window: QWidget, _theme: object, name: str, _settings: object) -> QDialog:
+        asked.append(name)
+        return QDialog(window)
+
+    monkeypatch.setattr("study_app.gui.devices.view.open_diagnosis", open_diagnosis)
+    place = DevicesPlace(DEFAULTS.model_copy(update={"device": preferred}), list)
+    qtbot.addWidget(place)
+    place.diagnose("falcon")
+    place.end_diagnosis()
+    assert asked == [examined]

@@ -43,6 +43,9 @@ def test_one_begins_at_the_first_place_goes_by_the_rail_and_a_session_and_the_en
     qtbot.mouseClick(main.rail.buttons["lab"], Qt.MouseButton.LeftButton)
     assert (main.here, log[1:]) == ("lab", ["leave home", "enter lab"])
     assert [name for name, button in main.rail.buttons.items() if button.here] == ["lab"]
+    for narrow, words in ((True, "Dark"), (False, "Dark theme")):
+        main.rail.set_narrow(narrow)
+        assert (main.rail.switch.text(), main.rail.switch.accessibleName()) == (words, "Dark theme")
     main.hide_for_session()
     assert (main.isVisible(), log[-1]) == (False, "leave lab")
     main.return_from_session()

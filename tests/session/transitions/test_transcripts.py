@@ -14,6 +14,7 @@ from study_app.session.pages import EndPage, TroublePage
 from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (
     Begin,
+    Chosen,
     Continue,
     FadeIn,
     ForceStopped,
@@ -21,8 +22,10 @@ from study_app.session.transitions.events import (
     PauseRequested,
     Rest,
     ResumeRequested,
+    Retracted,
     StopForce,
     StopTrial,
+    Submitted,
     Write,
     WriteCompleted,
     WriteFailed,
@@ -81,6 +84,19 @@ def test_who_may_resume_after_a_pause_and_a_stop(paused_by: Any, stopped_by: Any
             advance(state, ResumeRequested(3.0, "participant"))
     state, commands = advance(state, ResumeRequested(4.0, "operator" if refusal else "participant"))
     assert (state.phase, state.force_off, FadeIn() in commands) == (Phase.READING, False, True)
+
+
+def test_each_answer_is_on_the_disk_before_the_session_goes_on() -> None:
+    state = state_in(Phase.ANSWERING)
+    item = state.trial.items[0]
+    for event, line in (
+        (Chosen(10.0, item, 4), "choice"),
+        (Retracted(10.0, item), "answer_removed"),
+        (Submitted(10.0), "responses"),
+    ):
+        _, commands = advance(state, event)
+        writes = [command for command in commands if isinstance(command, Write)]
+        assert [(write.line.event, write.waits) for write in writes][:1] == [(line, True)]
 
 
 def test_a_chosen_language_is_that_of_the_page_and_of_all_after_it() -> None:
