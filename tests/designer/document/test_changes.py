@@ -28,6 +28,7 @@ from study_app.designer.document.fields import (
     references_to,
     with_references,
 )
+from study_app.designer.document.steps import MakeSeries, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
@@ -177,6 +178,15 @@ def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, .
     row = number_row(study.document, NO_DELAY, (*NO_DELAY, "delay_ms"))
     with pytest.raises(StudyError, match=f"^{why}$"):
         check_values(study.document, row, values)
+
+
+def test_copies_of_a_series_come_in_order_after_their_original_in_each_list(study: Study) -> None:
+    step = MakeSeries(NO_DELAY, (*NO_DELAY, "delay_ms"), (30, 60)).step(Situation(study, NO_DELAY))
+    after, _ = study.with_edits(*step.edits)
+    names = at(after.document, ("blocks", "delays", "conditions"))
+    series = [at(after.document, ("conditions", name, "delay_ms")) for name in names]
+    assert series == [0, 30, 60, 50, 75, 100, 125, 150, 200]
+    assert step.select == ("conditions", names[1])
 
 
 @pytest.mark.parametrize(

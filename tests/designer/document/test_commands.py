@@ -201,12 +201,6 @@ def check(before: Study, request: Request, step: Step, after: Study) -> None:
         case MakeSeries(path, field, values):
             added = count_at(after, path[:-1]) - count_at(before, path[:-1])
             assert (added, now((*step.select, *field[len(path) :])) in values) == (len(values), True)
-            for place in references_to(before.document, path):
-                if place[0] == "blocks" and isinstance(place[-1], int):
-                    names = now(place[:-1])
-                    copies = names[names.index(path[1]) + 1 :][: len(values)]
-                    series = tuple(now((path[0], name, *field[2:])) for name in copies)
-                    assert series == values or names == value_at(before.document, place[:-1]), "after its original"
         case MoveElement() | DeleteElement() | RenameElement():
             check_element(before, request, after)
 
