@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QApplication, QDialog, QFileDialog
 
 from study_app.gui.home import view
+from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import source_bytes
@@ -155,6 +156,20 @@ def test_the_card_that_one_went_on_from_keeps_the_keyboard_and_is_in_sight(qtbot
         assert (held.facts.title, bar.value() > 0) == ("Zest", True)
     else:
         assert (len(home.grid.cards), held, bar.value()) == (count - 1, home.grid.cards[0], 0)
+
+
+def test_each_button_of_a_study_opens_what_it_says(qtbot, tmp_path):
+    home = open_home(qtbot, tmp_path)
+    card = home.grid.cards[0]
+    for button, title, kind in (
+        (card.new, "New session", NewSessionDialog),
+        (card.rehearse, "Rehearse", RehearsalDialog),
+    ):
+        assert button.text() == title
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+        dialogs = [one for one in home.main.findChildren(QDialog) if one.isVisible()]
+        assert [type(one) for one in dialogs] == [kind]
+        dialogs[0].reject()
 
 
 def test_a_draft_can_be_discarded_from_its_card(qtbot, tmp_path):
