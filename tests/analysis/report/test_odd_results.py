@@ -41,6 +41,7 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     )
     assert both.format("eight") in told
     assert both.format("four") in told
+    assert "and 90 % confidence intervals" in told, "two one-sided tests at 5 %"
 
 
 def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
