@@ -119,7 +119,7 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     assert (found.decision, found.by.partition(": ")[2]) == ("kept", "left-handed")
     assert thresholds(study) == [None, "P001", "P002"]
     report(pairs, tmp_path / "kept")
-    assert "nobody has decided yet" not in (tmp_path / "kept" / "report.html").read_text("utf-8")
+    assert "no decision has been made yet" not in (tmp_path / "kept" / "report.html").read_text("utf-8")
 
     exclude(pairs, "P002", 1, by="below_chance", reason="keys exchanged")
     with pytest.raises(StoreError, match="is excluded: include it without --rule"):
