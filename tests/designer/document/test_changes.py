@@ -135,7 +135,7 @@ def test_a_refused_name_comes_with_one_that_neither_the_study_nor_other_answers_
     name: str, recorded: set[str], free: str
 ) -> None:
     study = read_study((FOLDER / "compare-liquids.toml").read_bytes(), FOLDER)
-    with pytest.raises(StudyError, match=f'"{free}" is free$'):
+    with pytest.raises(StudyError, match=f'"{free}" is available$'):
         edits_to_rename(study.document, ("liquids", "oil"), name, frozenset(recorded))
 
 
