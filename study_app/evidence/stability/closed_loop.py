@@ -457,7 +457,7 @@ def _settle_passivity(passivity: Any) -> None:
     """Reset the passivity controller: each balance starts the tick as high as the liquid's reserve permits."""
     passivity.balance_j = passivity.late_balance_j = passivity.later_balance_j = passivity.fast.balance_j = math.inf
     passivity.gain = 1.0
-    passivity.settling = 0
+    passivity.settling = passivity.reversals = 0
     clear(passivity.velocity_mps)
 
 

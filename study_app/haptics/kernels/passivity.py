@@ -41,6 +41,10 @@ With a force link, no debt is forgiven, the gain does not recover before the nex
 there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
 which it neither supplies nor absorbs energy.
 
+A handle that was let go may also oscillate without a debt, since buoyancy or the liquid's reserve supplies the energy.
+From six successive reversals on, each sooner than a hand can reverse, the gain falls until the oscillation ends, at
+most to a twentieth (`_count_reversals`); it recovers as after a debt that is not forgiven.
+
 The energy that the velocity estimator stores and may therefore return is `filter_storage`.
 
 The incremental observer asks whether the fast part of a force drives the fast part of the hand's motion.
@@ -64,7 +68,7 @@ from typing import Any
 
 from study_app.haptics.kernels.compiled import kernel, part
 from study_app.haptics.kernels.sample_validation import is_gap
-from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm, square, square_distance
+from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 
@@ -154,6 +158,13 @@ _QUIET_MPS = 0.06
 _PUSHED_S = 0.2
 _LEAST_PUSH_S = 0.015
 _REGAINED_S = 0.3
+_SWING_WEIGHT = 4.0
+_REVERSAL_S = 0.05
+_REVERSALS = 6
+_SLOW_RATIO = 6.0
+_CALMED_S = 0.04
+_LEAST_GAIN = 0.05
+_NOTHING_M2PS2 = 1e-30
 DELIVERY_STEPS_PER_N = 2.0**14
 
 
@@ -180,6 +191,10 @@ def reset_observer(passivity: layout.Record) -> None:
     clear(passivity.slow_mps)
     passivity.fast_s = passivity.quiet_s = 0.0
     passivity.gap_s = math.inf
+    clear(passivity.swing_mps)
+    clear(passivity.peak_mps)
+    passivity.peak_m2ps2 = passivity.reversed_s = 0.0
+    passivity.reversals = 0
     passivity.debt = layout.DEBT_NONE
     passivity.longest_m = 0.0
     passivity.strongest_n = 0.0
@@ -274,6 +289,39 @@ def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_
     passivity.fast_s = (passivity.fast_s + lasted_s) / (1.0 + interval_s / _PUSHED_S)
     passivity.quiet_s = 0.0 if square_m2ps2 > _QUIET_MPS * _QUIET_MPS else passivity.quiet_s + interval_s
     passivity.gap_s = 0.0 if is_gap(parameters, interval_s) else passivity.gap_s + interval_s
+    _count_reversals(parameters, passivity, min(_SWING_WEIGHT * weight, 1.0), interval_s)
+
+
+@part
+def _count_reversals(parameters: layout.Record, passivity: layout.Record, weight: float, interval_s: float) -> None:
+    """Count successive reversals of a swing, each sooner than a hand can reverse.
+
+    The swing is the velocity between 10 and 40 Hz. It must exceed the speed in the rules, and a share of the slow
+    speed: smaller ones are ripples of a stroke.
+    """
+    swing_mps, peak_mps = passivity.swing_mps, passivity.peak_mps
+    for axis in range(3):
+        fast_mps = passivity.velocity_mps[axis] - passivity.slow_mps[axis]
+        swing_mps[axis] += weight * (fast_mps - swing_mps[axis])
+    square_m2ps2 = square(swing_mps)
+    passivity.reversed_s += interval_s
+    is_late = passivity.reversed_s > _REVERSAL_S
+    if is_late:
+        passivity.reversals = 0
+    if square_m2ps2 <= parameters.rules.swing_mps * parameters.rules.swing_mps:
+        if square_m2ps2 < _NOTHING_M2PS2:
+            clear(swing_mps)
+        return
+    along_m2ps2, peak_m2ps2 = dot(swing_mps, peak_mps), passivity.peak_m2ps2
+    has_reversed = along_m2ps2 < 0.0 and along_m2ps2 * along_m2ps2 > 0.5 * square_m2ps2 * peak_m2ps2
+    if has_reversed or is_late:
+        is_ripple = square(passivity.slow_mps) > _SLOW_RATIO * _SLOW_RATIO * peak_m2ps2
+        passivity.reversals = 0 if is_late or is_ripple else passivity.reversals + 1
+        passivity.reversed_s = 0.0
+    elif along_m2ps2 <= peak_m2ps2:
+        return
+    copy(swing_mps, peak_mps)
+    passivity.peak_m2ps2 = square_m2ps2
 
 
 @part
@@ -320,7 +368,11 @@ def reduce_gain(
     """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
     left_j = _judge_debt(parameters, state, passivity, left_j)
-    if passivity.debt == layout.DEBT_FORGIVEN:
+    if passivity.reversals >= _REVERSALS:
+        passivity.debt = layout.DEBT_OWN
+        calmed = max(passivity.gain * (1.0 - parameters.period_s / _CALMED_S), _LEAST_GAIN)
+        passivity.gain = min(passivity.gain, calmed)
+    elif passivity.debt == layout.DEBT_FORGIVEN:
         passivity.gain = min(passivity.gain + parameters.period_s / _REGAINED_S, 1.0)
     elif parameters.link.acts == 0:
         passivity.gain = min(passivity.gain * (1.0 + _RECOVERY_PER_S * parameters.period_s), 1.0)

@@ -32,7 +32,8 @@ class ForceRules(NamedTuple):
     energy: with that of 1 Hz, a handle of 200 g let go in tar oscillated at 35 Hz on energy that 35 Hz do not store.
     ``known_force_ticks`` is the shortest delay at which "kalman" computes inertial forces with the known force instead
     of smoothing and limiting them (`kernels.known_force`), up to an inertia of ``most_known_inertia`` times the least
-    mass of the device and a scale of ``most_known_scale``: beyond, the force was noisy.
+    mass of the device and a scale of ``most_known_scale``: beyond, the force was noisy. ``swing_mps`` is the
+    least speed at which reversals count as an oscillation of the handle, which lowers the gain (`passivity`).
     """
 
     version: int
@@ -54,6 +55,7 @@ class ForceRules(NamedTuple):
     known_force_ticks: int = 99
     most_known_inertia: float = 7.0
     most_known_scale: float = 3.0
+    swing_mps: float = math.inf
 
 
 VERSIONS: Final = {
@@ -81,8 +83,9 @@ VERSIONS: Final = {
     )
 }
 VERSIONS[4] = VERSIONS[3]._replace(version=4, known_force_ticks=1)
+VERSIONS[5] = VERSIONS[4]._replace(version=5, swing_mps=0.01)
 
-FORCE_RULES: Final = 4
+FORCE_RULES: Final = 5
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are
 a new version."""
 CURRENT: Final = VERSIONS[FORCE_RULES]

@@ -506,6 +506,11 @@ PASSIVITY = np.dtype(
         ("fast_s", np.float64),  # for how long the hand moved fast of late
         ("quiet_s", np.float64),  # for how long it has been quiet
         ("gap_s", np.float64),  # time since the last gap in the samples
+        ("swing_mps", np.float64, (3,)),  # the fast part of the velocity, smoothed over 4 ms
+        ("peak_mps", np.float64, (3,)),  # its greatest value since its last reversal
+        ("peak_m2ps2", np.float64),  # the square of that
+        ("reversed_s", np.float64),  # time since that reversal
+        ("reversals", np.int64),  # number of successive ones, each sooner than a hand can reverse
         ("debt", np.int64),  # DEBT_*: why force is or was withheld
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.model import laws
 from study_app.haptics.model import motion as paths
-from study_app.haptics.model.force_rules import VERSIONS
+from study_app.haptics.model.force_rules import CURRENT, VERSIONS
 from study_app.haptics.model.layout import LIMITER_ENERGY
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Body, ForceLink
@@ -369,3 +369,39 @@ def test_a_debt_that_begins_in_slow_motion_or_after_a_gap_is_not_forgiven(other)
 def test_with_a_force_link_no_debt_is_forgiven():
     linked = HONEY.model_copy(update={"link": ForceLink(delay_s=0.001)})
     assert indebted(Hand(linked), fast=True).max() < 0.1
+
+
+def oscillating_gains(hz, speed_mps, *, stroke_mps=0.0, seconds=1.0, rules=CURRENT):
+    """Return the controller's gain after each millisecond of an imposed oscillation on a slow sine of 1 Hz."""
+    hand, gains = Hand(HONEY, rules=rules), []
+    for t_s in np.arange(0.0, 1.0 + seconds, 1e-3):
+        x_m = stroke_mps * np.sin(2 * np.pi * t_s) / (2 * np.pi)
+        if t_s > 1.0:
+            x_m += speed_mps * np.sin(2 * np.pi * hz * (t_s - 1.0)) / (2 * np.pi * hz)
+        hand.tick((38e-6 * np.round(x_m / 38e-6), 0.0, 0.0))
+        gains.append(float(passivity(hand).gain))
+    return np.array(gains[1000:])
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(("hz", "speed_mps"), [(12.5, 0.06), (20.0, 0.03), (45.0, 0.05)])
+def test_the_gain_falls_while_the_handle_oscillates_faster_than_a_hand_can(hz, speed_mps):
+    gains = oscillating_gains(hz, speed_mps)
+    assert (gains[: int(2.5e3 / hz)] == 1.0).all()
+    assert gains[-1] == pytest.approx(0.05)
+    assert (oscillating_gains(hz, speed_mps, rules=VERSIONS[4]) == 1.0).all()
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    "motion",
+    [
+        {"hz": 8.0, "speed_mps": 0.5},
+        {"hz": 20.0, "speed_mps": 0.005},
+        {"hz": 20.0, "speed_mps": 0.05, "seconds": 0.1},
+        {"hz": 20.0, "speed_mps": 0.05, "stroke_mps": 0.8, "seconds": 0.2},
+    ],
+    ids=["strokes of 8 Hz", "tremor", "two periods", "ripples of a stroke"],
+)
+def test_the_gain_stays_in_what_a_hand_does(motion):
+    assert (oscillating_gains(**motion) == 1.0).all()

@@ -23,6 +23,7 @@ RELEASED = {
     "known_force_ticks": 99,
     "most_known_inertia": 7.0,
     "most_known_scale": 3.0,
+    "swing_mps": math.inf,
 }
 
 
