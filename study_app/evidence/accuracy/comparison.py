@@ -14,6 +14,7 @@ from study_app.errors import StudyError
 from study_app.evidence import reference_solutions as truths
 from study_app.evidence.accuracy import candidates as models
 from study_app.evidence.accuracy.candidates import Candidate, with_given_velocity
+from study_app.evidence.accuracy.plain_c import compare_with_plain_c
 from study_app.evidence.cfd.stored_flows import solver_truths
 from study_app.evidence.computer import machine
 from study_app.evidence.cost import TickTimer
@@ -98,7 +99,8 @@ class ActingError(NamedTuple):
 class Accuracy:
     """All results: rows, sources of the references, omitted candidates with reasons, machine and motion.
 
-    ``acting`` are the errors of the force on the hand in ``acting_liquid``.
+    ``acting`` are the errors of the force on the hand in ``acting_liquid``. ``plain_c`` is the time of the whole tick
+    relative to plain C, as a sentence.
     """
 
     rows: tuple[Row, ...]
@@ -108,6 +110,7 @@ class Accuracy:
     motion: str
     acting: tuple[ActingError, ...] = ()
     acting_liquid: str = ""
+    plain_c: str = ""
 
     def of(self, kind: Kind) -> tuple[Row, ...]:
         return tuple(row for row in self.rows if row.kind == kind)
@@ -166,6 +169,7 @@ def accuracy(
     rows = tuple(replace(row, on_front=row.candidate in fronts) for row in measured)
     progress("force on the hand")
     subject = physical or numerical
+    plain_c = "" if numerical is None else _in_plain_c(numerical, repeats * batches)
     acting = () if subject is None else _acting_errors(subject, batches)
     liquid = "" if subject is None else subject.liquids[0].id
     return Accuracy(
@@ -176,6 +180,21 @@ def accuracy(
         motion=named,
         acting=acting,
         acting_liquid=liquid,
+        plain_c=plain_c,
+    )
+
+
+def _in_plain_c(scene: Scene, batches: int) -> str:
+    """Return the time of a tick relative to plain C, or why it was not measured, as a sentence."""
+    liquid = scene.liquids[0].id
+    try:
+        found = compare_with_plain_c({liquid: scene}, batches=batches)[liquid]
+    except StudyError as error:
+        return f"The time of a tick relative to plain C was not measured: {error}."
+    return (
+        f"A whole tick of the servo in {liquid}, with estimator and safety layer, takes {found.tick_ns:.0f} ns, "
+        f"{found.ratio:.1f} times as long as velocity and force in plain C ({found.plain_ns:.0f} ns; the forces differ "
+        f"by at most {found.difference:.0e} of the greatest)."
     )
 
 

@@ -1,5 +1,8 @@
 """Accuracy and computation time: a reduced table and its signs."""
 
+import re
+import shutil
+
 import pytest
 
 from study_app.evidence.accuracy.comparison import accuracy
@@ -25,6 +28,13 @@ def test_all_that_keeps_the_definition_differs_by_rounding(found):
     for name in ("O(1) wake", "O(N) compiled"):
         assert rows[name].error.rms < 1e-11, name
     assert 1e-9 < rows["O(N) compiled, float32"].error.rms < 1e-4
+
+
+@compiled
+def test_the_whole_tick_is_compared_with_plain_c(found):
+    compared = r"A whole tick of the servo in water, .* takes \d+ ns, \d+\.\d times as long as .* in plain C \(\d+ ns"
+    missing = r"The time of a tick relative to plain C was not measured: there is no C compiler \(gcc\)\."
+    assert re.match(compared if shutil.which("gcc") else missing, found.plain_c)
 
 
 @compiled
