@@ -215,3 +215,13 @@ def test_the_head_of_a_trial_of_intervals_stays_in_its_room(qapp: QApplication, 
     painter.end()
     assert not image.isNull()
     assert end <= room.width() + 10 * scale + 1
+
+
+def test_a_head_without_words_has_bars_only(qapp: QApplication) -> None:
+    """A break between the trials of the only part has neither part nor label."""
+    painter = QPainter(image := QImage(400, 40, QImage.Format.Format_RGB32))
+    progress = Progress(part=1, parts=1, label="", index=2, of=3)
+    end = draw_progress(painter, QRectF(0, 0, 360, 40), progress, words("en"))
+    painter.end()
+    assert not image.isNull()
+    assert end > 100  # three bars of 40 px

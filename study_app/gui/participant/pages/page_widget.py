@@ -172,7 +172,8 @@ def draw_progress(
         QFontMetricsF(font("statement", scale=scale, weight=weight)).horizontalAdvance(text)
         for text, weight, _ in texts
     ]
-    scale *= min(1.0, room.width() / (sum(widths) + 14 * scale * len(texts)))
+    if texts:
+        scale *= min(1.0, room.width() / (sum(widths) + 14 * scale * len(texts)))
     painter.save()
     painter.setLayoutDirection(Qt.LayoutDirection.RightToLeft if flip else Qt.LayoutDirection.LeftToRight)
     for text, weight, colour in texts:
