@@ -251,11 +251,9 @@ def _own_questions(name: str, study: Study) -> Iterator[OwnQuestion]:
 
 
 def _unit_of(study: Study, path: Place) -> str:
-    """Return the unit of a stimulus' numbers, that of the varied key."""
+    """Return the unit of a stimulus' numbers, that of the varied key; "" for other numbers."""
     varied = study.document.get(path[0], {}).get(path[1], {}).get("vary") if path[0] == "stimuli" else None
-    if isinstance(varied, str):
-        return unit_of(varied)
-    return "times" if path[-1] == "repetitions" else ""
+    return unit_of(varied) if isinstance(varied, str) else ""
 
 
 def study_choices(opened: Document | None) -> tuple[StudyChoice, ...]:

@@ -309,8 +309,9 @@ class _Arrangement(QWidget):
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
-        """Note which part has keyboard focus; close the drawer when another part takes it."""
+        """Note which part has keyboard focus and show its help; close the drawer when another part takes it."""
         parts = (self.outline, self.form, self.pane)
+        self.form.show_help_of(now)
         self.used = next((part for part in parts if now is not None and part.isAncestorOf(now)), self.used)
         if self.drawer and now is not None and self.isAncestorOf(now) and not self.outline.isAncestorOf(now):
             self._hide_drawer()

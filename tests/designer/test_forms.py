@@ -5,9 +5,9 @@ from typing import Any
 import pytest
 import shiboken6
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
-from study_app.designer.document.steps import AddKey, RenameElement
+from study_app.designer.document.steps import AddKey, ChangeLanguage, RenameElement
 from study_app.designer.document.toml_edits import Set
 from study_app.gui.widgets.controls import IconButton
 
@@ -83,6 +83,33 @@ def test_the_next_element_has_no_selected_entries_and_shows_the_field_with_the_k
     assert area.verticalScrollBar().maximum()
     assert designer.place.form.inside.isAncestorOf(designer.keyboard)
     assert area.viewport().rect().contains(designer.keyboard.mapTo(area.viewport(), designer.keyboard.rect().center()))
+
+
+def test_the_help_is_that_of_the_row_with_the_keyboard(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    for key in ("title", "conditions", "phase", "task"):
+        row = designer.form_row("blocks", "liquids", key)
+        keyboard = next(part for part in row.findChildren(QWidget) if part.focusPolicy() & Qt.FocusPolicy.TabFocus)
+        keyboard.setFocus()
+        assert designer.place.form.foot.title.text() == row.row.label
+
+
+def test_a_text_loses_its_selection_with_the_keyboard(designer: Any) -> None:
+    designer.open("kitchen", *QUESTIONNAIRE)
+    (line,) = designer.field(*QUESTIONNAIRE, "intro").findChildren(QPlainTextEdit)
+    line.setFocus(Qt.FocusReason.TabFocusReason)
+    assert line.textCursor().hasSelection()
+    designer.form_row(*ITEMS).field.take_keyboard()
+    assert not line.textCursor().hasSelection()
+
+
+def test_the_name_of_an_incomplete_language_is_whole(designer: Any) -> None:
+    designer.open("kitchen", "study", width=1920)
+    designer.editing.handle_request(ChangeLanguage("add", "fr"))
+    designer.editing.make_step("Change", Set((*ITEMS, 0, "text"), {"en": "Honey", "fr": "Honey"}))
+    QApplication.processEvents()
+    row = designer.field("study", "languages").rows[-1]
+    assert "French" in [label.text() for label in row.findChildren(QLabel)]
 
 
 @pytest.mark.parametrize("row", [("scales", "agreement", "labels"), (*ITEMS, 0, "text")])

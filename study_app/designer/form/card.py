@@ -839,6 +839,12 @@ class FormCard(Card):
         row.show_messages()
         self.show_help()
 
+    def show_help_of(self, part: QWidget | None) -> None:
+        """Show the help of the row that contains a part, if any."""
+        row = next((row for row in self.rows if part is not None and row.isAncestorOf(part)), None)
+        if row is not None and row is not self._focused:
+            self._show_focused_row(row)
+
     def show_help(self) -> None:
         row = self._focused if self._focused in self.rows else next(iter(self.rows), None)
         if row is None:

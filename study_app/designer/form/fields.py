@@ -246,6 +246,13 @@ class TypedText(_Typed, QPlainTextEdit):
             self.setPlainText(text)  # Qt makes a paragraph of each line separator, so the text may differ
             self._showing = False
 
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() not in {Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason}:
+            cursor = self.textCursor()  # a line loses its selection in Qt, a text does not
+            cursor.clearSelection()
+            self.setTextCursor(cursor)
+
 
 class TypedSentence(TypedText):
     """A sentence that wraps into as many lines as it needs and fit; Enter accepts it."""

@@ -270,7 +270,7 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
         counts, copied = texts_by_language(study), copied_texts(study)
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
             (present, wanted), alike = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
-            note = f"{present - alike} of {wanted} texts" + (f", {alike} still to translate" if alike else "")
+            note = f"{present - alike} of {wanted} texts" + (f", {alike} to translate" if alike else "")
             yield Entry((*row.path, at), language_name(str(code)), note, wanted - present)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))

@@ -32,7 +32,7 @@ from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.themed import name_scroll_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
-from study_app.gui.widgets.labels import Elided, figures
+from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import typed_numbers
 from study_app.protocol.source.document import Path
@@ -406,8 +406,7 @@ class LanguageListField(EntryList):
         codes = [str(code) for code in row.value] if isinstance(row.value, tuple) else []
         first = row.entries[0].title if row.entries else ""
         for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
-            title, note = Elided("label", "bad" if entry.faults else "text"), Elided("small", "text2")
-            title.show_text(entry.title)
+            title, note = label(entry.title, "label", "bad" if entry.faults else "text"), Elided("small", "text2")
             note.show_text(entry.note)
             note.setAlignment(RIGHT)
             description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"

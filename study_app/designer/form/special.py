@@ -429,9 +429,10 @@ def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
 
 
 def _measures_of_design(study: Study, block: str) -> tuple[tuple[str, str], ...]:
-    """Return the measures of a block with a design; all that are possible while the study has problems."""
-    formed = study.formed
-    known = OF_LEVELS if formed is None else measures_of(formed, formed.blocks[block])
+    """Return the measures of a block with a design; every measure if the block has problems."""
+    protocol = valid_part(study).protocol
+    valid = None if protocol is None else protocol.blocks.get(block)
+    known = OF_LEVELS if protocol is None or valid is None else measures_of(protocol, valid)
     return tuple(measure for measure in _MEASURES if measure[0] in known)
 
 
@@ -458,8 +459,8 @@ def _comparable_items(study: Study) -> Iterator[Compared]:
 
 
 def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
-    """Return the numbers and scores of the forms after each block as FORM/ID with their words; empty if faulty."""
-    protocol, after = study.protocol, dict[str, tuple[tuple[str, str], ...]]()
+    """Return the numbers and scores of the valid forms after each block as FORM/ID with their words."""
+    protocol, after = valid_part(study).protocol, dict[str, tuple[tuple[str, str], ...]]()
     if protocol is None:
         return after
     exchanged = [] if protocol.study.block_order == "fixed" else [block.id for block in protocol.main_blocks]

@@ -86,7 +86,7 @@ class MeasuresPage(_MeasureCards):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.power = PowerCard()
         self.column.addWidget(self.power)
-        self.column.addStretch()
+        self.column.addStretch(1)
         self.column.setStretchFactor(self.grid, 0)
 
     def show_parts(self, shown: MeasuresView) -> None:

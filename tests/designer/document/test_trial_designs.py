@@ -8,6 +8,7 @@ from study_app.designer.document.steps import (
     AddEntry,
     AddKey,
     AddLiquid,
+    ChangeLanguage,
     RemoveKey,
     SetValue,
     Situation,
@@ -171,3 +172,7 @@ def test_a_hypothesis_on_a_design_of_conditions_begins_with_d_prime(study: Study
     first, _ = next(row.facts for row in rows if row.path == ("analysis", "contrasts"))
     assert first.measures[0] == ("d_prime", "Sensitivity d′")
     assert not {"threshold", "pse", "exponent"} & {measure for measure, _ in first.measures}
+    untranslated = after(two, ChangeLanguage("add", "fr"))
+    assert untranslated.protocol is None
+    rows = (row for section in form_of(untranslated, ("sequence",)).sections for row in section.rows)
+    assert next(row.facts for row in rows if row.path == ("analysis", "contrasts"))[0].measures == first.measures

@@ -21,6 +21,8 @@ def test_power_is_shown_in_parts_cancelled_by_an_edit_and_kept(qtbot: Any, desig
     assert worker.orders[0].power
     assert power.progress.text() == WAITING
     assert not power.table.isVisible()
+    cards = designer.place.measures.grid
+    assert cards.height() == cards.sizeHint().height()  # no gap above the power
     worker.answer("10 of 200 studies of each size")
     qtbot.waitUntil(lambda: power.progress.text() == "10 of 200 studies of each size")
     assert "| 12 | 80% |" in power.table.text()
