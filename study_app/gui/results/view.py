@@ -482,6 +482,9 @@ class ResultsPlace(Place):
         self.unblind.setVisible(view.sealed is True)
         for button in (self.unblind, self.export, self.report):
             button.setEnabled(view.can_be_written)
+        if unblinding := any(isinstance(order, OpenKey) for order in self._orders.values()):
+            self.unblind.setEnabled(False)
+        self.unblind.show_action("eye", "Unblinding …" if unblinding else "Unblind …")
         self.exclusions.leave_out.setEnabled(any(session.excluded is None for session in view.sessions))
         self._panel.setVisible(view.chosen is not None)
         self.figures.show_view(view)
@@ -834,6 +837,7 @@ class ResultsPlace(Place):
     def _order_decision(self, what: str, order: Callable[..., _Decided], **details: Any) -> None:
         if self.view.chosen is not None:
             self._send_order(order(folder=self.view.chosen, **details), what)
+            self.show_view(self.view)
 
     def _start_writing(self, make: Callable[..., WriteTables | WriteReport], *details: Any) -> None:
         if self.view.chosen is not None:

@@ -149,6 +149,7 @@ def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
     assert "1 session is not complete" in said
     assert "cannot be undone" in said
     assert decided(qtbot, place, "AK", "closed") == OpenKey(place.view.chosen, "AK", "closed")
+    assert (place.unblind.text(), place.unblind.isEnabled()) == ("Unblinding …", False)
 
 
 def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
