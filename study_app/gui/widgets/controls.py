@@ -384,7 +384,7 @@ class Radio(Themed, QRadioButton):
 
 
 def _marked_size(button: QAbstractButton) -> QSize:
-    return QSize(round(QFontMetricsF(button.font()).horizontalAdvance(button.text())) + 34, 32)
+    return QSize(round(QFontMetricsF(button.font()).horizontalAdvance(button.text())) + 36, 32)
 
 
 def _begin_mark(button: QAbstractButton, theme: Theme) -> tuple[QPainter, QRectF]:
@@ -393,8 +393,11 @@ def _begin_mark(button: QAbstractButton, theme: Theme) -> tuple[QPainter, QRectF
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(QColor(theme.text if button.isEnabled() else theme.text3))
     painter.setFont(button.font())
-    room = QRectF(30, 0, button.width() - 30, button.height())
+    room = QRectF(32, 0, button.width() - 32, button.height())
     painter.drawText(room, Qt.AlignmentFlag.AlignVCenter, button.text())
-    marked = button.isChecked() or button.hasFocus()
-    painter.setPen(QPen(QColor(theme.accent if marked else theme.ctl), 2 if button.hasFocus() else 1.4))
-    return painter, QRectF(2, button.height() / 2 - 9, 18, 18)
+    mark = QRectF(4, button.height() / 2 - 9, 18, 18)
+    if button.hasFocus():
+        painter.setPen(QPen(QColor(theme.accent), 2))
+        painter.drawRoundedRect(mark.adjusted(-3, -3, 3, 3), 8, 8)
+    painter.setPen(QPen(QColor(theme.accent if button.isChecked() else theme.ctl), 1.4))
+    return painter, mark

@@ -6,10 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtGui import QColor, QFontInfo, QImage
-from PySide6.QtWidgets import QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLineEdit, QPlainTextEdit, QVBoxLayout, QWidget
 
 from study_app.gui.theme import icons
 from study_app.gui.theme.theme import DARK, LIGHT, PARTICIPANT, TANK, Theme, font, load_fonts, stylesheet
+from study_app.gui.theme.themed import apply_theme
+from study_app.gui.widgets.controls import Check, Radio
 
 THEMES = [LIGHT, DARK, PARTICIPANT]
 
@@ -79,6 +81,26 @@ def test_a_refused_field_with_the_keyboard_shows_both(
         row = {image.pixelColor(x, image.height() // 2).name().upper() for x in range(image.width())}
         colours.append(row & {theme.accent, theme.bad})
     assert colours == [{theme.accent, theme.bad}, {theme.bad}]
+
+
+@pytest.mark.parametrize("kind", [Check, Radio])
+def test_a_marked_button_with_the_keyboard_has_a_ring(qtbot: Any, kind: type[QAbstractButton]) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    column = QVBoxLayout(window)
+    buttons = [kind(), kind()]
+    for button in buttons:
+        button.setAutoExclusive(False)
+        button.setChecked(True)
+        column.addWidget(button)
+    apply_theme(window, LIGHT)
+    window.show()
+    window.activateWindow()
+    buttons[0].setFocus()
+    qtbot.waitUntil(buttons[0].hasFocus)
+    drawn = [button.grab().toImage() for button in buttons]
+    inked = [[image.pixelColor(x, image.height() // 2).lightnessF() < 0.6 for x in (1, 2)] for image in drawn]
+    assert inked == [[True, False], [False, False]]
 
 
 def test_every_icon_paints_inside_its_square(qapp: object) -> None:
