@@ -254,7 +254,7 @@ def fit(
     levels : tuple of float
         The smallest and the largest possible level.
     design : str
-        Kind of the design, such as ``"2ifc"`` or ``"yesno"``, which determines the guess rate.
+        Kind of design, such as ``"2ifc"`` or ``"yesno"``, which determines the guess rate.
     spacing : str
         Whether levels are evenly spaced logarithmically or linearly.
     distances : bool

@@ -91,7 +91,7 @@ def split(text: str, names: Collection[str], *, comment: str = "") -> TextTable:
                 lines.append(Line(begin, fields))
             begin = reader.line_num + 1
     except csv.Error as error:
-        raise ValueError(f"line {begin} is not CSV ({error})") from error
+        raise ValueError(f"line {begin} is not valid CSV ({error})") from error
     return TextTable(_names_of(header, separator), tuple(lines[1:]))
 
 

@@ -54,7 +54,7 @@ def test_a_table_with_one_reading_is_read(text: str) -> None:
         (b'rate,stress\n0.1,21\n2.5,"1,2,3"\n', "line 3: '1,2,3' is not a finite number"),
         (b"rate,stress\n0.1,21\nnan,3\n", "line 3: 'nan' is not a finite number"),
         (b"rate,stress\n0.1,21\n1_0,3\n", "line 3: '1_0' is not a finite number"),
-        (b'rate,stress\n0.1,"21\n', "line 2 is not CSV"),
+        (b'rate,stress\n0.1,"21\n', "line 2 is not valid CSV"),
         ("rate,stress\n0.1,21\n".encode("utf-16"), "it is not UTF-8 text but seems to be UTF-16: save it as CSV"),
         ("rate,stress\n0.1,21\n".encode("utf-16-le"), "it is not UTF-8 text but seems to be UTF-16: save it as CSV"),
         (b"rate,stress\n0.1,21\n# 20 \xb0C\n", "it is not UTF-8 text in line 3: save it as CSV in UTF-8"),

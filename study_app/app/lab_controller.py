@@ -277,7 +277,7 @@ _INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
 _INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
 _FRAME_MS: Final = 33
 _APPRAISE_AFTER_MS: Final = 300
-COMPILING: Final = "Compiling the force model (takes about a minute, once after each installation or update)"
+COMPILING: Final = "Compiling the force model (about a minute; only needed after an installation or update)"
 
 
 class LabController(QObject):

@@ -37,7 +37,9 @@ from study_app.number_text import counted
 )
 @click.option("--parquet", is_flag=True, help="Also write every table as a Parquet file.")
 @click.option(
-    "--sav", is_flag=True, help="Also write the answers, long and wide, for SPSS, jamovi and JASP; requires pyreadstat."
+    "--sav",
+    is_flag=True,
+    help="Also write the answers, in long and wide format, for SPSS, jamovi and JASP; requires pyreadstat.",
 )
 @click.option(
     "--psych-ds",
@@ -375,8 +377,8 @@ def proof(
 ) -> None:
     """Print a proof of a study: one line for each session, withdrawal, unblinding and exclusion.
 
-    Keep the lines where people who can change the results cannot change them; verify --fingerprints compares the study
-    with them.
+    Store these lines where people with access to the results cannot change them; verify --fingerprints compares the
+    study with these lines.
     """
     from study_app.store import workstation
     from study_app.store.atomic import write_file

@@ -178,7 +178,7 @@ def _motion_along(path: str, scene: Scene) -> Motion:
     is_flag=True,
     help=(
         "Compute the flow again instead of using the stored tables (20 minutes on an idle core, an hour on a busy "
-        "one); requires the extra cfd (NGSolve, 350 MB)."
+        "one); requires the cfd extra (NGSolve, 350 MB)."
     ),
 )
 @click.option(
@@ -312,7 +312,7 @@ def stability(
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable and noisy ones.
 
     Each case combines a liquid, a scale, a rate, a delay, an estimator, a device and a hand. Further groups test a
-    second model of hand and device, a wrong delay estimate, lost samples, releases in mid-stroke, and the Falcon's
+    second model of hand and device, a wrong delay estimate, lost samples, releases mid-stroke, and the Falcon's
     driver with an emulated Falcon. The exit code is 3 if a case is unstable with the safety layer on, or if more than 1
     in 10,000 cases are noisy.
     """
@@ -437,7 +437,7 @@ def timing(
 ) -> None:
     """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
-    The measurement switches between the four every quarter of a second, in each priority class that the system grants.
+    The measurement switches among the four every quarter of a second, in each priority class that the system grants.
     Ctrl+C ends the command.
 
     With --delays, a session presents the delays of rek2024 on 60 and 144 Hz screens, with and without load, and the
@@ -616,14 +616,14 @@ def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
-    """Measure how often the report's verdicts are wrong in simulated studies with none, some or all of the effects.
+    """Measure how often the report's verdicts are wrong in simulated studies with no, some or all effects.
 
     The report's own tests are applied to simulated rek2024 studies with 5, 12 and 24 participants. The answers come
     from the answer model used in rehearsals or from an ordinal probit model with random effects. The command prints
     each rate with its Wilson interval and says whether the rate meets its limit. A limit of 5 % is met if the interval
     ends below 7.5 %, and exceeded if an interval corrected for the number of rates lies above 5 %. The tests for
     hypotheses, recognition, equivalence with a minority and skewed trends use values drawn directly from distributions.
-    If a rate is still undecided, more studies are simulated for its cell, up to four times the initial number. Ctrl+C
+    If a rate is still undecided, more studies are simulated for it, up to four times the initial number. Ctrl+C
     ends the command and prints the results so far. The exit code is 3 if a rate exceeds its limit; otherwise it is 4 if
     there are too few studies to decide on every rate.
     """
@@ -675,9 +675,9 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
     analyses many studies with 20 observers whose thresholds differ by a factor of 1.2. For magnitude estimation, the
-    exponent is known instead. The command then rehearses three participants with the servo, files, unblinding and
-    analysis. Every value is printed with its limit; the interval in brackets is corrected for the number of values. The
-    exit code is 3 if an interval lies beyond its limit.
+    exponent is specified instead. The command then runs complete sessions with three simulated participants, including
+    the servo, files, unblinding and analysis. Every value is printed with its limit; the interval in brackets is
+    corrected for the number of values. The exit code is 3 if an interval lies beyond its limit.
     """
     from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
     from study_app.evidence.thresholds.known_values import validate as validate_values
@@ -706,7 +706,7 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
 def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
-    """Compare delays that simulated participants rate as different (rek2024) and delays that they detect (delaydetect).
+    """Compare the delays rated as different (rek2024) and detected (delaydetect) by simulated participants.
 
     The ratings depend on each participant's criterion; the forced choices do not.
     """

@@ -71,13 +71,13 @@ def power(
 ) -> None:
     """Simulate studies to estimate the power of the protocol's own tests and the smallest detectable difference.
 
-    Four sessions are rehearsed to obtain the features of each condition. Thousands of participants are then simulated
-    with the answer model used in rehearsals, which is plausible but not based on measurements. Power is printed for
-    typical participants, or for the values in [simulated_participants], with the range across consistent, typical and
-    noisy participants. For a study of thresholds, d′, ratings or magnitude estimation, the command prints three values
-    for each number of participants and trials: the standard deviation of one participant's estimate, the half-width of
-    the group's 95 % interval, and the proportion of studies that reach analysis.precision. Ctrl+C ends the command and
-    prints the results so far.
+    Four complete sessions are simulated to obtain the forces and delays in each condition. Thousands of participants
+    are then simulated with the answer model used in rehearsals, which is plausible but not based on measurements. Power
+    is printed for typical participants, or for the values in [simulated_participants], with the range across
+    consistent, typical and noisy participants. For a study of thresholds, d′, ratings or magnitude estimation, the
+    command prints three values for each number of participants and trials: the standard deviation of one participant's
+    estimate, the half-width of the group's 95 % interval, and the proportion of studies that reach analysis.precision.
+    Ctrl+C ends the command and prints the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)

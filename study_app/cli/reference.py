@@ -62,7 +62,7 @@ def delayed_force_markdown() -> str:
     )
     tables = (
         (
-            "Remaining force [%], light hand (middle hand in brackets), `kalman`",
+            "Remaining force [%], light grip (medium grip in brackets), `kalman`",
             ("liquid", *(f"{delay:g} ms" for delay in delays)),
             shares,
         ),

@@ -213,9 +213,9 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
     "--answers-only",
     is_flag=True,
     help=(
-        "Simulate thousands of participants in seconds, to try out an analysis. Four sessions are rehearsed but not "
-        "stored; each participant's answers are then derived from the features of one of them. Measurement columns "
-        "contain n/a. Sessions are written without waiting for the disk."
+        "Simulate thousands of participants in seconds, to try out an analysis. Four complete sessions are simulated "
+        "but not stored; each answer is then generated from the forces and delays in one of them. Measurement columns "
+        "contain n/a. Files are written without waiting for the disk to confirm."
     ),
 )
 @click.option(

@@ -106,7 +106,7 @@ def acting_report(scene: Scene) -> str:
         own, of_kalman = (_acting(alone, velocity) for velocity in (scene.velocity, Kalman()))
         better = [ticks for ticks in _LATE_TICKS if of_kalman[ticks].error < own[ticks].error]
         lines.append(
-            f"{liquid.id} on the hand (middle hand, 0.2 kg, {WHOLE}), {scene.velocity.kind}: {_acting_text(own)}"
+            f"{liquid.id} on the hand (medium grip, 0.2 kg, {WHOLE}), {scene.velocity.kind}: {_acting_text(own)}"
         )
         if better:
             lines.append(f'  with velocity = {{ kind = "kalman" }}: {_acting_text(of_kalman)}')

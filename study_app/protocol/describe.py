@@ -62,7 +62,7 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
         for name, condition in protocol.conditions.items()
     ]
     warned = [f"  {sentence}" for sentence in warnings(protocol, without_force=without_force)]
-    decided = [("nothing", "there is no [analysis] table, so the report will call all findings exploratory")]
+    decided = [("nothing", "there is no [analysis] table, so the report will label all findings as exploratory")]
     if protocol.analysis is not None:
         named = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
         decided = list(protocol.analysis.described(named))

@@ -56,7 +56,7 @@ __all__ = [
 
 MAX_FORCE_N = 8.0
 HandForceN: TypeAlias = Annotated[
-    float, within(0.1, MAX_FORCE_N, "participants hardly feel less than 0.1 N, and 8 N is the maximum safe force")
+    float, within(0.1, MAX_FORCE_N, "participants can barely feel less than 0.1 N, and 8 N is the maximum safe force")
 ]
 
 
@@ -312,14 +312,14 @@ class Limits(Table):
         "follows [%]; default: 40.",
     )
     attempts: Annotated[int, Field(ge=1, le=100)] | None = later(
-        default=None, description="Maximum number of attempts to deliver a trial with intervals; default: 3."
+        default=None, description="Maximum number of attempts to deliver an interval trial; default: 3."
     )
     missing_percent: (
         Annotated[float, within(0, 100, "a proportion of the trials; 0 means that all trials are required")] | None
     ) = later(
         default=None,
         description=(
-            "Maximum proportion of undelivered trials among a session's main trials with intervals [%]; above this, "
+            "Maximum proportion of undelivered trials among a session's main interval trials [%]; above this, "
             "the session is incomplete; default: 5."
         ),
     )
@@ -645,9 +645,7 @@ class Protocol(Table):
     questionnaires: dict[Id, Questionnaire] = Field(default_factory=dict)
     pages: dict[Id, PageText] = Field(default_factory=dict)
     stimuli: dict[Id, Stimulus] = later(default_factory=dict)
-    designs: dict[Kind, AnyDesign] = later(
-        default_factory=dict, description="How trials with intervals are constructed."
-    )
+    designs: dict[Kind, AnyDesign] = later(default_factory=dict, description="How interval trials are constructed.")
     methods: dict[Kind, AnyMethod] = later(default_factory=dict, description="How the levels of a stimulus are chosen.")
     blocks: Named[Block] = Field(min_length=1)
     sequence: Steps = Field(

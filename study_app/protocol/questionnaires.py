@@ -214,7 +214,8 @@ def _fill_in(
             whole["scale"] = scale_name(of, item["scale"])
         kind = item.get("kind", STATEMENT)
         if whole.get("kind", kind) != kind:
-            faults.append(Fault((*place, *(path or ()), "kind"), f'is "{kind}" in {of}: omit it', kind="surplus"))
+            fault = f'must be "{kind}", as in {of}: omit it'
+            faults.append(Fault((*place, *(path or ()), "kind"), fault, kind="surplus"))
             whole["kind"] = kind
         fields = KINDS[kind].model_fields
         ask(path, name, whole, *(key for key in ("text", "low", "high") if key in fields))

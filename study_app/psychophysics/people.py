@@ -135,9 +135,9 @@ class Expected:
     standards : int
         Number of standards in the group's mean.
     halves : mapping of str to sequence of float
-        Half the 95 % intervals of participants, in u, for each kind of people; infinite if nothing is measured.
+        Half the 95 % intervals of participants, in u, for each kind of participant; infinite if nothing is measured.
     spreads : mapping of str to float
-        Standard deviation of the estimate's error, in u, for each kind of people; infinite if nothing is measured.
+        Standard deviation of the estimate's error, in u, for each kind of participant; infinite if nothing is measured.
     threshold : float
         Approximate threshold, as a level; or the assumed d′, d_a or exponent.
     shared : mapping of str to float

@@ -217,7 +217,7 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     late_ms, gap_ms = facts.timing.lateness_p99_s * 1e3, facts.timing.worst_gap_s * 1e3
     worst = max(late_ms / limits.lateness_ms, gap_ms / limits.worst_gap_ms)
     about = (
-        f"99th percentile of ticks (limit: {limits.lateness_ms:g} ms); largest gap {gap_ms:.1f} ms (limit: "
+        f"99th percentile (limit: {limits.lateness_ms:g} ms); largest gap {gap_ms:.1f} ms (limit: "
         f"{limits.worst_gap_ms:g} ms); {counted(facts.timing.overruns, 'overrun')}"
     )
     advice = "Trials would be invalid: close other programs."
@@ -362,7 +362,7 @@ def _cost_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         about = (
             f"version {protocol.study.version} has already been run from a different file, with {facts.ran_otherwise}"
         )
-        advice = "Set a different study.version in the changed file; the report mentions the change in any case."
+        advice = "Set a different study.version in the changed file; the report mentions the change either way."
         yield Check("Study file", "warning", "changed", about=about, advice=advice)
 
     if facts.untranslated:

@@ -268,8 +268,8 @@ _OUTCOME = [column.name for column in _TRIALS].index("outcome")
 DELIVERED: tuple[Column, ...] = (
     _signed(
         "value_delivered",
-        "The varied quantity as delivered, in its unit: damping as fitted at the hand, a force delay as the lag "
-        "behind the model's force, any other quantity as requested; n/a for a visual delay, whose error is in "
+        "Delivered value of the varied quantity, in its unit. Damping is fitted at the hand, a force delay is the lag "
+        "behind the model's force, and any other quantity is as requested; n/a for a visual delay, whose error is in "
         "delay_error_mean_ms.",
     ),
     _signed(

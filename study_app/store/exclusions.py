@@ -226,7 +226,7 @@ def exclusions(folder: Path) -> tuple[Exclusion, ...]:
     except ValueError as error:
         raise StoreError(f"{path}: {error}") from error
     except csv.Error as error:
-        raise StoreError(f"{path} is not CSV ({error}): save it as CSV in UTF-8, with commas") from error
+        raise StoreError(f"{path} is not valid CSV ({error}): save it as CSV in UTF-8, with commas") from error
     if (separator := separator_of(text.partition("\n")[0], columns)) != ",":
         raise StoreError(f"{path} uses {separator!r} as a separator: save it as CSV with commas")
     if tuple(names[1]) not in (columns, early):

@@ -10,7 +10,7 @@ from typing import Any, Final, NamedTuple
 
 from study_app.errors import VideoError
 
-EXTRA: Final = "needs the optional extra video: pip install 'liquid-study[video]'"
+EXTRA: Final = "needs the optional video extra: pip install 'liquid-study[video]'"
 _SIZE: Final = (1280, 720)
 """Size of scaled frames until the tank sets its own [px]."""
 _NICE: Final = 5

@@ -75,7 +75,7 @@ class Camera:
     def __init__(self, source: str, now_ns: Callable[[], int], holds_s: float) -> None:
         self.source = source  # may contain a name and a password: use `without_login` to show or store it
         if not source:
-            raise VideoError("the camera is not set: specify it under This machine, for example as dshow:video=NAME")
+            raise VideoError("no camera is selected: specify one under This machine, for example as dshow:video=NAME")
         self._now_ns = now_ns
         self._holds_ns = round(holds_s * SECOND_NS) + _SPARE_NS
         self._changed = threading.Condition()

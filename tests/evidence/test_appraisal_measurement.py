@@ -129,7 +129,7 @@ def test_the_process_answers_the_newest_question_and_ends_when_closed() -> None:
 def test_what_cannot_be_measured_is_said() -> None:
     wild = THESIS["water"].model_copy(update={"rate_hz": 100.0})  # slower than any loop that is known to be stable
     told: list[object] = []
-    with pytest.raises(StudyError, match="no stable force is known"):
+    with pytest.raises(StudyError, match="no force is known to be stable"):
         appraise(Question(wild), told.append, lambda: False)
     assert told == []
 
@@ -156,7 +156,7 @@ def test_non_newtonian_liquids_are_compared_with_their_law_added_mass_and_buoyan
 def test_scene_states_what_acts_of_each_part_at_two_and_three_ticks_and_offers_kalman():
     own, offered = acting_report(load_scene("rek2024", "water")).splitlines()
     pattern = r"2 ticks: \d+ % of drag, (\d+) % of wake act, error [\d.]+ %; 3 ticks: .* % of wake act, error"
-    assert own.startswith("water on the hand (middle hand, 0.2 kg, 1.6 Hz ±20 mm), ewma: ")
+    assert own.startswith("water on the hand (medium grip, 0.2 kg, 1.6 Hz ±20 mm), ewma: ")
     assert offered.startswith('  with velocity = { kind = "kalman" }: ')
     assert int(re.search(pattern, own)[1]) < 20
     assert int(re.search(pattern, offered)[1]) > 70

@@ -153,7 +153,7 @@ def test_a_reason_is_kept_as_it_can_be_read(folder: Path) -> None:
 
 def test_a_list_with_an_endless_cell_is_named(folder: Path) -> None:
     (folder / "exclusions.csv").write_bytes(b"x" * 200_000)
-    with pytest.raises(StoreError, match=r"is not CSV \(field larger than field limit"):
+    with pytest.raises(StoreError, match=r"is not valid CSV \(field larger than field limit"):
         exclusions(folder)
 
 

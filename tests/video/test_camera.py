@@ -105,7 +105,7 @@ def test_a_camera_that_sends_nothing_without_closing_is_said_in_words() -> None:
 @pytest.mark.parametrize(
     ("source", "why"),
     [
-        ("", "^the camera is not set: specify it under This machine"),
+        ("", "^no camera is selected: specify one under This machine"),
         ("tcp://127.0.0.1:9", "the camera tcp://127.0.0.1:9 cannot be used: Connection refused"),
         ("v4l2:/dev/video77", "the camera v4l2:/dev/video77 cannot be used: No such file or directory"),
     ],

@@ -181,7 +181,7 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
         cells = [count for line in evenness.positions for count in line]
         after = evenness.after_another
         summary = (
-            f"each code occurs in each position {min(cells)} to {max(cells)} times and follows each other code "
+            f"each code occurs in each position {min(cells)} to {max(cells)} times and follows every other code "
             f"{min(after)} to {max(after)} times"
         )
         return [MeasureCard("Balance", aside, ((*verdict[:2], f"{verdict[2]}; {summary}"),))]

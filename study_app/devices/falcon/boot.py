@@ -105,7 +105,7 @@ def _blocks(data: bytes) -> tuple[Block, ...]:
         number = len(blocks) + 1
         if len(data) < at + 2:
             raise _refusal(
-                f"it is truncated: it ends at byte {len(data)}, after {len(blocks)} blocks, without an end mark"
+                f"it is truncated: it ends at byte {len(data)}, after {len(blocks)} blocks, without an end marker"
             )
         (word_count,) = struct.unpack_from("<H", data, at)
         if word_count == 0:
@@ -122,7 +122,7 @@ def _blocks(data: bytes) -> tuple[Block, ...]:
         raise _refusal("it does not contain any blocks to load")
     extra = len(data) - at - 2
     if extra:
-        raise _refusal(f"{extra} bytes follow the end mark at byte {at}")
+        raise _refusal(f"{extra} bytes follow the end marker at byte {at}")
     return tuple(blocks)
 
 

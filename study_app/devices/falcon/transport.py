@@ -448,7 +448,7 @@ def load_d2xx() -> Any:
 
 def probe(usb: Any = None, platform: str = sys.platform) -> Backend:
     """Return the state of libusb, or another backend of pyusb, on a platform."""
-    can = "force up to 8 N; needs its firmware and homing each time the device is turned on"
+    can = "force up to 8 N; load its firmware and home it each time it is turned on"
     by = f"libusb {_version()}"
     usb = usb if usb is not None else libusb_package.get_libusb1_backend()
     if usb is None:

@@ -79,8 +79,8 @@ def draw(accuracy: Accuracy) -> Figure:
 
 
 _KEY: Final = (
-    "Points show each model's largest error across its references; a thin line extends to the smallest. The ring "
-    "marks the model that the program uses. No other model is both faster and more accurate than a connected one. The "
+    "Points show each model's largest error across its references; a thin line extends to the smallest. The ring marks "
+    "the model that the program uses. For each connected model, no other model is both faster and more accurate. The "
     "effect of fewer ticks per second on stability is not shown. "
 )
 
@@ -103,7 +103,7 @@ def _draw_acting(figure: FigureBase, accuracy: Accuracy, height_pt: float) -> No
         figure,
         "Error of the force on the hand, including the delay",
         f"{accuracy.acting_liquid}; a typical hand moves a 0.2 kg handle randomly, at about 1.6 Hz and with the power "
-        "of a ±20 mm oscillation. Numbers: ticks of delay. Bars: smallest error of any linear estimator.",
+        "of a ±20 mm oscillation. Numbers are ticks of delay; bars show the smallest error of any linear estimator.",
         height_pt,
     )
     axes = _axes_at(figure, _ACTING_TOP_PT, _PANEL_PT, height_pt)

@@ -51,8 +51,8 @@ _LIMIT_DELAYS: Final = (1, 2, 4)
 _COLOURS: Final = dict(zip(_MAP_DELAYS, (style.STEPS[0], style.STEPS[1], style.STEPS[3], style.STEPS[4]), strict=True))
 _CAPTION: Final = (
     "Lines show the boundary measured with the servo's own tick, an exact encoder and safety off. The dashed "
-    "line is b = B·α/(2 − α), extended to a delay; below it the loop is stable for any hand. Bars show the "
-    "limits in use; they exceed half of the boundary only at 1 kHz with up to one tick of delay."
+    "line is b = B·α/(2 − α), extended to include the delay; below it the loop is stable for any hand. Bars show the "
+    "limits in use; they exceed half the boundary only at 1 kHz with up to one tick of delay."
 )
 _CAPTION_LETTERS: Final = 112
 _MARKS: Final = dict(zip(_MAP_DELAYS, "osD^", strict=True))
@@ -84,7 +84,7 @@ def _boundary(axes: Axes) -> None:
         axes.plot(_FRICTIONS_NSPM, measured, marker=_MARKS[delay], markersize=3, label=str(delay), **look)
         axes.plot(_FRICTIONS_NSPM, proved, linestyle=(0, (3, 2)), linewidth=0.9, **look)
     _logarithmic(axes, _FRICTIONS_NSPM, (1, 10, 100))
-    axes.set_title(f"Maximum stable damping B [N·s/m]\nof {FREE_HANDLE_KG:g} kg at 1 kHz", pad=26)
+    axes.set_title(f"Maximum stable damping B [N·s/m]\nwith a {FREE_HANDLE_KG:g} kg handle at 1 kHz", pad=26)
     axes.set_xlabel("Friction b of the handle [N·s/m]", loc="right", labelpad=1)
     _name_curves(axes, 4)
 
@@ -386,8 +386,8 @@ def _limiters(swept: Swept) -> Iterator[str]:
 
 def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
     yield "RMS difference between the force sent and the model force clamped to 8 N, hand attached, worst of twelve"
-    yield "motions, in % of the RMS force; * more than 5 % and 0.05 N. The second number is the largest proportion of"
-    yield "ticks with such a difference."
+    yield "motions, as a percentage of the RMS force; * marks more than 5 % and 0.05 N. The second number is the"
+    yield "largest proportion of ticks with such a difference."
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
     for liquid, row in itertools.groupby(fidelities, key=lambda one: one.liquid):
         cells = (f"{f'{fidelity.share:.1%}' + ' *'[not fidelity.within]} {fidelity.beyond:6.1%}" for fidelity in row)

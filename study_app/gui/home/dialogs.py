@@ -140,8 +140,8 @@ class RehearsalDialog(Work):
 _FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 _HOLDS = "It will contain the folders protocols and results."
-_ROW_HINT = "the session uses that participant's order; leave empty if none"
-_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty if none"
+_ROW_HINT = "the session uses that participant's order; leave empty if nobody is replaced"
+_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty if nobody is replaced"
 _GROUP_HINT = "recorded as a property of the participant"
 
 

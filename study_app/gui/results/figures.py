@@ -498,7 +498,8 @@ class _WorkLine(Card):
             self.bar.show_share(going.share)
         elif untested:
             self.words.show_text(
-                "The computation was stopped before the tests ran, so recognition and the lowest delays are missing."
+                "The computation was stopped before the tests ran, so the recognition results and the lowest delays "
+                "are missing."
             )
 
 

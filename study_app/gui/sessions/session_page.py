@@ -177,7 +177,7 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bo
     return (
         f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded one of the study's "
         "limits. The answers are still included; in Results you can exclude trials that you do not trust. The "
-        f"column “Limits” and the line below the table show which limit.{later}"
+        f"column “Limits” and the line below the table show which limit was exceeded.{later}"
     )
 
 

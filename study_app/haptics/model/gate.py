@@ -266,7 +266,7 @@ def _barred_effects(scene: Scene, liquid: Liquid, bound_of: Mapping[Effect, floa
         for name in names
     }
     return barred | dict.fromkeys(
-        _NEVER_BY_ITSELF, "cannot be selected from density and viscosity: to use it, list it in effects"
+        _NEVER_BY_ITSELF, "cannot be selected automatically from density and viscosity: to use it, list it in effects"
     )
 
 

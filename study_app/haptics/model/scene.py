@@ -226,7 +226,7 @@ class ForceLink(Frozen):
 def too_long_delay(rate_hz: float) -> str:
     """Return the error message of a link that does not fit."""
     return (
-        f"the force's delay and jitter together must be below {1000 * STORED_FORCES / rate_hz:g} ms at {rate_hz:g} Hz"
+        f"the sum of the force's delay and jitter must be below {1000 * STORED_FORCES / rate_hz:g} ms at {rate_hz:g} Hz"
     )
 
 

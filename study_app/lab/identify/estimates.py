@@ -152,7 +152,7 @@ def _parameter_warnings(
     for k, it in enumerate(problem.parameters):
         near = 1e-6 * max(1.0, abs(z[k]))
         if not acts[k]:
-            yield f"{it.name} does not change the {problem.compared}, so its initial value {it.value:g} was kept"
+            yield f"{it.name} does not affect the {problem.compared}, so its initial value {it.value:g} was kept"
         elif z[k] - problem.least[k] < near or problem.most[k] - z[k] < near:
             yield (
                 f"{it.name} reached the end of its range, {values[k]:.6g}{_edge_reason(problem, k, z)}: the best value "

@@ -75,8 +75,8 @@ def _caption(fit: Fit) -> str:
         f"autocorrelation is {fit.following:.2f}."
     ).replace("-", "−")
     along = (
-        " The right panel shows the residual along the motion against speed; dots are medians. A slope or "
-        "bend there indicates that the force law is wrong."
+        " The right panel plots the residual force in the direction of motion against speed; the dots are medians. A "
+        "slope or bend there indicates that the force law is wrong."
     )
     return text + along + "".join(f" Warning: {warning}." for warning in fit.warnings)
 

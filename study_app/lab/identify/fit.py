@@ -112,8 +112,8 @@ def _quantity_warnings(measured: Measured, axes: Sequence[int]) -> Iterator[str]
     along = float(np.sum(varying_n * velocity_mps)) / size if size else 0.0
     if along > _DRIVING:
         yield (
-            f"the measured values drive the body (their correlation with its velocity is {along:.2f}), but a liquid at "
-            "rest slows it down: specify the liquid's force on the body, not the body's force on the liquid"
+            f"the measured forces accelerate the body (their correlation with its velocity is {along:.2f}), but a "
+            "liquid at rest slows it down: specify the liquid's force on the body, not the body's force on the liquid"
         )
     left_n2 = 0.0
     for axis in axes:
@@ -196,7 +196,7 @@ def fit_curve(scene: Scene, liquid_id: str, names: Sequence[str], curve: FlowCur
     parameters = find_parameters(scene, liquid_id, names)
     for it in parameters:
         if it.table != CURVE_TABLE:
-            raise StudyError(f"{it.name} does not change a flow curve: fit parameters from the table {CURVE_TABLE}")
+            raise StudyError(f"{it.name} does not affect a flow curve: fit parameters from the table {CURVE_TABLE}")
     if len(curve.rate_per_s) <= len(parameters):
         raise StudyError(f"{len(curve.rate_per_s)} shear rates are too few for {len(parameters)} parameters")
     ordered = curve.ordered()

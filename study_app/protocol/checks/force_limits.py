@@ -327,7 +327,8 @@ def _returned_energy_fault(protocol: Protocol, block: Block, stroke: Stroke) -> 
         ("stimuli", str(block.stimulus), "levels"),
         f"damping of {damping:.3g} N·s/m with a delay of {1000 * delay_s:.3g} ms returns {1000 * most_j:.1f} mJ per "
         "motion reversal, and the passivity controller removes this energy",
-        f"choose a delay of at most {longest_delay_ms(damping, stroke)} ms, which returns {1000 * LIMIT_J:g} mJ",
+        f"choose a delay of at most {longest_delay_ms(damping, stroke)} ms, at which the damping returns "
+        f"{1000 * LIMIT_J:g} mJ",
     )
 
 

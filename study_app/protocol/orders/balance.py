@@ -47,7 +47,7 @@ class Evenness:
 
     @property
     def after_another(self) -> tuple[int, ...]:
-        """The counts of how often each code follows each other code."""
+        """The counts of how often each code follows every other code."""
         return tuple(count for at, line in enumerate(self.follows) for then, count in enumerate(line) if at != then)
 
     @property
@@ -263,9 +263,9 @@ def _verdict_lines(counted: Evenness) -> Iterator[str]:
         yield f"Positions are not balanced: each code occurs in each position {_range_text(cells)}."
     after = counted.after_another
     if counted.follows_even:
-        yield f"Carry-over is balanced: each code follows each other code {_times_text(after[0])}."
+        yield f"Carry-over is balanced: each code follows every other code {_times_text(after[0])}."
     else:
-        yield f"Carry-over is not balanced: each code follows each other code {_range_text(after)}."
+        yield f"Carry-over is not balanced: each code follows every other code {_range_text(after)}."
     if counted.shortest_distance is not None:
         least = f"the minimum distance between repeats is {counted.shortest_distance}"
         yield f"At most {counted.longest_run} presentations of a condition occur in a row; {least}."
@@ -279,7 +279,7 @@ def _advice(block: _BlockBalance) -> Iterator[str]:
             yield "All participants have the same order, so the effects of condition and position cannot be separated."
         case "shuffled" | "constrained":
             yield (
-                "A new order is drawn for each session, so the orders are balanced only on average. Each seed gives "
+                "A new order is drawn for each session, so the orders are balanced only on average. Each seed produces "
                 "different tables."
             )
             if repetitions == 1:
@@ -321,7 +321,7 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
         then = f"each code would occur in each position {_times_text(enough // codes)}"
         if block.order == "williams" and has_even_borders(codes, block.repetitions):
             follows = enough * (codes * block.repetitions - 1) // (codes * (codes - 1))
-            then += f" and follow each other code {_times_text(follows)}"
+            then += f" and follow every other code {_times_text(follows)}"
         yield f"A full round consists of {rows} participants. With {enough} participants, {then}."
 
 

@@ -114,7 +114,7 @@ def _table_warning(protocol: Protocol, name: str, liquid: str, delay_ms: float) 
         return None
     force_n = steady_force(protocol.scene_for(name), STIRRED.speed_mps).drag_n
     return (
-        f"with a delay of {delay_ms:.3g} ms and a light hand, the passivity controller holds back about "
+        f"with a delay of {delay_ms:.3g} ms and a light grip, the passivity controller holds back about "
         f"{percent:.0f} % of the force ({percent / 100 * force_n:.2g} of {force_n:.2g} N at {STIRRED.speed_mps:.2g} "
         "m/s): choose at most "
         f"{most_ms:g} ms"

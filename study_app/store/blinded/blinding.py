@@ -517,7 +517,7 @@ def protocol_errors(receipt: Path) -> Iterator[None]:
         raise StoreError(f"{receipt} does not contain {lacking}: restore it from a back-up") from lacking
     except (AttributeError, TypeError, ValueError):  # the reason is omitted, since it could reveal conditions
         raise StoreError(
-            f"{receipt} and the study's key do not form a protocol that this version can run: restore them "
+            f"{receipt} and the study's key cannot be combined into a protocol that this version can run: restore both "
             "from a back-up"
         ) from None
 

@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.store import workstation
 from study_app.store.atomic import read_regular
 
-_EXTRA: Final = "from the optional extra proofs: pip install 'liquid-study[proofs]'"
+_EXTRA: Final = "from the optional proofs extra: pip install 'liquid-study[proofs]'"
 WAITS_S: Final = 10.0
 _LONGEST: Final = 1_000_000
 """Greatest length of a time-stamp server's answer [bytes]."""

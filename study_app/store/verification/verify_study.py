@@ -181,7 +181,7 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
             if claim.path.lstat().st_size:
                 findings.error(claim.path, "has been changed: restore it from a back-up")
             else:
-                findings.warning(claim.path, "was reserved by a program that ended too early; it will remain unused")
+                findings.warning(claim.path, "was reserved by a program that ended early; it will remain unused")
             continue
         if not is_unchanged(claim, key):
             findings.error(claim.path, "has been changed: restore it from a back-up")

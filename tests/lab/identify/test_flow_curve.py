@@ -80,7 +80,7 @@ def test_a_relaxation_time_does_not_change_a_flow_curve():
     assert not found.distinguishable
     (warning,) = found.warnings
     assert warning.startswith(
-        "relaxation_time_s does not change the stress at these shear rates, so its initial value 0.3 was kept"
+        "relaxation_time_s does not affect the stress at these shear rates, so its initial value 0.3 was kept"
     )
 
 
@@ -111,7 +111,7 @@ def test_a_narrow_range_of_shear_rates_does_not_separate_the_parameters():
         (
             ["density_kg_m3"],
             25,
-            "density_kg_m3 does not change a flow curve: fit parameters from the table non_newtonian",
+            "density_kg_m3 does not affect a flow curve: fit parameters from the table non_newtonian",
         ),
         (["yield_stress"], 25, "unknown parameter 'yield_stress': did you mean 'yield_stress_pa'"),
         (["yield_stress_pa", "flow_index"], 2, "2 shear rates are too few for 2 parameters"),

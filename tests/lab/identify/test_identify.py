@@ -126,7 +126,7 @@ def test_a_parameter_that_does_nothing_is_named_and_left_alone():
     names = ["drag_coefficient", "viscosity_pa_s"]
     found = fit(OIL, "oil", names, REACH, noisy(OIL, REACH, 0.02))
     assert not found.distinguishable
-    assert any("drag_coefficient does not change the force" in warning for warning in found.warnings)
+    assert any("drag_coefficient does not affect the force" in warning for warning in found.warnings)
     assert found.values["drag_coefficient"] == 0.47
     assert np.isnan(found.correlation[0]).all()
     lower, upper = found.intervals["viscosity_pa_s"]

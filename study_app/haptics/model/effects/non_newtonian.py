@@ -63,7 +63,8 @@ def _problem(liquid: Liquid) -> str | None:
     if liquid.viscosity_pa_s is None:
         return None
     return (
-        "viscosity_pa_s describes a Newtonian liquid, but the table non_newtonian sets another law: remove one of them"
+        "viscosity_pa_s describes a Newtonian liquid, but the table non_newtonian specifies a different law: remove "
+        "one of them"
     )
 
 
