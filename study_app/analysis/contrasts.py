@@ -454,16 +454,16 @@ def answer(contrast: ContrastResult) -> str:
         sentences.append(f"{what} outside the equivalence bounds (not equivalent).")
     elif contrast.equivalent:
         people = (
-            "of people differ by more than the bound"
+            "of people show a difference larger than the bound"
             if contrast.contrast.groups is None
-            else "of a group belong to a minority that the sample does not include"
+            else "of a group belong to a minority that is not represented in the sample"
         )
         sentences.append(
-            f"The mean {kind} lies within the equivalence bounds (equivalent), but the data do not rule out that up "
-            f"to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
+            f"The mean {kind} lies within the equivalence bounds (equivalent). However, the data do not rule out that "
+            f"up to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
         )
     elif contrast.equivalent is not None:
-        sentences.append(f"The mean {kind} was not shown to lie within the equivalence bounds.")
+        sentences.append(f"The tests do not show that the mean {kind} lies within the equivalence bounds.")
     if contrast.left_out:
         sentences.append(f"Excluded: {_left_out_words(contrast)}.")
     return " ".join(sentences)
@@ -486,9 +486,9 @@ def _difference_words(contrast: ContrastResult) -> str:
         side = "higher" if (contrast.effect or 0.0) > (1.0 if contrast.ratio else 0.0) else "lower"
         said = f"{what} was {side} in {first} than in {second}"
     elif expected is None:
-        said = f"{what} was not shown to differ between {first} and {second}"
+        said = f"{what} did not differ significantly between {first} and {second}"
     else:
-        said = f"{what} was not shown to be {expected} in {first} than in {second}"
+        said = f"{what} was not significantly {expected} in {first} than in {second}"
     means = listed([number(side.mean) for side in contrast.sides if side.mean is not None])
     higher = (
         ""
@@ -551,8 +551,8 @@ def contrast_methods(results: Results) -> Iterator[str]:
         adjusted = f", Holm-adjusted across {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
             f"Equivalence was tested with two one-sided t tests and the same bootstrap{adjusted}; both had to show "
-            "equivalence. In addition, the sample had to be large enough to include somebody from any minority that "
-            "could shift the mean by the bound."
+            "equivalence. In addition, the sample had to be large enough to be likely to include a member of any "
+            "minority that could shift the mean by as much as the bound."
         )
     if gone := {
         f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out
@@ -605,7 +605,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         "soft",
     )
     yield paragraph(
-        f"{_SIZES} SD is the standard deviation across participants of each compared value and, for paired "
+        f"{_SIZES} SD is the standard deviation, across participants, of each of the two values and, for paired "
         "comparisons, of their difference.",
         "soft",
     )

@@ -400,7 +400,7 @@ def said_of_presentations(result: BlockResult) -> tuple[str, ...]:
         )
     if most > 1:
         often = f"{most}" if fewest == most else f"{fewest} to {most}"
-        single = "; the detection threshold uses each single answer" if result.delays_ms else ""
+        single = "; the detection threshold is estimated from all individual answers" if result.delays_ms else ""
         lines.append(
             f"Each participant rated each {settings_noun(result)} {often} times. The tests use the median of these "
             f"answers{single}."
@@ -423,8 +423,8 @@ def min_sample_reason(alpha: float, bound: float) -> str:
     share = smallest_minority(bound, STEPS)
     return (
         f"{min_sample(alpha, bound)}. A smaller sample has more than a {percent(alpha)} chance of including nobody "
-        f"from a minority of {percent(share)} of people; if the answers of such a minority differ by "
-        f"{significant(bound / share)} points, they shift the mean by the bound"
+        f"from a minority of {percent(share)} of the population; if the answers of such a minority differ by "
+        f"{significant(bound / share)} points, they shift the mean by as much as the bound"
     )
 
 

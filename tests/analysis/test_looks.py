@@ -141,7 +141,7 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
         ]
         shown += (holm(ps)[0] or 1.0) <= 0.05
     assert counts[0, FULL, 0] == shown > 0
-    told = "Student's t test on the slopes of each participant's regression of answers on delays"
+    told = "Student's t test on the slopes from each participant's regression of answers on delays"
     assert told in preregistration(protocol, "0" * 64)
     assert told in power_markdown(powers(planned, (10,), 10, 10, 1, count_findings(planned, (10,), 1, 0, 10)))
     settings = delays((0, 50, 100))
@@ -159,7 +159,7 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
         (5, "None has been reached"),
         (6, "look 1 of 2"),
         (12, "look 2 of 2"),
-        (9, "This look at 9 participants was not planned; looks are planned at 6 and 12 participants."),
+        (9, "This look at 9 participants was unplanned; looks are planned at 6 and 12 participants."),
         (13, "This look at 13 participants was not planned"),
     ],
 )

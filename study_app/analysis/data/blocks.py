@@ -417,10 +417,11 @@ class Decided:
 
             alpha = self.planned_alpha or self.alpha
             return (
-                f"This look at {n} participants was not planned; looks are planned at {planned}. An adjusted p value "
-                f"is significant if it is at most {significant(self.alpha)}, as at the last planned look. If there "
-                "were no effect and the data were tested in this way after every participant, the rate of false "
-                f"claims would be {100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of "
+                f"This look at {n} participants was unplanned; looks are planned at {planned}. An adjusted p value is "
+                f"significant if it is at most {significant(self.alpha)}, as at the last planned look. If there were "
+                "no effect and the data were tested in this way after every participant, the false-positive rate "
+                "would be "
+                f"{100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of "
                 f"{100 * alpha:g} %."
             )
         return (
@@ -439,7 +440,7 @@ class Decided:
 
 TRENDS: Final = {
     "ranks": "a sign-flip permutation test on the participants' rank correlations between answers and delays",
-    "slopes": "Student's t test on the slopes of each participant's regression of answers on delays",
+    "slopes": "Student's t test on the slopes from each participant's regression of answers on delays",
 }
 """How a trend over the delay is tested, in words."""
 

@@ -101,7 +101,7 @@ def _codebook(study: Study, files: Mapping[str, Any]) -> dict[str, Any]:
             "quartiles": QUARTILES,
             "agree_percent": f"percentage of valid answers at levels {AGREEMENT[0]} to {AGREEMENT[-1]}",
             "repeated": "the median of a participant's repeated answers is used; the detection threshold and the "
-            "counts for each level use single answers",
+            "counts for each level are based on individual answers",
             "counted": "main trials in completed sessions that are not excluded; if a trial was repeated, only its "
             "last attempt",
         },

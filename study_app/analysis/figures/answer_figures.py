@@ -236,9 +236,9 @@ def draw_threshold(
     shares = np.array(threshold.yes)[there] / asked[there]
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
-    sheet.text(MARGIN_PT, 28, "Proportion of agreeing answers", size=SMALL, colour=style.TEXT_SOFT)
+    sheet.text(MARGIN_PT, 28, "Proportion of answers expressing agreement", size=SMALL, colour=style.TEXT_SOFT)
     below = (
-        "Added delay in ms.   Small points: single participants; circles: all participants; diamond: threshold "
+        "Added delay in ms.   Small points: individual participants; circles: all participants; diamond: threshold "
         "with 95 % interval."
     )
     sheet.text(MARGIN_PT, sheet.height_pt - 5, below, size=SMALL, colour=style.TEXT_SOFT)
@@ -327,7 +327,7 @@ def _marks_of_bars(block: Block) -> Iterator[str]:
         "Bars show the number of answers, with disagreement to the left of the line and agreement to the right; "
         "neutral answers are shown separately in grey, on the same scale. Narrow segments are not labelled (the "
         "exported aggregate table contains all counts). If answers are missing, n next to the bar is the number of "
-        f"valid answers. The levels from 1 to 7 are: {', '.join(block.labels)}."
+        f"valid answers. The scale points from 1 to 7 are: {', '.join(block.labels)}."
     )
 
 

@@ -174,8 +174,8 @@ def _panels(result: LevelsResult, banded: bool) -> str:
         )
     units = " after removing differences between participants' units" if result.own_units else ""
     return (
-        f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); thin lines "
-        f"show single participants{units}. Other panels: one participant each, with 95 % intervals for the "
+        f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); thin lines show "
+        f"individual participants{units}. Other panels: one participant each, with 95 % intervals for the "
         f"answers{crosses}."
     )
 

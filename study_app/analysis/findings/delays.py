@@ -79,12 +79,11 @@ def _about_against(against: Sequence[ContrastWithControl]) -> Iterator[str]:
     first = against[0].found
     yield (
         f"Each comparison uses two one-sided t tests with equivalence bounds of {bound_text(first.bound)}, and a "
-        f"{percent(1 - 2 * first.alpha)} confidence interval. Equivalent: both the t tests and the bootstrap show "
-        "that the mean difference lies within the bounds, and the study has "
-        f"{min_sample_reason(first.alpha, first.bound)}. Not equivalent: the whole confidence interval lies outside "
-        "the bounds; this verdict is not corrected for the number of comparisons. Inconclusive: neither was shown, "
-        "which is not evidence of a difference. Out of reach: with so few participants, no answers could have shown "
-        "equivalence."
+        f"{percent(1 - 2 * first.alpha)} confidence interval. Equivalent: both the t tests and the bootstrap show that "
+        f"the mean difference lies within the bounds, and the study has {min_sample_reason(first.alpha, first.bound)}. "
+        "Not equivalent: the whole confidence interval lies outside the bounds; this verdict is not corrected for the "
+        "number of comparisons. Inconclusive: neither verdict is supported, which is not evidence of a difference. "
+        "Out of reach: with so few participants, no set of answers could have shown equivalence."
     )
     disagree = sum(tested.found.checks_agree is False for tested in against)
     if disagree:
@@ -234,8 +233,8 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if open_ones:
             yield (
                 f"{lead_phrase(result)}: {len(open_ones)} of {number_text.counted(len(against), 'comparison')} with "
-                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} inconclusive, because the "
-                "mean difference was not shown to lie either within the equivalence bounds or outside them."
+                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} inconclusive: the tests show "
+                "neither that the mean difference lies within the equivalence bounds nor that it lies outside them."
             )
 
     def methods(self) -> Iterator[str]:
@@ -296,7 +295,8 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             steps = step_down(answers.values[test.item], answers.block.delays_ms, direction, alpha=alpha)
             lowest.append(Lowest(test.item, steps, test.members))
         if trends and not showing:
-            why = "no statement shows a trend over all delays, although this does not mean that delays go unnoticed"
+            why = "no statement shows a trend across all delays; this does not mean that participants do not notice "
+            "the delays"
             return (), (NotTested(cls.what, why),)
         return tuple(lowest), ()
 
@@ -360,7 +360,7 @@ class DetectionThreshold(Finding[Threshold | None]):
             test.item for test in DelayTrend.of(result) if test.verdict in FOUND and (test.outcome.effect or 0.0) > 0
         ]
         if item not in rising:
-            return None, (NotTested(cls.what, "agreement was not shown to increase with the delay"),)
+            return None, (NotTested(cls.what, "the tests do not show that agreement increases with the delay"),)
         return noticed(answers.single[item], answers.block.delays_ms), ()
 
     def rows(self) -> Iterator[Row]:
@@ -413,7 +413,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         )
         caption = (
             "Proportion of answers that express agreement (5 to 7), as a function of the requested delay "
-            f"({drawing.simulated}n = {threshold.n}). Small points: single participants. {curve}{dashed}"
+            f"({drawing.simulated}n = {threshold.n}). Small points: individual participants. {curve}{dashed}"
         )
         draw = partial(answer_figures.draw_threshold, threshold, self._shares(drawing), lowest)
         return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",))
@@ -431,7 +431,7 @@ class DetectionThreshold(Finding[Threshold | None]):
         if self.value is not None:
             yield (
                 "The detection threshold is the delay at which a logistic function, fitted to agreement (5 to 7) in "
-                "single answers pooled across participants, lies halfway between the guess rate and one minus the "
+                "individual answers pooled across participants, lies halfway between the guess rate and one minus the "
                 "lapse rate (posterior median). Its 95 % interval is widened to allow for differences between "
                 "participants. The threshold is reported only if the statement shows a trend and the threshold lies "
                 "within the range of presented delays."
@@ -470,10 +470,11 @@ class NoticedFrom(Finding[None]):
             text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
             is_fitted = fitted is not None and decided.is_primary(fitted) == primary
             if not text and is_fitted:
-                text = "Agreement increases with the delay, but no particular delay was shown to be noticed."
+                text = "Agreement increases with the delay, but we could not show that participants noticed any "
+                "particular delay."
             if text:
                 return self.answered(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
-        return self.answered("not shown", f"No delay was shown to be noticed. {NO_EVIDENCE}")
+        return self.answered("not shown", f"We could not show that participants noticed any delay. {NO_EVIDENCE}")
 
     def _shortest(self, items: Sequence[str]) -> str:
         """Return a sentence on the shortest delay that changes one of these statements, or ""."""
@@ -574,7 +575,7 @@ def _not_excluded(tested: Sequence[Equivalence]) -> str:
     most = max(
         (equivalence.beyond.interval.high for equivalence in tested if equivalence.beyond is not None), default=1.0
     )
-    return f"the data do not rule out that up to {100 * most:.0f} % of people differ by more"
+    return f"the data do not rule out that up to {100 * most:.0f} % of people show a larger difference"
 
 
 def _within(against: ContrastWithControl) -> str:
@@ -590,7 +591,7 @@ def _kept(block: Block, results: Results) -> str:
     here = [delivered for delivered in results.delivered if delivered.block == block.id]
     judged, valid = sum(delivered.judged for delivered in here), sum(one.valid for one in here)
     if not judged:
-        return "It was not measured whether trials met the protocol's timing limits."
+        return "No data are available on whether trials met the protocol's timing limits."
     return f"{valid} of {judged} trials met the protocol's timing limits; all trials are included."
 
 
@@ -623,8 +624,8 @@ class Movement(Finding[None]):
         caption = (
             f"Reaching movements as a function of the requested delay ({drawing.simulated}n = {people} with "
             f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: interquartile "
-            "range. Movement time runs from the moment a target lights up until the hand enters it for the last time. "
-            f"The scales do not begin at zero. {_kept(block, drawing.results)}"
+            "range. Movement time is measured from the moment a target lights up until the hand enters it for the "
+            f"last time. The scales do not begin at zero. {_kept(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
         draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=True)

@@ -250,7 +250,7 @@ TESTS: Final = (
     Column("block", "text", "ID of the block."),
     Column("question", "text", "Question that the test answers."),
     optional("item", "text", "ID of the statement; n/a if the test covers several statements."),
-    optional("comparison", "text", "Conditions that are compared; n/a if the test covers all of them."),
+    optional("comparison", "text", "Conditions compared; n/a if the test covers all of them."),
     Column("test", "text", "Name of the test."),
     Column("n", "integer", "Number of participants included.", minimum=0),
     Column("dropped", "integer", "Number of participants excluded because of missing answers.", minimum=0),
@@ -275,7 +275,7 @@ TESTS: Final = (
     Column(
         "codes",
         "text",
-        "Codes of the compared conditions, in order and separated by spaces; + joins conditions with the same delay.",
+        "Codes of the conditions compared, in order and separated by spaces; + joins conditions with the same delay.",
     ),
 )
 

@@ -28,7 +28,7 @@ from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named_labels, recognition
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value
 
-_NONE_RECOGNISED: Final = "No liquid was shown to be recognised above chance."
+_NONE_RECOGNISED: Final = "We could not show that participants recognised any liquid above chance."
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,8 +107,8 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         yield paragraph(
             f"Confidence intervals for proportions are Clopper–Pearson intervals.{how} For each liquid, a "
             "within-participant test (McNemar's exact test, one-sided) shows whether its name was used more often for "
-            "it than for each other liquid. The table shows the largest of these p values and the liquid that gave it "
-            "(the closest other liquid). Adjusted p values are Holm-corrected across the liquids.",
+            "it than for each of the others. The table shows the largest of these p values and the liquid for which "
+            "it was obtained (the closest other liquid). Adjusted p values are Holm-corrected across the liquids.",
             "soft",
         )
 
@@ -128,7 +128,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         caption = (
             "The name that was rated highest for each liquid "
             f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and row percentages; "
-            f"correct names are outlined. Undecided: two or more names were rated equally high.{chance}"
+            f"correct names are outlined. Undecided: two or more names were tied for the highest rating.{chance}"
         )
         return drawing.picture(
             self.figure_title,
@@ -146,12 +146,11 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
     def methods(self) -> Iterator[str]:
         if self.value is not None:
             yield (
-                "Participants were taken to have named the liquid whose statement they rated highest; tied highest "
-                "ratings were treated as undecided and counted as incorrect. The number of correct names was tested "
-                "by permuting the liquids within participants (exact, one-sided). In addition, a liquid was "
-                "classified as recognised only if its name was used more often for it than for each other liquid "
-                "(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the "
-                "liquids)."
+                "Participants were considered to have named the liquid whose statement they rated highest; ties for "
+                "the highest rating were treated as undecided and counted as incorrect. The number of correct names "
+                "was tested by permuting the liquids within participants (exact, one-sided). In addition, a liquid was "
+                "classified as recognised only if its name was used more often for it than for each of the others "
+                "(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the liquids)."
             )
 
 
@@ -224,7 +223,8 @@ class Distinguished(Finding[None]):
         if apart:
             text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
         elif items:
-            text = f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which ones."
+            text = f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which "
+            "ones differ."
         else:
             text = f"No statement showed a difference between any two {result.kind}."
         if named is not None and named.found.p is not None:

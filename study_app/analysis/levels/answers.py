@@ -179,11 +179,11 @@ class Settings(LevelStatistic[SettingEstimate]):
         if any(map(cls.of, blocks)):
             yield (
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
-                "difference is their standard deviation, the constant error is the difference between the mean and "
-                "the standard, and the hysteresis is the difference between the means of settings that started high "
-                "and of settings that started low. All of them are computed on the logarithm of the level if levels "
-                "are spaced logarithmically (Gescheider 1997). Group values are means across participants with 95 % "
-                "confidence intervals (Student’s t)."
+                "difference is their standard deviation, the constant error is the difference between the mean and the "
+                "standard, and the hysteresis is the mean of settings that started high minus the mean of those that "
+                "started low. All of them are computed on the logarithm of the level if levels are spaced "
+                "logarithmically (Gescheider 1997). Group values are means across participants with 95 % confidence "
+                "intervals (Student’s t)."
             )
 
 
@@ -340,8 +340,8 @@ class Answers(LevelStatistic[LevelAnswers]):
         if not result.adaptive:
             yield self._of_group()
             units = (
-                " To remove each participant's choice of unit, the interval is based on ln answers minus the "
-                "participant's mean."
+                " To remove the effect of each participant's choice of unit, the interval is based on ln answers minus "
+                "the participant's mean."
             )
             yield paragraph(
                 f"The table shows the {mean_words(result)} across participants, with a 95 % confidence interval "

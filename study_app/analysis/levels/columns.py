@@ -96,7 +96,7 @@ _SETTINGS: Final[tuple[Column, ...]] = (
     Column(
         "pse",
         "number",
-        "Point of subjective equality, as a level: the mean of the settings (logarithmic if levels are spaced "
+        "Point of subjective equality, as a level: the mean of the settings (the geometric mean if levels are spaced "
         "logarithmically).",
     ),
     optional("low", "number", "Lower end of the 95 % confidence interval for the PSE (Student's t)."),
@@ -132,7 +132,7 @@ _EXPONENTS: Final[tuple[Column, ...]] = (
 _THRESHOLDS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
-    optional("condition", "text", "The condition that is compared; n/a in a block of levels."),
+    optional("condition", "text", "The comparison condition; n/a in a block that varies a level."),
     Column("n", "integer", "Number of answers included in the analysis.", minimum=0),
     optional(
         "threshold",
@@ -191,7 +191,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "d_prime_model",
         "text",
-        "Model used for d_prime; n/a unless the design has two models.",
+        "Model used to calculate d_prime; n/a unless there are two models for the design.",
         levels=(
             ("differencing", "intervals are compared with each other"),
             ("independent", "each interval is compared with known alternatives"),
@@ -237,13 +237,17 @@ class Results(NamedTuple):
 
 RESULTS: Final = {
     "thresholds": Results(
-        "one row per participant and standard, or per participant and compared condition, after unblinding", _THRESHOLDS
+        "one row per participant and standard, or per participant and comparison condition; available after unblinding",
+        _THRESHOLDS,
     ),
     "settings": Results(
-        "one row per participant and standard in a block in which participants set the level, after unblinding",
+        "one row per participant and standard in blocks in which participants set the level; available after "
+        "unblinding",
         _SETTINGS,
     ),
-    "exponents": Results("one row per participant in a block with magnitude estimation, after unblinding", _EXPONENTS),
+    "exponents": Results(
+        "one row per participant in blocks with magnitude estimation; available after unblinding", _EXPONENTS
+    ),
 }
 """By the names of the tables."""
 
@@ -255,8 +259,8 @@ def dictionary_markdown() -> str:
         "in studies whose trials consist of intervals, and the last four columns only after unblinding"
     )
     of_tracks = (
-        "one row per trial of a block with a design, after unblinding; also contains the trial's IDs and condition, "
-        "and force_mean_n and mean_speed_mps for each interval (…_1, …_2)"
+        "one row per trial of a block with a design; available after unblinding. It also contains the trial's IDs and "
+        "condition, and force_mean_n and mean_speed_mps for each interval (…_1, …_2)"
     )
     tables = {"tracks": Results(of_tracks, OF_TRACKS), **RESULTS}
     return "\n".join(

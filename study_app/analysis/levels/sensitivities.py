@@ -32,22 +32,22 @@ from study_app.psychophysics.detection import Model, Sensitivity, d_prime_at, ra
 from study_app.psychophysics.grid import Z_95
 
 _MODELS: Final = {
-    "differencing": " d′ uses the differencing model, because standards vary from trial to trial.",
-    "independent": " d′ uses the model of independent observations; the column d_prime_other of the exported "
-    "thresholds table contains d′ for the differencing model.",
+    "differencing": " d′ is calculated with the differencing model, because standards vary from trial to trial.",
+    "independent": " d′ is calculated with the independent-observation model; in the exported thresholds table, the "
+    "column d_prime_other contains d′ for the differencing model.",
 }
 _FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
 """Designs whose d′ follows from the share of correct answers alone."""
 _BIASES: Final = {
-    "2ifc": " c is above 0 if the second interval is preferred.",
-    "yesno": " c is above 0 if “no” is preferred.",
+    "2ifc": " c is above 0 if participants prefer the second interval.",
+    "yesno": " c is above 0 if participants prefer the answer “no”.",
     "samedifferent": " k is the difference above which the answer is “different”.",
     **dict.fromkeys(
         _FROM_SHARE_CORRECT,
-        " d′ is calculated from the proportion correct, assuming that participants have no response bias; a bias, "
-        "visible as unequal proportions of the answers, makes d′ too small. The participants' confidence intervals "
-        "for d′ are calculated from the Clopper–Pearson interval for the proportion correct; there is no interval if "
-        "all answers are correct.",
+        " d′ is calculated from the proportion correct, assuming that participants do not have a response bias. A "
+        "bias, which would show as unequal proportions of the possible answers, causes d′ to be underestimated. The "
+        "confidence interval for each participant's d′ is derived from the Clopper–Pearson interval for the proportion "
+        "correct; it cannot be calculated if all answers are correct.",
     ),
 }
 

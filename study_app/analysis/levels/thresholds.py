@@ -553,14 +553,14 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             "width, from 5 to 95 % of the rise, has a log-normal prior; the next column shows the threshold under a "
             "flat prior. “Above” and “below” mark thresholds outside the levels of the stimulus; “<” and “>” mark "
             "interval ends that the answers do not determine. Intervals allow a person’s threshold to differ between "
-            f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation) and to change over the trials. "
-            "The group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp interval if there are "
-            "at least three participants. Each variance is replaced by its geometric mean with the median "
+            f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation) and to change over the trials. The "
+            "group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp interval if there are at "
+            "least three participants. Each variance is replaced by its geometric mean with the median "
             f"variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated data sets; for the "
-            f"group, the excess clustering of errors in standard errors, marked “!” if above {MOST_CLUSTERED:g}. "
+            f"group, the excess clustering of errors, in standard errors, marked “!” if above {MOST_CLUSTERED:g}. "
             "Drift: correlation between trial number and deviance residual, marked “!” if the threshold changes over "
-            f"the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the rise or fall of "
-            "thresholds after the first trials, in standard errors. n is the number of "
+            f"the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the rise or fall of thresholds "
+            "after the first trials, in standard errors. n is the number of "
             f"answers{catch}." + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )
 
@@ -640,7 +640,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         if (people := len({estimate.participant for estimate in own})) < FEWEST:
             yield (
                 f"{title}: a group interval needs at least {FEWEST} participants, because differences between people "
-                f"are otherwise unknown. This block has {people}."
+                f"cannot be estimated from fewer. This block has {people}."
             )
         if self.found.level_kind == "weber":
             yield self._limit_of_device()

@@ -298,7 +298,7 @@ COLUMNS: Final = (
     optional("item", "text", "ID of the statement; n/a if the test covers several statements."),
     optional("over", "text", "Scope of the test, if it covers more than one statement."),
     optional("setting", "text", "The delay that is tested; n/a if the test covers all delays."),
-    Column("people", "text", "Kind of simulated participants."),
+    Column("people", "text", "Type of simulated participant."),
     *OF_STUDIES,
     Column(
         "power",
@@ -418,10 +418,10 @@ def _preface(power: Powers) -> list[str]:
         f"Tests use α = {decided.alpha:g}{looks}; p values are based on {PLANNED_DRAWS} random permutations of each "
         "participant's answers. Tests of primary statements are Holm-corrected; for the others, the false discovery "
         f"rate is controlled (Benjamini–Hochberg). Effects from {EFFECTS[1]:g} to {EFFECTS[-1]:g} times those of the "
-        f"model were simulated. A power of 80 % is uncertain by ±{50 * (high - low):.1f} percentage points.",
+        f"model were simulated. A power of 80 % has an uncertainty of ±{50 * (high - low):.1f} percentage points.",
         "",
-        f"The numbers are for {_people(next(iter(power.kinds)))}, with the lowest and highest values across all kinds "
-        "of people in parentheses. The kinds are "
+        f"The numbers are for {_people(next(iter(power.kinds)))}, with the lowest and highest values across all types "
+        "of participant in parentheses. The types are "
         + listed([f"**{kind}** ({people.described()})" for kind, people in power.plan.kinds.items()])
         + f". {_SOURCES}",
     ]
@@ -431,7 +431,8 @@ def _preface(power: Powers) -> list[str]:
         named = ", ".join(power.plan.unknown)
         lines += [
             "",
-            f"The model has no effects for {named}, so any detections for these statements are due to chance.",
+            f"The model does not assume any effects for {named}, so any effects detected for these statements are due "
+            "to chance.",
         ]
     lines += [
         line
@@ -572,8 +573,8 @@ def smallest_differences(
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
     )
     yield (
-        f"{said}{both} The smallest difference is the one that {WANTED:.0%} of studies detect "
-        f"({at}).{within} {LEFT_OUT}"
+        f"{said}{both} The “smallest difference” is the difference that {WANTED:.0%} of studies detect ({at}).{within} "
+        f"{LEFT_OUT}"
     )
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
@@ -661,9 +662,9 @@ def _explained(question: Question, found: Powers) -> list[str]:
             bound = found.plan.decided.equivalence_bound or STEPS
             return [
                 f"Equivalence is tested with two one-sided t tests (bounds {bound_text(bound)}) and a bootstrap; both "
-                f"must show equivalence. It also requires {min_sample_reason(found.plan.decided.alphas[-1], bound)}. "
-                "If the model's difference is near or outside the bounds, few studies should find equivalence; "
-                "outside the bounds, such a finding is wrong."
+                "must show equivalence. Equivalence also requires "
+                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the model's difference is near or "
+                "outside the bounds, few studies should find equivalence; outside the bounds, such a finding is wrong."
             ]
         case "contrast":
             return [
@@ -760,8 +761,8 @@ def draw_power(power: Powers, block: Planned) -> Figure:
     figure = Figure(figsize=(style.PAGE_WIDTH_PT / 72, 0.7 + 1.45 * len(rows)), layout="constrained")
     figure.suptitle(
         f"{block.title}: proportion of {power.studies} studies with SIMULATED participants, by number of participants\n"
-        f"α = {power.plan.decided.alpha:g}; line: {_people(next(iter(power.kinds)))}; band: range across all kinds of "
-        "people; dashed line: no effect",
+        f"α = {power.plan.decided.alpha:g}; line: {_people(next(iter(power.kinds)))}; band: range across all types of "
+        "participant; dashed line: no effect",
         fontsize=7.5,
     )
     for row, plots in enumerate(rows):

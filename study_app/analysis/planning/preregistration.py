@@ -417,12 +417,13 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         attempts = protocol.limits.attempts
         times = "" if attempts is None else f", for up to {number_text.counted(attempts, 'presentation')} in total"
         yield (
-            f"If an interval of a trial exceeds a limit, no question is asked and the trial is presented again{times}."
+            "If any interval in a trial exceeds one of these limits, no question is asked and the trial is "
+            f"repeated{times}."
         )
         if (permitted := protocol.limits.missing_percent) is not None:
             yield (
-                f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of its main trials '
-                "with intervals remain unanswered because no presentation met the limits for valid trials."
+                f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of its main '
+                "interval trials remain unanswered because none of the presentations met the limits for valid trials."
             )
     if any(block.design is None for block in protocol.main_blocks):
         trials = "Other trials" if has_intervals else "Trials"

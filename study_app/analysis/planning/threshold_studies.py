@@ -354,8 +354,8 @@ def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
     if math.isfinite(medians[worst]):
         yield ""
         yield (
-            f"With {precisions.sizes[-1]} participants and {trials} trials, the precision depends on the kind of "
-            f"people: ±{sorted(medians.values())[len(medians) // 2]:.0%} (median across kinds), "
+            f"With {precisions.sizes[-1]} participants and {trials} trials, the precision depends on the type of "
+            f"participant: ±{sorted(medians.values())[len(medians) // 2]:.0%} (median across types), "
             f"±{medians[worst]:.0%} at worst ({worst})."
         )
 
@@ -426,7 +426,7 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (
-            "Each study simulates one kind of people, and the kinds alternate. They differ in the width of the "
+            "Each study simulates one type of participant, and the types alternate. They differ in the width of the "
             "psychometric function (0.5, 1, 1.5 or 2.5 times the median of the prior), the rate of random answers (2 "
             f"or 5 %), {'the preference for one interval or for the last answer, ' if plan.two_intervals else ''}and "
             "the change of the threshold over the trials (a fall or a rise). The mean threshold lies in the middle "

@@ -278,7 +278,7 @@ def _missing_trials(study: Study) -> str:
     if not study.levels or not asked:
         return ""
     if not count:
-        return "All main trials with intervals met the limits for valid trials."
+        return "All main interval trials met the limits for valid trials."
     lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
     return f"{lost} because no presentation met the limits for valid trials."
 

@@ -716,7 +716,7 @@ def _recordings(measured: Performance) -> str:
     if measured.unread:
         text += f" (reasons for the others: {'; '.join(measured.unread)})"
     if not measured.judged:
-        return f"{text}. It was not measured whether trials met the protocol's timing limits."
+        return f"{text}. No data are available on whether trials met the protocol's timing limits."
     if not measured.invalid:
         return f"{text}. All measured trials met the protocol's timing limits."
     verb = "is" if measured.invalid == 1 else "are"

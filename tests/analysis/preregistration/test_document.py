@@ -59,7 +59,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
     )
     assert "we simulated 50 trials per standard" in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
-    assert "presented again, for up to 3 presentations in total" in text
+    assert "the trial is repeated, for up to 3 presentations in total" in text
     assert "Hartung–Knapp 95 % interval if there are at least 3 participants" in text
     assert "Power was not computed" not in preregistration(load("thickness"), "0" * 64)
 

@@ -650,9 +650,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"Over delays of {R} to {R} ms, participants tended to rate longer delays (.*)\.", trend_is_shown),
     (r"They may also notice shorter delays\.", always),
     (r"A trend does not imply that mean ratings change\.", always),
-    (r"Agreement increases with the delay, but no particular delay was shown to be noticed\.",
+    (r"Agreement increases with the delay, but we could not show that participants noticed any particular delay\.",
      when(lambda told: told.block["threshold"]["effect"] is not None)),
-    (r"No delay was shown to be noticed\.", nothing_noticed),
+    (r"We could not show that participants noticed any delay\.", nothing_noticed),
     (r"This is not evidence that there is no difference\.", always),
     (r"This was not tested, because [a-z].*\.", when(lambda told: not told.against)),
     (rf"We could not show for any delay that the mean answers to all statements stay within ±{R} points? of those at "
@@ -670,16 +670,18 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # First page: liquids
     (rf"Participants named (\d+) of (\d+) liquids correctly \({R} expected by chance, {P}\)\.", names_are_counted),
     (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
-    (r"No liquid was shown to be recognised above chance\.", when(lambda told: not recognised(told))),
+    (r"We could not show that participants recognised any liquid above "
+     r"chance\.", when(lambda told: not recognised(told))),
     (r"Rated differently: (.*)\.", pairs_differ),
-    (r"The liquids were rated differently on (.*), but the tests do not show which ones\.", statements_differ),
+    (r"The liquids were rated differently on (.*), but the tests do not show which ones differ\.", statements_differ),
     (r"No statement showed a difference between any two liquids\.", no_statement_differs),
     # First page: a block with a single setting
     (rf"(?P<agreed>\d+) of (?P<n>\d+) (?:participants agreed|answers expressed agreement) with “(?P<short>.*)” "
      rf"\((?P<share>{R}) %(?:, 95 % confidence interval \[(?P<low>\d+), (?P<high>\d+)\] %)?; median {R}\)\.", agreed),
     # Hypotheses
-    (rf"Agreement with {ITEM} was (?:(?P<shown>higher|lower) in .* than in .*|not shown to (?:differ between .* and .*"
-     rf"|be (?P<lower>higher|lower) in .* than in .*)) \(means (?P<means>{R} and {R}); mean difference (?P<effect>{R})"
+    (rf"Agreement with {ITEM} (?:was (?P<shown>higher|lower) in .* than in .*|did not differ significantly between .*"
+     r" and .*|was not significantly (?P<lower>higher|lower) in .* than in .*)"
+     rf" \(means (?P<means>{R} and {R}); mean difference (?P<effect>{R})"
      rf", 95 % confidence interval \[(?P<low>{R}), (?P<high>{R})\], (?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
      r"p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
     (r"It was higher in (\S+) for (\d+) of (\d+) participants\.", higher_for_so_many),
@@ -693,13 +695,14 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: bool(told.contrasts))),
     (r"Cliff's delta is the probability that an answer in the first group is larger than one in the second, minus the "
      r"probability that it is smaller; within participants, it is .*\.", when(lambda told: bool(told.contrasts))),
-    (r"The mean difference lies within the equivalence bounds \(equivalent\), but the data do not rule out that up to "
-     r"(\d+) % of (people differ by more than the bound|a group belong to a minority that the sample does not "
-     r"include)\.",
+    (r"The mean difference lies within the equivalence bounds \(equivalent\)\. However, the data do not rule out that "
+     r"up to (\d+) % of (people show a difference larger than the bound|a group belong to a minority that is not "
+     r"represented in the sample)\.",
      bound_of_a_contrast("within")),
     (r"(The whole confidence interval lies|All differences lie) outside the equivalence bounds \(not equivalent\)\.",
      bound_of_a_contrast("beyond")),
-    (r"The mean difference was not shown to lie within the equivalence bounds\.", bound_of_a_contrast("neither")),
+    (r"The tests do not show that the mean difference lies within the equivalence bounds\.",
+     bound_of_a_contrast("neither")),
     (r"Not tested: (fewer than two participants have both values|the values do not vary between participants, so a "
      r"t test is not possible)\.", contrast_is_untested),
     (r"Excluded: .*\.", when(lambda told: any(one["left_out"] for one in told.contrasts))),
@@ -709,12 +712,12 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: people(told) < told.results["decided"]["looks"][0])),
     (rf"This is look (?P<look>\d+) of \d+, planned at {LOOKS}\.",
      look(lambda told: people(told) in told.results["decided"]["looks"])),
-    (rf"This look at \d+ participants was not planned; looks are planned at {LOOKS}\.",
+    (rf"This look at \d+ participants was unplanned; looks are planned at {LOOKS}\.",
      look(lambda told: people(told) not in told.results["decided"]["looks"])),
     (rf"An adjusted p value is significant if it is at most {R}( \(.* alpha spending\)|, as at the last planned look)"
      r"\.", alpha_here),
-    (r"If there were no effect and the data were tested in this way after every participant, the rate of false claims "
-     rf"would be {R} % instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
+    (r"If there were no effect and the data were tested in this way after every participant, the false-positive rate "
+     r"would be {R} % instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
     (r"At the planned looks, adjusted p values of up to (.*) are significant \((O'Brien–Fleming|Pocock) alpha spending "
      r"with alpha = [\d.]+, Lan & DeMets 1983\)\.", alphas_of_looks),
     # Limits
@@ -749,8 +752,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"A smaller sample has more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of people; "
      rf"if the answers of such a minority differ by {R} points, they shift the mean by the bound\.", missed_minority),
     (rf"This study has {N} participants?\.", lambda match, told: count(match[1]) == told.block["n"]),
-    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) inconclusive, because the mean difference was not "
-     r"shown to lie either within the equivalence bounds or outside them\.", nobody_is_left),
+    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) inconclusive: the tests show neither that the mean "
+     rf"difference lies within the equivalence bounds nor that it lies outside them\.", nobody_is_left),
     # Methods
     (rf"{N} participants?(?: \(SIMULATED, not people\))? took part in “Made up” \(protocol made_up, version 1\)(, "
      r"each in all conditions|, but not all of them in all conditions)?\.",
@@ -763,7 +766,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Several conditions have a delay of .*; they are treated as repeated presentations of one delay\.",
      when(lambda told: bool(told.block["replicated_ms"]))),
     (r"Each participant rated each \w+ (\d+(?: to \d+)?) times\.", presentations),
-    (r"The tests use the median of these answers(; the detection threshold uses each single answer)?\.",
+    (r"The tests use the median of these answers(; the detection threshold is estimated from all individual "
+     r"answers)?\.",
      when(lambda told: told.block["presentations"][1] > 1)),
     (r"The answers from sessions (.*) are compared with each other, and are pooled in all other tests\.",
      lambda match, told: listed_in(match[1]) == {str(one) for one in told.block["sessions"]}),
@@ -803,12 +807,13 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"If a statement showed a difference, pairs were compared with Wilcoxon's signed-rank test \(exact; pairs of "
      r"equal answers were dropped\), with p values Holm-adjusted across all pairs for all such statements; the effect "
      r"size is the matched-pairs rank-biserial correlation\.", when(lambda told: bool(told.block["pairs"]))),
-    (r"Participants were taken to have named the liquid whose statement they rated highest; tied highest ratings were "
-     r"treated as undecided and counted as incorrect\.", when(lambda told: told.block["named"] is not None)),
+    (r"Participants were considered to have named the liquid whose statement they rated highest; ties for the highest "
+     r"rating were treated as undecided and counted as "
+     r"incorrect\.", when(lambda told: told.block["named"] is not None)),
     (r"The number of correct names was tested by permuting the liquids within participants \(exact, one-sided\)\.",
      when(lambda told: told.block["named"] is not None)),
     (r"In addition, a liquid was classified as recognised only if its name was used more often for it than for each "
-     r"other liquid \(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the "
+     r"of the others \(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the "
      r"liquids\)\.", when(lambda told: told.block["named"] is not None)),
     (r"Trends across delays were tested with a sign-flip permutation test on the participants' rank correlations "
      r"between answers and delays \(.*; (one-sided in the direction stated (?:before the first session|by the "
@@ -829,9 +834,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      == fewest(told.against[0]["found"]["alpha"], min(1 / 5, told.against[0]["found"]["bound"] / 6))),
     (r"It was classified as not equivalent if the whole confidence interval lay outside the bounds\.",
      when(lambda told: bool(told.against))),
-    (r"The detection threshold is the delay at which a logistic function, fitted to agreement \(5 to 7\) in single "
-     r"answers pooled across participants, lies halfway between the guess rate and one minus the lapse rate "
-     r"\(posterior median\)\.", when(lambda told: told.block["threshold"] is not None)),
+    (r"The detection threshold is the delay at which a logistic function, fitted to agreement \(5 to 7\) in "
+     r"individual answers pooled across participants, lies halfway between the guess rate and one minus the lapse "
+     r"rate \(posterior median\)\.", when(lambda told: told.block["threshold"] is not None)),
     (r"Its 95 % interval is widened to allow for differences between participants\.", always),
     (r"The threshold is reported only if the statement shows a trend and the threshold lies within the range of "
      r"presented delays\.", when(lambda told: told.block["threshold"] is not None)),
