@@ -77,7 +77,7 @@ def test_the_cost_of_a_test_at_every_participant_is_that_of_simulated_studies(sp
         spending=spending,
     )
     rate = f"{100 * error_of_every_report(looks, 0.05, spending):.1f} %"
-    assert f"the rate of false claims would be {rate} instead of 5 %" in made.at(13).look_words(13)
+    assert f"the false-positive rate would be {rate} instead of 5 %" in made.at(13).look_words(13)
 
 
 @pytest.mark.parametrize(

@@ -420,8 +420,7 @@ class Decided:
                 f"This look at {n} participants was unplanned; looks are planned at {planned}. An adjusted p value is "
                 f"significant if it is at most {significant(self.alpha)}, as at the last planned look. If there were "
                 "no effect and the data were tested in this way after every participant, the false-positive rate "
-                "would be "
-                f"{100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of "
+                f"would be {100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of "
                 f"{100 * alpha:g} %."
             )
         return (

@@ -295,8 +295,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
             steps = step_down(answers.values[test.item], answers.block.delays_ms, direction, alpha=alpha)
             lowest.append(Lowest(test.item, steps, test.members))
         if trends and not showing:
-            why = "no statement shows a trend across all delays; this does not mean that participants do not notice "
-            "the delays"
+            why = "no statement shows a trend across all delays, but participants may still notice the delays"
             return (), (NotTested(cls.what, why),)
         return tuple(lowest), ()
 
@@ -470,8 +469,10 @@ class NoticedFrom(Finding[None]):
             text = self._shortest([item.id for item in self.found.items if decided.is_primary(item.id) == primary])
             is_fitted = fitted is not None and decided.is_primary(fitted) == primary
             if not text and is_fitted:
-                text = "Agreement increases with the delay, but we could not show that participants noticed any "
-                "particular delay."
+                text = (
+                    "Agreement increases with the delay, but we could not show that participants noticed any "
+                    "particular delay."
+                )
             if text:
                 return self.answered(verdict, f"{self._threshold_words() if is_fitted else ''}{text}", claims=True)
         return self.answered("not shown", f"We could not show that participants noticed any delay. {NO_EVIDENCE}")

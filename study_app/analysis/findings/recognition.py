@@ -223,8 +223,10 @@ class Distinguished(Finding[None]):
         if apart:
             text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
         elif items:
-            text = f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which "
-            "ones differ."
+            text = (
+                f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which ones "
+                "differ."
+            )
         else:
             text = f"No statement showed a difference between any two {result.kind}."
         if named is not None and named.found.p is not None:

@@ -122,7 +122,7 @@ def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is()
         block="b", design="abx", vary="damping", summary="share", statistics={Sensitivities.key: (one,)}
     )
     told = Sensitivities(cast("Any", of_block)).explained()
-    assert "assuming that participants have no response bias" in told
+    assert "assuming that participants do not have a response bias" in told
     assert "exported thresholds table" in told
     (row,) = Sensitivities(cast("Any", of_block)).exported()
     assert "d_prime_other" in row

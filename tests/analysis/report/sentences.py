@@ -662,7 +662,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"equivalent; not corrected for the number of comparisons\)\.",
      lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))),
     (rf"Up to {R} ms, mean answers to (all \w+ statements|both statements|the one statement) stay within ±{R} points? "
-     rf"of those at {R} ms, but the data do not rule out that up to {R} % of people differ by more\.", all_equivalent),
+     rf"of those at {R} ms, but the data do not rule out that up to {R} % of people show a larger "
+     r"difference\.", all_equivalent),
     (rf"The detection threshold is {R} ms \((.*), n = (\d+)\); at this delay, (?:> )?{R} % of answers express "
      rf"agreement with ({ITEM})\.", threshold_is_told),
     (rf"The largest mean difference is {R} points \(({ITEM}) at {R} ms, (?:> )?{R} % confidence interval {ENDS}, "
@@ -695,9 +696,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: bool(told.contrasts))),
     (r"Cliff's delta is the probability that an answer in the first group is larger than one in the second, minus the "
      r"probability that it is smaller; within participants, it is .*\.", when(lambda told: bool(told.contrasts))),
-    (r"The mean difference lies within the equivalence bounds \(equivalent\)\. However, the data do not rule out that "
-     r"up to (\d+) % of (people show a difference larger than the bound|a group belong to a minority that is not "
-     r"represented in the sample)\.",
+    (r"The mean difference lies within the equivalence bounds \(equivalent\)\.", bound_of_a_contrast("within")),
+    (r"However, the data do not rule out that up to (\d+) % of (people show a difference larger than the bound|a "
+     r"group belong to a minority that is not represented in the sample)\.",
      bound_of_a_contrast("within")),
     (r"(The whole confidence interval lies|All differences lie) outside the equivalence bounds \(not equivalent\)\.",
      bound_of_a_contrast("beyond")),
@@ -717,7 +718,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"An adjusted p value is significant if it is at most {R}( \(.* alpha spending\)|, as at the last planned look)"
      r"\.", alpha_here),
     (r"If there were no effect and the data were tested in this way after every participant, the false-positive rate "
-     r"would be {R} % instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
+     rf"would be {R} % instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
     (r"At the planned looks, adjusted p values of up to (.*) are significant \((O'Brien–Fleming|Pocock) alpha spending "
      r"with alpha = [\d.]+, Lan & DeMets 1983\)\.", alphas_of_looks),
     # Limits
@@ -749,8 +750,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf"of "
      r"that position\.", same_position),
     (rf"{LEAD}a comparison can count as equivalent only with at least (\d+) participants\.", too_few_for_equivalence),
-    (rf"A smaller sample has more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of people; "
-     rf"if the answers of such a minority differ by {R} points, they shift the mean by the bound\.", missed_minority),
+    (rf"A smaller sample has more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of the "
+     rf"population; if the answers of such a minority differ by {R} points, they shift the mean by as much as the "
+     r"bound\.", missed_minority),
     (rf"This study has {N} participants?\.", lambda match, told: count(match[1]) == told.block["n"]),
     (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) inconclusive: the tests show neither that the mean "
      rf"difference lies within the equivalence bounds nor that it lies outside them\.", nobody_is_left),
@@ -786,8 +788,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"bounds)?; both had to show equivalence\.",
      lambda match, told: int(match[1] or 1)
      == sum(one["contrast"]["bound"] is not None for one in told.contrasts)),
-    (r"In addition, the sample had to be large enough to include somebody from any minority that could shift the mean "
-     r"by the bound\.", when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
+    (r"In addition, the sample had to be large enough to be likely to include a member of any minority that could "
+     r"shift the mean by as much as the bound\.",
+     when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
     (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Some participants were excluded from a test because a value was missing \(.*\)\.",
