@@ -160,7 +160,7 @@ def test_slopes_are_tested_and_planned_where_the_study_says_so() -> None:
         (6, "look 1 of 2"),
         (12, "look 2 of 2"),
         (9, "This look at 9 participants was unplanned; looks are planned at 6 and 12 participants."),
-        (13, "This look at 13 participants was not planned"),
+        (13, "This look at 13 participants was unplanned"),
     ],
 )
 def test_the_first_page_says_which_look_it_is(n: int, said: str) -> None:
