@@ -83,11 +83,13 @@ def compare_with_plain_c(scenes: Mapping[str, Scene], *, batches: int) -> dict[s
             for each in timers.values():
                 for timer in each:
                     timer.batch()
-        found = {}
+        compared = {}
         for name, each in timers.items():
             plain_ns, tick_ns, rest_ns = (statistics.median(timer.costs_ns) for timer in each)
-            found[name] = Comparison(plain_ns, tick_ns, rest_ns, differences[name])
-        return found
+            compared[name] = Comparison(
+                plain_ns=plain_ns, tick_ns=tick_ns, rest_ns=rest_ns, difference=differences[name]
+            )
+        return compared
 
 
 def _compiled_library(folder: Path) -> ctypes.CDLL:
