@@ -190,7 +190,7 @@ class Registry(Mapping[str, T], Generic[T]):
     def _name_of(self, found: Any, place: str, package: str, others: Mapping[str, T]) -> str:
         """Return the name of an entry point's object; raise a StudyError with the reason if it has none."""
         if self._key == "name" and not isinstance(found, self._base):
-            raise StudyError(f"{place} must be a {self._base.__name__}, but is a {type(found).__name__}")
+            raise StudyError(f"{place} must be a {self._base.__name__}, but has the type {type(found).__name__}")
         if self._key != "name" and not (isinstance(found, type) and issubclass(found, self._base)):
             raise StudyError(f"{place} is not a subclass of {self._base.__name__}")
         if self._key != "name" and (lacking := getattr(found, "__abstractmethods__", None)):

@@ -128,7 +128,7 @@ class TestDeviceOfAnotherPackage:
     [
         ("toy_missing:TOY", "", "No module named 'toy_missing'"),
         ("toy_broken:TOY", "raise RuntimeError('no such\\nlibrary')", "no such library"),
-        ("toy_broken:TOY", "TOY = 3", "toy_broken:TOY is not a DeviceDescriptor but a int"),
+        ("toy_broken:TOY", "TOY = 3", "toy_broken:TOY must be a DeviceDescriptor, but has the type int"),
         ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"mouse"'), "device 'mouse' already exists: rename it"),
         ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"Toy 1"'), "the device name 'Toy 1' is not permitted"),
         (

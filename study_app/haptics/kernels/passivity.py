@@ -43,7 +43,8 @@ which it neither supplies nor absorbs energy.
 
 A handle that was let go may also oscillate without a debt, since buoyancy or the liquid's reserve supplies the energy.
 From six successive reversals on, each sooner than a hand can reverse, the gain falls until the oscillation ends, at
-most to a twentieth (`_count_reversals`); it recovers as after a debt that is not forgiven.
+most to a twentieth (`_count_reversals`); it recovers as after a debt that is not forgiven. A delayed force lets a light
+hand ring, which a study of delays must be able to present: with a force link, reversals do not count.
 
 The energy that the velocity estimator stores and may therefore return is `filter_storage`.
 
@@ -368,7 +369,7 @@ def reduce_gain(
     """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
     left_j = _judge_debt(parameters, state, passivity, left_j)
-    if passivity.reversals >= _REVERSALS:
+    if passivity.reversals >= _REVERSALS and parameters.link.acts == 0:
         passivity.debt = layout.DEBT_OWN
         calmed = max(passivity.gain * (1.0 - parameters.period_s / _CALMED_S), _LEAST_GAIN)
         passivity.gain = min(passivity.gain, calmed)

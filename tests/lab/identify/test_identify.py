@@ -160,7 +160,7 @@ def test_a_reversed_sign_is_noticed_and_the_explained_share_is_told():
     assert wrong.explained < 0.01
     left = f"{100 * right.share:.0f} % of the force instead of {100 * wrong.share:.0f} %"
     assert any(left in warning and "opposite sign" in warning for warning in wrong.warnings)
-    assert any("drive the body" in warning for warning in wrong.warnings)
+    assert any("accelerate the body" in warning for warning in wrong.warnings)
 
 
 def test_values_that_do_not_follow_the_motion_are_no_force_on_the_body():
