@@ -449,7 +449,7 @@ class Contrast(Table):
     def effect_words(self, within: tuple[str, str] | None = None, measure: str = "") -> str:
         """Return what the two sides are compared in: the measure, or in an interaction the difference in it.
 
-        ``within`` are the names of what differs within participants, ``measure`` the measure in words; by default ids.
+        ``within`` names the two blocks or conditions and ``measure`` the measure in words; by default their ids.
         """
         measure = measure or self.measure_words
         if self.groups is None or self.within is None:
