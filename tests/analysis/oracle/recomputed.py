@@ -34,16 +34,16 @@ class Compared:
         self.places, self.differences = set[str](), list[tuple[str, Any, Any]]()
         self.rows, self.values = dict[tuple[str, ...], Numbers](), dict[tuple[str, str], Any]()
 
-    def check(self, place: str, recomputed: Mapping[str, Any], tolerance: float = 1e-6) -> None:
+    def check(self, place: str, recomputed: Mapping[str, Any], tolerance: float = 1e-6, absolute: float = 1e-9) -> None:
         """Compare the numbers without "_" before their names with a part of the report; None and NaN are the same."""
         for path, own in named(place, recomputed).items():
             if "._" not in path:
                 self.places.add(path)
-                self.equal(path, self.numbers.get(path), own, tolerance)
+                self.equal(path, self.numbers.get(path), own, tolerance, absolute)
 
-    def equal(self, path: str, reported: Any, own: Any, tolerance: float = 1e-6) -> None:
+    def equal(self, path: str, reported: Any, own: Any, tolerance: float = 1e-6, absolute: float = 1e-9) -> None:
         values = [math.nan if value is None else float(value) for value in (reported, own)]
-        if not all(map(math.isnan, values)) and not math.isclose(*values, rel_tol=tolerance, abs_tol=1e-9):
+        if not all(map(math.isnan, values)) and not math.isclose(*values, rel_tol=tolerance, abs_tol=absolute):
             self.differences.append((path, reported, own))
 
     def tests(self) -> pd.DataFrame:

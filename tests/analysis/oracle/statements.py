@@ -11,6 +11,7 @@ from scipy import stats
 from statsmodels.stats.inter_rater import cohens_kappa
 from statsmodels.stats.multitest import multipletests
 
+from tests.analysis.oracle.cumulative import counts, fitted
 from tests.analysis.oracle.recomputed import Compared, Floats, Numbers, exact_share, named, quartiles, student
 
 
@@ -58,6 +59,7 @@ def compare_statements(compared: Compared, answers: pd.DataFrame, trials: pd.Dat
         _measures(block, trials[trials["block"] == own["id"]])
         _settings_differ(block)
         _pairs(block)
+        _cumulative_models(block)
         if own["named"] is not None:
             _recognition(block)
         if own["kind"] == "delays":
@@ -140,6 +142,28 @@ def _settings_differ(block: Block) -> None:
     block.record_family("mixed", "means differ", slopes, explored=True)
     if not delays:
         block.record_family("omnibus", "settings differ", {item: _alike(one) for item, one in block.wide.items()})
+
+
+def _cumulative_models(block: Block) -> None:
+    """Fit each primary statement; a maximum is found to about four digits, the table of tests repeats the report."""
+    place = {code: number for number, code in enumerate(block.codes)}
+    rows = block.answers.dropna(subset="response").assign(place=lambda answers: answers["code"].map(place))
+    delays = block.found["kind"] == "delays"
+    design = np.array(block.delays)[:, None] / 100 if delays else np.eye(len(place))[:, 1:]
+    outcomes = {}
+    for item, model in ((one["item"], one["outcome"]) for one in block.found["cumulative"]):
+        own = rows[rows["item"] == item]
+        outcomes[item] = counts(own, len(place))
+        if model["p"] is not None:
+            outcomes[item] |= fitted(own, design, block.sides.get(item) if delays else None)
+    ps = adjusted([outcome["p"] for outcome in outcomes.values()], "fdr_bh")
+    for number, ((item, outcome), p) in enumerate(zip(outcomes.items(), ps, strict=True)):
+        own = named("outcome", outcome) | {"p_adjusted": np.maximum(p, block.gate), "members": len(outcomes)}
+        block.compared.check(f"{block.place}.cumulative.{number}", own, 2e-3, 2e-3)
+        reported = {
+            name: block.found["cumulative"][number]["outcome"][name] for name in ("n", "statistic", "p", "effect")
+        }
+        block.compared.rows[block.found["id"], "answers differ, cumulative mixed model", item, ""] = reported
 
 
 def _friedman(complete: pd.DataFrame) -> float:

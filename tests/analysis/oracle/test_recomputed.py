@@ -104,6 +104,7 @@ def test_measured_columns_have_different_values(name: str, written: Callable[[st
             assert values.is_unique, f"{path.name}: {column}"
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize(
     "path",
     [
@@ -215,6 +216,7 @@ FAULTS: tuple[Planted, ...] = (
 )
 
 
+@pytest.mark.variants(4)
 @pytest.mark.parametrize(("name", "plant", "where"), FAULTS, ids=[plant.__name__ for _, plant, _ in FAULTS])
 def test_a_planted_fault_is_found(
     name: str,

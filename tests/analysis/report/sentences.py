@@ -568,6 +568,12 @@ def tested_means(match: re.Match[str], told: Told) -> bool:
     return listed_in(match[1]) == {what for what, applies in expected.items() if applies}
 
 
+def cumulative_models(match: re.Match[str], told: Told) -> bool:
+    """Check how many cumulative models were fitted, and whether they have random slopes."""
+    fitted = [one for one in told.block["cumulative"] if one["outcome"]["p"] is not None]
+    return len(fitted) == count(match[2]) and bool(match[1]) == (told.block["kind"] == "delays")
+
+
 def no_tested_means(_match: re.Match[str], told: Told) -> bool:
     """Check that no test is of means."""
     tested = any(one["outcome"]["p"] is not None for one in told.block["mixed"])
@@ -855,6 +861,11 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"tested with Hotelling's T²|the participants' slopes were tested with Student's t test), for the participants "
      r"who answered in all conditions; the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
      when(lambda told: any(one["outcome"]["p"] is not None for one in told.block["mixed"]))),
+    (rf"In an exploratory analysis, a cumulative logit mixed model with random intercepts( and delay effects)? was "
+     rf"fitted to all individual answers to {N} primary statements?, including those of incomplete participants; "
+     r"effects were tested with likelihood ratios, and "
+     r"the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
+     cumulative_models),
     (r"Missing answers were not imputed; (\d+) participants? with a missing answer to a statement (?:was|were) "
      r"excluded from that statement's tests over all conditions, and from comparisons of two conditions that involve "
      r"the missing answer\.",

@@ -1,0 +1,92 @@
+"""Cumulative mixed models of the primary statements, which need neither equal steps nor complete participants."""
+
+from collections.abc import Iterator
+from functools import partial
+from typing import cast
+
+import numpy as np
+
+from study_app import number_text
+from study_app.analysis.findings.finding import FDR, Absent, BlockAnswers, in_family
+from study_app.analysis.findings.statement_tests import StatementTests
+from study_app.analysis.html_page import heading, paragraph, table_of
+from study_app.analysis.results import BlockResult, NotTested, Tested, short_text
+from study_app.analysis.statistics.cumulative_models import CumulativeModel, cumulative_model
+from study_app.analysis.statistics.outcome import false_discovery
+from study_app.analysis.wording import counted, interval, number, p_value
+
+
+class CumulativeModels(StatementTests):
+    """An exploratory cumulative mixed model of each primary statement, fitted to all individual answers."""
+
+    key = "cumulative"
+    place = 14
+    row_place = 6
+    what = "cumulative mixed model"
+    asks = "answers differ, cumulative mixed model"
+    title = "Do the answers differ in a cumulative mixed model? (exploratory)"
+
+    @classmethod
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
+        if answers.k < 2 or answers.verdicts_only:
+            return (), ()
+        over_delay = answers.block.kind == "delays"
+        columns = np.array(answers.block.delays_ms)[:, None] / 100 if over_delay else None
+        outcomes = {
+            item: cumulative_model(values, columns, answers.decided.direction(item) if over_delay else None)
+            for item, values in answers.single.items()
+            if answers.decided.is_primary(item)
+        }
+        family = f"{answers.block.id}: cumulative mixed models"
+        tested = in_family(outcomes, answers, family, false_discovery, FDR, primary=False)
+        if tested and all(test.outcome.p is None for test in tested):
+            return (), (NotTested(cls.what, tested[0].outcome.note),)
+        return tested, ()
+
+    def section(self) -> Iterator[str]:
+        if not (fitted := [test for test in self.value if test.outcome.p is not None]):
+            return
+        first, delays = fitted[0].outcome, bool(self.found.delays_ms)
+        effects = ["per 100 ms"] if delays else [f"{name} − {self.found.names[0]}" for name in self.found.names[1:]]
+        yield heading(3, self.title)
+        yield table_of(
+            fitted,
+            ("Statement", lambda test: short_text(self.found, test.item)),
+            ("n", lambda test: f"{test.outcome.n}"),
+            ("incomplete", lambda test: f"{self._model(test).incomplete}"),
+            ("Answers", lambda test: f"{self._model(test).answers}"),
+            *[(effect, partial(self._effect, place)) for place, effect in enumerate(effects)],
+            ("SD", lambda test: ", ".join(number(sd) for sd in self._model(test).sds)),
+            ("LR", lambda test: number(test.outcome.statistic)),
+            ("p", lambda test: p_value(test.outcome.p)),
+            ("adjusted p", lambda test: p_value(test.p_adjusted)),
+            ("Verdict", lambda test: test.verdict),
+            last=1,
+        )
+        yield paragraph(
+            "Cumulative logit mixed model of all individual answers, including those of incomplete participants. "
+            f"Effects are log odds ratios{' per 100 ms of delay' if delays else ''} with 95 % confidence intervals "
+            "(Wald): above 0 if answers are higher. SD: between participants, of their intercepts"
+            f"{' and of their delay effects' if delays else ''}. Test: {first.method}; p adjusted "
+            f"({fitted[0].correction}) across {number_text.counted(fitted[0].members, 'test')}.",
+            "soft",
+        )
+
+    @staticmethod
+    def _model(test: Tested) -> CumulativeModel:
+        return cast("CumulativeModel", test.outcome)
+
+    def _effect(self, place: int, test: Tested) -> str:
+        model = self._model(test)
+        return f"{number(model.log_odds_ratios[place])} {interval(model.intervals[place])}"
+
+    def methods(self) -> Iterator[str]:
+        fitted = sum(test.outcome.p is not None for test in self.value)
+        if fitted:
+            slopes = " and delay effects" if self.found.delays_ms else ""
+            yield (
+                f"In an exploratory analysis, a cumulative logit mixed model with random intercepts{slopes} was fitted "
+                f"to all individual answers to {counted(fitted, 'primary statement')}, including those of "
+                "incomplete participants; effects were tested with likelihood ratios, and the false discovery rate was "
+                "controlled (Benjamini–Hochberg)."
+            )
