@@ -17,6 +17,8 @@ from study_app import api
 from study_app.errors import ProtocolError, SessionError, StudyError
 from study_app.haptics.runtime import offline
 from study_app.protocol.load import load_scene
+from study_app.store.journals import journal
+from study_app.store.journals.journal_events import start_of
 from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.documented import ROOT, blocks
@@ -279,6 +281,17 @@ def test_an_own_observer_answers_and_a_session_left_is_resumed(short: Path, tmp_
     assert verify_study(parted).errors == ()
     with pytest.raises(StudyError, match="completed"), api.open_session(short, "P001", results=whole, seed=5):
         pass
+
+
+@pytest.mark.slow
+@needs_servo
+def test_a_participant_replaces_another(tmp_path: Path) -> None:
+    with api.open_session("rek2024", "P002", results=tmp_path, seed=5, recordings=False, row_of="P001") as session:
+        next(iter(session))
+    assert start_of(journal.read(session.folder / "journal.jsonl")).row_of == "P001"
+    with api.open_session("rek2024", "P003", results=tmp_path, seed=5, recordings=False) as session:
+        next(iter(session))
+    assert start_of(journal.read(session.folder / "journal.jsonl")).row_of is None
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.designer.document.steps import RetypeFile
 from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.file import file_text
 from tests.designer.support.designer import DEMO
 
 pytestmark = pytest.mark.slow
@@ -20,6 +21,11 @@ def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer:
     designer.editing.handle_request(RetypeFile(text))
     problems = designer.place.problems
     qtbot.waitUntil(lambda: len(problems.problems) == 4)
+    marked = file_text(designer.study, "kitchen.toml", ()).faulty
+    assert [text.split("\n")[line] for line in marked] == [
+        "[liquids.thin]", "[liquids.thick]", "[tasks.explore]", "[tasks.reach]",
+    ]  # fmt: skip
+    assert {row.line for row in problems.problems} == {line + 1 for line in marked}
     problems.show()
     at = QPointF(5, 5)
     QApplication.sendEvent(problems, QEnterEvent(at, at, at))

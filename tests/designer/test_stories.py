@@ -823,6 +823,8 @@ def new_study(story: Story) -> None:
     story.play("'Cold tea'")
     assert page.name.placeholderText().startswith("cold")
     story.act("of the demo", lambda: ask("demo"))
+    reached_by_tab = [one.focusPolicy() == Qt.FocusPolicy.StrongFocus for one in page.buttons]
+    assert reached_by_tab == [one.isChecked() for one in page.buttons]
     story.act("to the chosen card", next(one for one in page.buttons if one.isChecked()).setFocus)
     story.expect(at="Copy of A first look")
     story.play("Up Up Up")

@@ -154,6 +154,11 @@ def test_changes_begin_with_the_last_session_where_no_participant_was_run(
     changes = designer.controller.changes
     assert changes.version.itemText(0) == "The file without the edits"
     assert changes.chosen == protocol_hash(source)
+    assert changes.restore.isEnabled()
+    before, designer.editing.opened.read_only = designer.text, "The study is read-only."
+    changes.restore.click()
+    changes.compare_now()
+    assert (designer.text, changes.restore.isEnabled()) == (before, False)
 
 
 def test_the_version_of_a_session_in_results_leads_to_what_changed(

@@ -1,5 +1,6 @@
 """What the pre-flight says of facts, and that it measures them."""
 
+import itertools
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.clocks.grants import Grant
 from study_app.haptics.runtime.servo import Servo
-from study_app.haptics.runtime.telemetry import Timing
+from study_app.haptics.runtime.telemetry import Telemetry, Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load, parse, protocol_hash, read_document, source_bytes
 from study_app.protocol.model import Protocol
@@ -233,6 +234,19 @@ def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None
     assert facts.probe_s is not None and 0 < facts.probe_s < 60  # noqa: PT018
     assert facts.free_bytes is not None
     assert list(tmp_path.iterdir()) == []
+
+
+@needs_servo
+def test_the_sample_age_is_that_of_all_but_a_twentieth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    newest, looks = Telemetry.latest, itertools.count()
+
+    def late(self: Telemetry) -> Any:
+        sample = newest(self).copy()
+        sample["time_ns"] -= next(looks) % 20 * 1_000_000
+        return sample
+
+    monkeypatch.setattr(Telemetry, "latest", late)
+    assert measured(tmp_path).sample_age_s == pytest.approx(0.018, abs=0.0015)
     assert refusal_reasons(preflight_checks(facts, small.protocol())) == ""
 
 

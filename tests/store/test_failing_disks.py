@@ -520,6 +520,9 @@ def test_what_is_written_is_on_the_disk_before_what_follows_from_it(studied: Pat
         if name == "session":
             calls = [call for call in calls if "subject-P009" not in call.path.name]
         assert list(early_changes(calls)) == [], name
+        if name == "merge":  # the folders of the sites, too
+            named = [(call.name, call.path.name) for call in calls]
+            assert ("fsync", "sites") in named[: named.index(("rename", "pooled"))]
 
 
 @pytest.mark.slow

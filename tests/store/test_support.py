@@ -92,7 +92,9 @@ def test_nothing_of_a_study_is_in_it(
         )
     )
     plant(caplog)
-    write_support(tmp_path / "help.zip", "1  FOUND  no reply\n")
+    monkeypatch.setenv("HOME", str(results.parent))
+    monkeypatch.setenv("USERPROFILE", str(results.parent))
+    write_support(tmp_path / "help.zip", f"1  FOUND  no reply, see {results / 'bench.md'}\n")
     found = members(tmp_path / "help.zip")
     everything = "\n".join((*found, *found.values()))
     assert [word for word in PLANTED if word in everything] == []
@@ -104,8 +106,8 @@ def test_nothing_of_a_study_is_in_it(
     assert "the panel … failed: … times" in found["last-error.txt"]
     assert "test_support.py:" in found["last-error.txt"]
     assert "in fails" in found["last-error.txt"]
-    assert found["diagnosis.txt"] == "1  FOUND  no reply\n"
-    assert "app/session/bridge.py" in found["crash-1.txt"]
+    assert found["diagnosis.txt"] == f"1  FOUND  no reply, see {Path('~/results/bench.md')}\n"
+    assert '"study_app/app/session/bridge.py"' in found["crash-1.txt"]
     settings = json.loads(found["settings.json"])
     private = [settings[name] for name in ("operator", "workspace", "firmware", "recent", "camera")]
     assert (private, settings["device"]) == ([True] * 5, "mouse")

@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -11,6 +12,7 @@ from study_app.errors import ProtocolError, StoreError
 from study_app.haptics.model.estimators import Ewma
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.source.files import shipped_file
+from study_app.store.atomic import write_file
 from study_app.store.folder_lock import lock_folder
 from study_app.store.folders import StudyFolder
 from study_app.store.sessions.recovery import check_resumable
@@ -161,14 +163,21 @@ def test_a_session_that_is_open_is_not_upgraded_and_may_be_afterwards(results: P
 def test_an_upgrade_that_a_full_disk_interrupts_is_completed_by_the_next(
     results: Path, monkeypatch: pytest.MonkeyPatch, step: str
 ) -> None:
-    def disk_is_full(*_: object) -> None:
+    written: list[Path] = []
+
+    def disk_is_full(*words: Any) -> None:
+        if step == "write_file" and not written:
+            written.append(words[0])
+            return write_file(*words)
         raise StoreError("the disk is full")
 
     with monkeypatch.context() as patched:
         patched.setattr(f"study_app.store.upgrade.{step}", disk_is_full)
         with pytest.raises(StoreError, match="the disk is full"):
             upgrade(results)
-    assert upgrade(results) != []
+    upgraded = upgrade(results)
+    assert upgraded != []
+    assert written == [] or written[0] not in upgraded
     assert verify_study(results).errors == ()
 
 

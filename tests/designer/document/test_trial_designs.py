@@ -3,6 +3,7 @@
 import pytest
 
 from study_app.designer.document.additions import edits_to_duplicate
+from study_app.designer.document.document import template
 from study_app.designer.document.fields import kind_note, refused_at, row_at
 from study_app.designer.document.steps import (
     AddEntry,
@@ -15,10 +16,13 @@ from study_app.designer.document.steps import (
     shipped_liquids,
 )
 from study_app.designer.document.study import Study, read_study
+from study_app.designer.document.toml_edits import Set
+from study_app.designer.form.drawn_fields import _trial_strip
 from study_app.designer.form.form import form_of
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable_elements
 from study_app.protocol.warnings.study_warnings import warnings
+from tests.protocol.trials import matching
 
 STUDY = b"""\
 format = 2
@@ -176,3 +180,25 @@ def test_a_hypothesis_on_a_design_of_conditions_begins_with_d_prime(study: Study
     assert untranslated.protocol is None
     rows = (row for section in form_of(untranslated, ("sequence",)).sections for row in section.rows)
     assert next(row.facts for row in rows if row.path == ("analysis", "contrasts"))[0].measures == first.measures
+
+
+@pytest.mark.parametrize(
+    ("study", "block", "design", "durations_s"),
+    [
+        (template("viscosity-jnd"), "training", "pair", (4.0, 0.7, 4.0, 2.0, 0.5, 0.9)),
+        (template("viscosity-jnd"), "viscosity", "pair", (4.0, 0.7, 4.0, 2.0, 0.9)),
+        (read_study(matching.TEXT.encode()), "matching", "match", (2.0, 0.7, 2.0, 30.0, 0.9)),
+    ],
+)
+def test_the_trial_strip_has_the_duration_of_each_phase(
+    study: Study, block: str, design: str, durations_s: tuple[float, ...]
+) -> None:
+    for key, value in (("pause_s", 0.7), ("feedback_s", 0.5), ("between_s", 0.9)):
+        if key != "feedback_s" or design == "pair":
+            study, _ = study.with_edits(Set(("designs", design, key), value))
+    row = row_at(study.document, ("blocks", block, "design"))
+    assert row is not None
+    strip = _trial_strip(study, row)
+    assert strip is not None
+    assert tuple(phase.duration_s for phase in strip.phases) == durations_s
+    assert strip.duration_s == pytest.approx(sum(durations_s))

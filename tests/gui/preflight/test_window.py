@@ -1,11 +1,13 @@
 """The window before a session: every check with its value, warnings accepted by name, failures refused."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
 
-from study_app.gui.preflight.window import PreflightWindow, resumed_rows
+from study_app.devices.descriptor import NONE, NOT_AVAILABLE, Backend
+from study_app.gui.preflight.window import PreflightWindow, _compiled_check, _device_check, resumed_rows
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
 from study_app.session.preflight import Masking
@@ -95,6 +97,30 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
     window.show_view(checked(WELL, goes_on=rows))
     assert {value.text() for value in window.values()} >= {"Liquid setting 2, attempt\u00a02", "2 of 8 answers"}
     assert "Kept" not in dict(checked(WELL).rows)
+
+
+@pytest.mark.parametrize(
+    ("cache", "compiled", "verdict", "value", "about"),
+    [
+        (None, 0, "warning", "not stored", "no folder is writable"),
+        (Path("kept"), 0, "ok", "stored", "the force model for this processor, in kept"),
+        (Path("kept"), 7, "ok", "7 functions compiled", "the force model for this processor, in kept"),
+    ],
+)
+def test_the_check_of_compiled_code_says_where_it_is_stored(cache, compiled, verdict, value, about):
+    check = _compiled_check(cache, compiled)
+    assert (check.verdict, check.value, check.about) == (verdict, value, about)
+
+
+def test_the_check_of_devices_names_those_that_cannot_be_used():
+    falcon, inverse, phantom = (
+        Backend(name, "", state=state, can="")
+        for name, state in (("Falcon", "connected"), ("Inverse3", NOT_AVAILABLE), ("Phantom", NONE))
+    )
+    check = _device_check((falcon, inverse, phantom))
+    assert (check.verdict, check.value, check.about) == ("ok", "Falcon", "cannot be used now: Inverse3")
+    check = _device_check((phantom,))
+    assert (check.verdict, check.value, check.about) == ("warning", "none connected", "every device can be used")
 
 
 def test_a_haptic_device_is_asked_whether_its_motors_are_masked(qtbot) -> None:

@@ -15,10 +15,12 @@ from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import DARK
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
+from study_app.session.watch import _mark_text
 from study_app.store import recordings
 from study_app.store.unblinding import unblind
 from tests.compiled import needs_servo
 from tests.gui.walk import cut, dead, settle, unnamed, unreached
+from tests.journal_lines import event_of
 from tests.protocol.trials import level_studies
 
 pytestmark = [pytest.mark.slow, needs_servo]
@@ -98,16 +100,33 @@ def test_every_moment_is_the_recordings(opened, whole):
         assert np.cross(force.vector_m, samples.device_force_n[at]) == pytest.approx(0, abs=1e-9)
         assert stage.forces.cursor.value() == pytest.approx(times_s[at])
     assert stage.forces.sent.yData.max() == pytest.approx(np.linalg.norm(samples.device_force_n, axis=1).max())
-    assert [mark.text for mark in stage.shown.marks if mark.kind == "target"][:2] == [
-        "target 1 reached",
-        "target 2 reached",
-    ]
+    targets = [mark.text for mark in stage.shown.marks if mark.kind == "target"]
+    count = len(stage.shown.page.task.targets_m)
+    assert targets == [f"target {number % count + 1} reached" for number in range(len(targets))]
+    assert len(targets) > count
     answers = [mark.text for mark in stage.shown.marks if mark.kind == "answer"]
     assert answers[-1] == "answers confirmed"
     assert {one.split(":")[0] for one in answers[:-1]} == {"harder", "comfortable"}
     window.go(stage.shown.marks[1].at_s + 0.001)
     assert stage.happened.whole.endswith("target 2 reached")
     assert stage.tank.view.task.reached == 2
+
+
+@pytest.mark.parametrize(
+    ("event", "fields", "mark"),
+    [
+        ("target_reached", {"target": 2}, ("target", "target 3 reached")),
+        ("stepped", {"steps": -1}, ("answer", "set -1 step")),
+        ("choice", {"item": "thick", "value": 4}, ("answer", "thick: 4")),
+        ("choice", {"item": "thick", "value": None}, ("answer", "thick: cannot judge")),
+        ("answer_removed", {"item": "thick"}, ("answer", "thick: answer removed")),
+        ("trial_ended", {"outcome": "timeout"}, ("event", "task ended: timeout")),
+        ("note", {"text": ""}, ("event", "note: marked")),
+        ("force_stopped", {}, ("event", "force stopped")),
+    ],
+)
+def test_each_line_of_the_journal_has_its_mark(event, fields, mark):
+    assert _mark_text(event_of(event, **fields)) == mark
 
 
 def test_keys_mouse_and_speed_move_through_time(opened, whole, qtbot, monkeypatch):

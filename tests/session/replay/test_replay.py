@@ -156,7 +156,14 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
 
 
 def test_repeats_pauses_stops_and_fades_come_out_to_the_last_bit(tmp_path: Path) -> None:
-    comes_out(troubled(tmp_path / "results"), 5)
+    place = troubled(tmp_path / "results")
+    comes_out(place, 5)
+    (place / "recordings" / "trial-001.parquet").unlink()
+    found = replay(place)
+    unknown = ("trial 1, attempt 2", "trial 1, attempt 3", "trial 1, attempt 4")
+    why = "the recording continues an earlier one, which is missing or has a gap"
+    assert (found.recordings, found.differences) == (1, ())
+    assert found.uncompared == tuple(f"{name}: {why}" for name in unknown)
 
 
 @pytest.mark.parametrize("liquid", STRESSED)

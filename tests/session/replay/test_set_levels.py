@@ -8,9 +8,11 @@ import pytest
 
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse, resume_rehearsal
+from study_app.session.watch import read_watched
 from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.receipt import read
+from study_app.store.unblinding import unblind
 from study_app.store.verification.leaks import certain_telltales, find_leaks, recorded_numbers
 from study_app.store.verification.reproduction import reproduce_session
 from study_app.store.verification.verify_study import verify_study
@@ -97,6 +99,12 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
     scenes = {line["scene"] is None for line in lines if line["event"] == "stepped"}
     assert scenes == {DELAY in edits}
     assert sum(line["event"] == "responses" for line in lines) == 3
+    unblind(tmp_path / "study", by="AK", reason="a test")
+    begun = [line for line in lines if line["event"] == "interval_started" and line["trial"] == 1][-1]
+    shown = read_watched(session, 1, interval=begun["interval"])
+    zero_s = shown.samples["time_ns"][0] * 1e-9 - shown.times_s[0]
+    origin_ns = read(session / "receipt.json")["clock"]["origin_ns"]
+    assert zero_s - origin_ns * 1e-9 == pytest.approx(begun["t_s"], abs=0.005)
 
 
 def test_every_level_that_steps_led_to_is_looked_for_and_stands_nowhere(study: Path) -> None:

@@ -143,14 +143,18 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
 @needs_servo
 def test_a_rehearsals_worker_tells_how_much_is_compiled_and_nothing_of_what_compiles_later(monkeypatch: Any) -> None:
     said: list[float | str | Path] = []
+    rehearsed: list[tuple[str, int, int]] = []
 
-    def rehearse(_study: str, **_order: Any) -> Path:
+    def rehearse(study: str, *, participants: int, seed: int, **_given: Any) -> Path:
+        rehearsed.append((study, participants, seed))
         compiled(2)
         return Path("results")
 
     compiled, later = numba.njit(lambda x: x + 1), numba.njit(lambda x: x + 2)
     monkeypatch.setattr(rehearsal, "rehearse", rehearse)
-    assert carry_out(RehearsalOrder("demo", 1, 1, Path("results")), said.append, lambda: False) == Path("results")
+    order = RehearsalOrder("demo", participants=3, seed=7, results=Path("results"))
+    assert carry_out(order, said.append, lambda: False) == Path("results")
+    assert rehearsed == [("demo", 3, 7)]
     shares = tuple(said)
     later(2)
     assert shares

@@ -186,6 +186,14 @@ def test_every_page_of_a_preview_is_that_of_a_session_with_its_seed(name: str, l
     held = pages_of_session(shown, language)
     assert {type(page) for page in held} == {TextPage, TaskPage, QuestionnairePage}
     assert [plain(page) for page in previewed] == [plain(page) for page in held]
+    intros = {shown.protocol.text(form.intro, language) for form in shown.protocol.questionnaires.values()}
+    assert {page.intro for page in held if isinstance(page, QuestionnairePage)} <= intros
+
+
+def test_each_time_a_form_is_asked_its_simulated_answers_have_a_stream_of_their_own() -> None:
+    page = next(page for page in pages_of_session(preview(load("demo")), "en") if isinstance(page, QuestionnairePage))
+    again = [replace(page, trial=None, form="load", time=time).stream for time in (1, 2)]
+    assert [page.stream, *again] == [f"{page.trial}/answers", "form/load/answers", "form/load/2/answers"]
 
 
 @pytest.mark.parametrize("name", ["viscosityjnd", "compared"])

@@ -18,6 +18,7 @@ from study_app.session.transitions.events import (
     Continue,
     FadeIn,
     ForceStopped,
+    ItemShown,
     LanguageChosen,
     PauseRequested,
     Rest,
@@ -30,13 +31,15 @@ from study_app.session.transitions.events import (
     WriteCompleted,
     WriteFailed,
     WriteRetried,
+    WriteTables,
 )
 from study_app.session.transitions.page_builder import preview
 from study_app.session.transitions.state import FINAL, Phase
 from study_app.session.transitions.table import advance, initial_state
+from study_app.store.journals.journal_events import Answer
 from tests.golden import compare
 from tests.session import small
-from tests.session.transitions.states import LEFT, shown, state_in
+from tests.session.transitions.states import LEFT, shown, state_in, written
 from tests.session.transitions.transcribed import FOLDER, play
 from tests.transcripts import every, played
 
@@ -86,6 +89,13 @@ def test_who_may_resume_after_a_pause_and_a_stop(paused_by: Any, stopped_by: Any
     assert (state.phase, state.force_off, FadeIn() in commands) == (Phase.READING, False, True)
 
 
+def test_the_operator_takes_over_a_pause_once_and_the_tables_are_written() -> None:
+    state, _ = advance(state_in(Phase.READING), PauseRequested(1.0, "participant"))
+    state, commands = advance(state, PauseRequested(2.0, "operator"))
+    assert (written(commands), WriteTables() in commands) == (["paused"], True)
+    assert advance(state, PauseRequested(3.0, "operator")) == (state, ())
+
+
 def test_each_answer_is_on_the_disk_before_the_session_goes_on() -> None:
     state = state_in(Phase.ANSWERING)
     item = state.trial.items[0]
@@ -97,6 +107,14 @@ def test_each_answer_is_on_the_disk_before_the_session_goes_on() -> None:
         _, commands = advance(state, event)
         writes = [command for command in commands if isinstance(command, Write)]
         assert [(write.line.event, write.waits) for write in writes][:1] == [(line, True)]
+
+
+def test_a_removed_answer_keeps_the_time_at_which_its_question_was_shown() -> None:
+    state = small.walk(small.opened(), Phase.ANSWERING)
+    item = state.trial.items[0]
+    for event in (ItemShown(9.0, item), Chosen(10.0, item, 4), Chosen(11.0, item, 5), Retracted(12.0, item)):
+        state, _ = advance(state, event)
+    assert state.answers[item] == Answer(onset_s=9.0)
 
 
 def test_a_chosen_language_is_that_of_the_page_and_of_all_after_it() -> None:

@@ -116,6 +116,14 @@ def test_a_rehearsals_key_follows_from_its_seed_and_does_not_mix_with_a_real_one
         open_or_draw_key(tmp_path / "real", protocol, stream(1, "blinding").random)
 
 
+def test_no_other_key_is_drawn_for_a_session_that_has_only_its_receipt(tmp_path: Path, protocol: Protocol) -> None:
+    session = StudyFolder(tmp_path).session("P001", 1)
+    session.path.mkdir(parents=True)
+    session.receipt.write_text("{}", encoding="utf-8", newline="\n")
+    with pytest.raises(StoreError, match=r"key\.sealed is missing, although 1 session used it"):
+        open_or_draw_key(tmp_path, protocol)
+
+
 def test_a_block_with_another_of_the_studys_methods_has_other_conditions(tmp_path: Path) -> None:
     many = '\n[methods.many]\nkind = "constant"\nlevels = [0.1, 0.8]\nrepetitions = 8\n'
     open_or_draw_key(tmp_path, study(more=many))

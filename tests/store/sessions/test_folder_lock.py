@@ -1,6 +1,7 @@
 import json
 import os
 import platform
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -41,7 +42,8 @@ def test_a_folder_is_open_in_one_program_until_it_lets_go(tmp_path: Path) -> Non
         (tmp_path / name).write_text("of no program", encoding="utf-8", newline="\n")
     first = lock_folder(tmp_path)
     assert is_open(tmp_path)
-    by = rf"is open in another program \(process {os.getpid()} on .*: wait for it, or close it there"
+    at = re.escape(json.loads(first.marker.read_bytes())["at"])
+    by = rf"is open in another program \(process {os.getpid()} on .*, since {at}\): wait for it, or close it there"
     with pytest.raises(StoreError, match=by):
         lock_folder(tmp_path)
     assert markers(tmp_path) == (first.marker,)
@@ -105,6 +107,12 @@ def test_neither_a_set_clock_nor_a_hidden_process_ends_an_opening(
     monkeypatch.setattr(psutil.Process, "status", mock.Mock(side_effect=psutil.AccessDenied))
     assert is_open(tmp_path)
     opening.release()
+
+
+@needs_links
+def test_a_marker_that_is_removed_before_it_is_read_keeps_nobody_out(tmp_path: Path) -> None:
+    (tmp_path / ".open-0123abcd.json").symlink_to(tmp_path / "removed")
+    assert not is_open(tmp_path)
 
 
 @pytest.mark.slow

@@ -95,6 +95,9 @@ def test_a_recording_that_is_lost_is_said_to_be(start: Start, samples_of: Make) 
     assert store.recorder is not None
     store.recorder.start(1, 1, 1000.0)
     store.recorder.append(samples_of(10))
+    full = mock.Mock(side_effect=StoreError("no space left"))
+    with mock.patch.object(SessionStore, "append", full), pytest.raises(StoreError, match="no space"):
+        store.finish("completed")
     store.finish("completed")
     (lost,) = [line for line in journal.read(store.folder.journal) if line.event == "recording_lost"]
     assert (lost.trial, lost.attempt) == (1, 1)

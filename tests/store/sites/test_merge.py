@@ -17,7 +17,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import reversals
 from study_app.store.folder_lock import lock_folder
 from study_app.store.folders import StudyFolder
-from study_app.store.merged import read_merged
+from study_app.store.merged import all_exclusions, read_merged
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.sites import merge as merging
 from study_app.store.sites.merge import merge_sites
@@ -79,9 +79,10 @@ def test_commands_name_an_excluded_participant_with_the_site(labs: dict[str, Pat
     pooled = results / "pooled"
     merge_sites({"A": labs["A"], "B": labs["B"]}, pooled)
     asked = [str(pooled), "--participant", "B-P001", "--by", "AB", "--reason", "asleep"]
-    for command in ("exclude", "include"):
+    for command, excluded in (("exclude", ["B-P001"]), ("include", [])):
         done = CliRunner().invoke(commands, [command, *asked])
         assert (done.exit_code, "B-P001, session 1" in done.output) == (0, True), done.output
+        assert [row.participant for row in all_exclusions(pooled)] == excluded
     assert [row.participant for row in reversals(pooled / "sites" / "B")] == ["P001"]
 
 

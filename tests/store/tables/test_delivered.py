@@ -101,6 +101,15 @@ def test_what_is_found_of_an_interval(pytestconfig: pytest.Config) -> None:
     compare(file, played(file, acts(begun, {})), pytestconfig, rel=1e-3)
 
 
+def test_the_lead_of_a_paced_task_is_not_judged() -> None:
+    interval = Interval(parse(STUDY.encode(), "delivered.toml"))
+    task = interval.protocol.tasks["follow"]
+    interval.weaken(0.5, until=round(1000 * task.lead_s))
+    found = delivered_values(interval.protocol, DAMPING, task, judged_fields(interval.found))
+    assert task.lead_s > interval.protocol.scene.fade_s
+    assert (found.force_share, found.value_delivered) == (pytest.approx(1.0), pytest.approx(8.0, rel=0.01))
+
+
 @pytest.mark.parametrize(
     ("errors_ms", "holds", "broken"),
     [

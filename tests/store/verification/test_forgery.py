@@ -95,6 +95,17 @@ def test_a_removed_confirmation_is_found_where_the_session_went_on(
     assert told(study).count("was never confirmed: a line was removed") == number
 
 
+@pytest.mark.parametrize("key", ["value", "changes", "onset_s", "first_s", "last_s"])
+def test_a_confirmed_answer_that_was_not_chosen_is_found(study: Path, key: str) -> None:
+    def edit(lines: Lines) -> None:
+        confirmed = next(line for line in lines if line["event"] == "responses")
+        confirmed["items"][0][key] += 1
+
+    forge(study / P007 / "journal.jsonl", edit)
+    cover_up(study)
+    assert "that differs from the one chosen earlier: it has been changed" in told(study)
+
+
 def test_a_session_that_left_its_last_page_was_not_aborted(tmp_path: Path) -> None:
     study = rehearse_answers("demo", participants=1, seed=1, results=tmp_path / "demo", features=made_up("demo"))
     session = study / "data" / "sub-P001" / "ses-01"
