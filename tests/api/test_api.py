@@ -308,6 +308,7 @@ def test_an_own_observer_answers_with_lists_and_numbers_of_numpy(tmp_path: Path)
         session.run()
     assert verify_study(tmp_path / "r").errors == ()
     rows = api.read(tmp_path / "r")["responses"]
+    assert rows["onset_s"].notna().all()  # also of questions that an answer made visible
     told = {item: set(rows.loc[rows["item"] == item, "response"].astype(str)) for item in given}
     assert told == {"age": {"30"}, "used": {"falcon mouse"}, "pleasant": {"25.0"}, "thickness": {"2"}}
 

@@ -9,7 +9,6 @@ from PySide6.QtWidgets import QApplication
 
 from study_app.designer.document.steps import RetypeFile
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.file import file_text
 from tests.designer.support.designer import DEMO
 
 pytestmark = pytest.mark.slow
@@ -21,11 +20,6 @@ def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer:
     designer.editing.handle_request(RetypeFile(text))
     problems = designer.place.problems
     qtbot.waitUntil(lambda: len(problems.problems) == 4)
-    marked = file_text(designer.study, "kitchen.toml", ()).faulty
-    assert [text.split("\n")[line] for line in marked] == [
-        "[liquids.thin]", "[liquids.thick]", "[tasks.explore]", "[tasks.reach]",
-    ]  # fmt: skip
-    assert {row.line for row in problems.problems} == {line + 1 for line in marked}
     problems.show()
     at = QPointF(5, 5)
     QApplication.sendEvent(problems, QEnterEvent(at, at, at))
@@ -54,6 +48,13 @@ def test_header_and_list_count_problems_and_warnings_after_each_step(designer: A
         designer.editing.make_step("Remove a key", Unset(key))
     qtbot.waitUntil(lambda: len(designer.place.problems.problems) == 2)
     assert heading.text().startswith("2 problems"), heading.text()
+    problems = designer.place.problems
+    problems.open_problem(problems.problems[1])
+    marks = [line.row == problems.problems[1] for line in problems.lines]
+    assert [line.here for line in problems.lines] == marks
+    for here_only in (True, False):
+        problems.limit.buttons[here_only].click()
+    assert [line.here for line in problems.lines] == marks, "also in lines that are made anew"
     for _ in range(3):
         designer.editing.undo()
     qtbot.waitUntil(lambda: header.words == sound)

@@ -26,6 +26,7 @@ from study_app.designer.document.steps import (
 )
 from study_app.designer.document.study import read_study
 from study_app.errors import StoreError
+from study_app.gui.widgets.cards import Chip
 from study_app.protocol.source.files import protocol_hash
 from study_app.store.drafts import Draft, draft_of, write_draft
 from study_app.store.folder_lock import lock_folder
@@ -789,6 +790,7 @@ def new_study(story: Story) -> None:
     ask, questions = designer.controller.show_new_page, page.card.questions
     story.act("ask", ask)
     story.act("adaptive", next(one for one in page.buttons if one.choice.source == "template:viscosity-jnd").click)
+    assert [chip.word for chip in page.card.details.findChildren(Chip)] == ["recovered"]
     languages = [f"Language {name}" for name in ("English", "Dutch", "German", "French", "Arabic")]
     for at in ("Short name of the new study", *languages, "Standards", "Trials per standard"):
         story.play("Tab")

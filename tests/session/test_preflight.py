@@ -234,6 +234,7 @@ def test_servo_and_disk_are_measured_and_nothing_is_left(tmp_path: Path) -> None
     assert facts.probe_s is not None and 0 < facts.probe_s < 60  # noqa: PT018
     assert facts.free_bytes is not None
     assert list(tmp_path.iterdir()) == []
+    assert refusal_reasons(preflight_checks(facts, small.protocol())) == ""
 
 
 @needs_servo
@@ -247,7 +248,6 @@ def test_the_sample_age_is_that_of_all_but_a_twentieth(tmp_path: Path, monkeypat
 
     monkeypatch.setattr(Telemetry, "latest", late)
     assert measured(tmp_path).sample_age_s == pytest.approx(0.018, abs=0.0015)
-    assert refusal_reasons(preflight_checks(facts, small.protocol())) == ""
 
 
 @needs_servo

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from markupsafe import escape
 
+from study_app.analysis.report import questions_in_full
 from study_app.analysis.report.write_report import report
 from study_app.protocol.source.files import shipped_file
 from study_app.store import receipt
@@ -44,6 +45,16 @@ def test_the_first_session_of_each_version_and_who_saved_it_are_read_from_receip
     assert after.participant == "P002"
     assert len(sentences) == 1
     assert OLD in sentences[0]
+
+
+def test_versions_are_listed_where_all_texts_are_in_one_language(
+    results: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texts_of = questions_in_full._texts
+    english = lambda protocol: (text for text in texts_of(protocol) if text.language == "en")  # noqa: E731
+    monkeypatch.setattr(questions_in_full, "_texts", english)
+    page = "".join(questions_in_full.appendix(recorded_contents(results)))
+    assert (">versions<" in page, ">language<" in page) == (True, False)
 
 
 def test_the_report_has_every_wording_in_every_language_and_says_what_changed(rek: Results, tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from study_app.designer.document.fields import (
     references_to,
     with_references,
 )
-from study_app.designer.document.steps import MakeSeries, Situation
+from study_app.designer.document.steps import DuplicateElement, MakeSeries, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
@@ -222,10 +222,18 @@ def test_an_entry_comes_to_its_place(name: str) -> None:
             wanted.insert(to - (index < to), listed[index])
             assert list(at(after.document, place)) == wanted
             assert at(after.document, path) == listed[index]
+        assert edits_to_move(study, (*place, 0), 0) == ((), (*place, 0))
 
 
 TITLE = ("pages", "welcome", "title")
 DEMO = read_study((PROTOCOLS / "demo.toml").read_bytes(), PROTOCOLS)
+
+
+def test_a_point_is_duplicated_with_its_numbers() -> None:
+    place = ("tasks", "reach", "targets_mm")
+    step = DuplicateElement((*place, 0)).step(Situation(DEMO))
+    after, _ = DEMO.with_edits(*step.edits)
+    assert at(after.document, place) == ((-30, 0, 0), (-30, 0, 0), (30, 0, 0))
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import pytest
 from study_app.analysis.planning import threshold_studies
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
+from study_app.designer.document.elements import outline
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import (
@@ -79,6 +80,13 @@ def test_a_fault_of_a_table_that_two_blocks_name_counts_once() -> None:
     changes = Set(("stimuli", "damping", "level"), "value"), Set(("stimuli", "damping", "levels"), [9, 40])
     study, _ = template("viscosity-jnd").with_edits(*changes, Set(("methods", "easy", "levels"), [12]))
     assert [fault.path for fault in study.faults].count(("designs", "pair", "feedback")) == 1
+
+
+def test_a_fault_of_a_question_counts_once_at_its_block() -> None:
+    study, _ = study_of("demo").with_edits(Set(("questionnaires", "liquid", "items", 0, "text"), 3))
+    assert len(study.faults) == 1
+    counts = {element.path: element.faults for element in outline(study).session if element.faults}
+    assert counts[("blocks", "liquids")] == counts[("questionnaires", "liquid")] == 1
 
 
 @pytest.mark.slow

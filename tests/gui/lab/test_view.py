@@ -44,6 +44,7 @@ def test_while_blind_nothing_tells_the_settings_apart(place: Any, moved: LabView
             assert name not in words, name
         assert "Setting 1" in words
         assert "Setting 2" in words
+        assert "The errors relative to the reference would reveal the settings." in words
     assert pictures[0] == pictures[1]
 
 

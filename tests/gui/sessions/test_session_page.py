@@ -8,7 +8,7 @@ import pytest
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.sessions.session_facts import sessions
-from study_app.gui.sessions.session_page import SessionPage, read_record
+from study_app.gui.sessions.session_page import SessionPage, _judged_sentence, read_record
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
@@ -115,6 +115,16 @@ def test_no_page_names_a_condition_of_a_sealed_study(study):
     text = repr(record)
     protocol = load("demo")
     assert [name for name in protocol.conditions if re.search(rf"\b{name}\b", text)] == []
+
+
+@pytest.mark.parametrize(
+    ("sealed", "verdict", "is_checked_later"), [(True, None, True), (True, True, False), (False, None, False)]
+)
+def test_what_unblinding_will_check_is_said_while_a_session_is_sealed_without_a_verdict(
+    sealed, verdict, is_checked_later
+):
+    said = _judged_sentence((), sealed=sealed, verdict=verdict)
+    assert said.endswith("will be checked after unblinding.") == is_checked_later
 
 
 def test_unblinding_keeps_the_validity_of_a_rehearsed_session_and_names_its_conditions(study):

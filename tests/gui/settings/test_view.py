@@ -21,6 +21,8 @@ def test_the_display_test_is_opened_once_and_left_by_esc(real_place, qtbot):
     qtbot.mouseClick(real_place.screens.test, Qt.MouseButton.LeftButton)
     test = real_place.test
     assert test.isVisible()
+    assert [value.accessibleName() for value in test.values] == list(view._NAMES)
+    assert test.interval.field.unit == "ms"
     real_place.open_test()
     assert real_place.test is test
     with qtbot.waitSignal(test.left):

@@ -170,6 +170,7 @@ def test_keys_mouse_and_speed_move_through_time(opened, whole, qtbot, monkeypatc
 def test_the_ball_is_as_late_as_on_the_screen(opened, whole, qtbot):
     window = next(one for one in (opened(whole, row) for row in (2, 3)) if one.presented.word == "late")
     window.go(2.0)
+    assert window.seen.toolTip().startswith("Shows the ball with the delay that the participant saw;")
     hand_ns = window.stage.tank.view.sample_time_ns
     window.seen.click()
     assert (hand_ns - window.stage.tank.view.sample_time_ns) * 1e-9 == pytest.approx(0.15, abs=0.1)
