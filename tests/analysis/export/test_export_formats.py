@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -123,6 +124,14 @@ def test_the_wide_table_for_spss_tells_why_an_answer_is_missing(small: Results, 
     assert hidden["smooth__heavyzembla"].isna().tolist() == [False, True, True]
 
 
+def test_the_wide_table_says_who_is_simulated(small: Results, to: Path) -> None:
+    for participant, small.simulated in (("A", True), ("B", False)):
+        small.add(participant, lambda *_: 5)
+    export(small.folder, to, extras=["wide"])
+    told = [(row["participant"], row["simulated"]) for row in cells(table(to, "small", "wide", "csv"))]
+    assert told == [("A", "true"), ("B", "false")]
+
+
 def test_without_its_library_sav_is_refused_in_one_line_before_anything_is_read(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
@@ -138,6 +147,8 @@ def test_the_psych_ds_folder_keeps_the_rules(small: Results, to: Path, opened: b
         small.open()
     export(small.folder, to, extras=["psych-ds"])
     assert undescribed(to / FOLDER) == set()
+    described = json.loads((to / FOLDER / "dataset_description.json").read_bytes())
+    assert (described["name"], described["alternateName"]) == ("small", "A small study")
     tables = [path.name for path in (to / FOLDER).rglob("*.csv")]
     assert sorted(set(tables)) == sorted(tables), "no table is there twice"
     responses = to / FOLDER / "data" / table(to, "small", "responses", "csv").name

@@ -5,15 +5,18 @@ import json
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.export.psychds_dataset import FOLDER, variables
+from study_app.analysis.export import psychds_dataset
+from study_app.analysis.export.psychds_dataset import FOLDER, _footage, _study_file, variables
 from study_app.analysis.export_study import export
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.source.files import shipped_file
+from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.blinded.blinding import reveal
 from study_app.store.csv_files import Column, optional
 from study_app.store.output_files import FileCopy, write_files
@@ -103,6 +106,18 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
         assert not (folder / "materials" / "waves.mp4").exists()
         readme = (folder / "README.md").read_text(encoding="utf-8")
         assert f"Add the files that are missing from `materials`: waves.mp4 (SHA-256 {digest}; {why})." in readme
+
+
+def test_the_file_and_the_footage_of_a_study_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = shipped_file("rek2024")
+    found = _study_file("rek2024", {protocol_hash(file.read_bytes())}, {})
+    assert found is not None
+    assert (found[0].name, found[1:]) == (file.name, (file.read_bytes(), {}))
+    conditions = {"fast": {"view": "b.mp4", "footage_sha256": "1f"}, "slow": {"view": "a.mp4", "footage_sha256": "2e"}}
+    key = SimpleNamespace(tables={"conditions": conditions | {"none": {"view": ""}}})
+    monkeypatch.setattr(psychds_dataset, "revealed_key", lambda _folder: key)
+    study: Any = SimpleNamespace(folder=tmp_path)
+    assert _footage(study) == {"a.mp4": "2e", "b.mp4": "1f"}
 
 
 def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) -> None:

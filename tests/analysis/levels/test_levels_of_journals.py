@@ -11,11 +11,13 @@ from typing import Any, NamedTuple
 import pandas as pd
 import pytest
 
+from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export_study import export
+from study_app.analysis.levels.tracks import OF_INTERVALS
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
-from study_app.store.columns import INTERVALS
+from study_app.store.columns import INTERVALS, TRIALS_MISSING
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.receipt import read
@@ -81,6 +83,15 @@ def test_trials_of_tracks_have_the_condition_whose_number_is_varied(opened_level
         of = {(row["block"], row["condition"], row["liquid"], row["delay_ms"]) for row in rows(tmp_path, name)}
         assert {("equal", "oil", "thin", "0.0"), ("pairs", "late", "thin", "100.0")} <= of, name
         assert not any("/" in condition or delay == "n/a" for _, condition, _, delay in of), name
+    (tracks, *_), (response, *_) = rows(tmp_path, "tracks"), rows(tmp_path, "responses")
+    assert {f"{name}_{number}" for name in OF_INTERVALS for number in (1, 2, 3)} <= tracks.keys()
+    assert TRIALS_MISSING.name in response
+    blocks = load_study(opened_levels).levels
+    levels = json.loads((tmp_path / "codebook.json").read_text("utf-8"))["levels"]
+    varied = {block.id: block.stimulus for block in blocks if block.stimulus is not None}
+    assert {
+        level["block"]: (level["vary"], level["level"], level["direction"]) for level in levels if "vary" in level
+    } == {name: (stimulus.vary, stimulus.level_kind, stimulus.direction) for name, stimulus in varied.items()}
 
 
 def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path, tmp_path: Path) -> None:
