@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, with_gates
 from study_app.analysis.report.first_page import first_page
+from study_app.analysis.report import sections
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
 from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
@@ -207,3 +209,25 @@ def test_known_liquids_are_called_recognised(n: int) -> None:
         for _ in range(100)
     ]
     assert sum(one == (0, 1, 2) for one in known) >= (75 if n == 12 else 99)
+
+
+@pytest.mark.parametrize(
+    ("reaching", "recorded", "why"),
+    [
+        ((), False, "This block does not contain a reaching task"),
+        (("reach",), False, "The recordings of this block could not be read"),
+        (("reach",), True, ""),
+    ],
+)
+def test_a_block_without_reaching_measures_says_why(
+    reaching: tuple[str, ...], recorded: bool, why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    block = SimpleNamespace(id="reach", title="Reaching")
+    measured = SimpleNamespace(reaching=reaching, recorded_in=lambda _block: recorded)
+    results: Any = SimpleNamespace(blocks=[block], performance=measured, delivered=())
+    for name, value in (("_movement_measures", []), ("_motion_rows", [["thin", "1", "2"]]), ("_recordings", "")):
+        monkeypatch.setattr(sections, name, lambda *_, value=value, **__: value)
+    monkeypatch.setattr(sections, "settings_noun", lambda _result: "setting")
+    page = "".join(sections.motion(results))
+    sentences = ("This block does not contain a reaching task", "The recordings of this block could not be read")
+    assert [sentence for sentence in sentences if sentence in page] == [why][: bool(why)]

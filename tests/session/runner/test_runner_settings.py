@@ -33,6 +33,7 @@ def at_setting(rig: Rig, *edits: tuple[str, str]) -> Bench:
     """Return a session whose first level is being set, its hand in motion."""
     made = Bench(rig, setting(*edits))
     made.swing()
+    assert ALONE in edits or made.state.adjusting is None, "the interval of the standard is not set"
     made.to_setting()
     return made
 
