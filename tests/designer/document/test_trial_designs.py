@@ -183,19 +183,19 @@ def test_a_hypothesis_on_a_design_of_conditions_begins_with_d_prime(study: Study
 
 
 @pytest.mark.parametrize(
-    ("study", "block", "design", "durations_s"),
+    ("study", "block", "durations_s"),
     [
-        (template("viscosity-jnd"), "training", "pair", (4.0, 0.7, 4.0, 2.0, 0.5, 0.9)),
-        (template("viscosity-jnd"), "viscosity", "pair", (4.0, 0.7, 4.0, 2.0, 0.9)),
-        (read_study(matching.TEXT.encode()), "matching", "match", (2.0, 0.7, 2.0, 30.0, 0.9)),
+        (template("viscosity-jnd"), "training", (4.0, 0.7, 4.0, 2.0, 0.5, 0.9)),
+        (template("viscosity-jnd"), "viscosity", (4.0, 0.7, 4.0, 2.0, 0.9)),
+        (read_study(matching.TEXT.encode()), "matching", (2.0, 0.7, 2.0, 30.0, 0.9)),
     ],
 )
 def test_the_trial_strip_has_the_duration_of_each_phase(
-    study: Study, block: str, design: str, durations_s: tuple[float, ...]
+    study: Study, block: str, durations_s: tuple[float, ...]
 ) -> None:
-    for key, value in (("pause_s", 0.7), ("feedback_s", 0.5), ("between_s", 0.9)):
-        if key != "feedback_s" or design == "pair":
-            study, _ = study.with_edits(Set(("designs", design, key), value))
+    (design,) = study.document["designs"]
+    for key, value in {"pause_s": 0.7, "between_s": 0.9, **({"feedback_s": 0.5} if design == "pair" else {})}.items():
+        study, _ = study.with_edits(Set(("designs", design, key), value))
     row = row_at(study.document, ("blocks", block, "design"))
     assert row is not None
     strip = _trial_strip(study, row)

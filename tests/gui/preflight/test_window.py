@@ -99,28 +99,21 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
     assert "Kept" not in dict(checked(WELL).rows)
 
 
-@pytest.mark.parametrize(
-    ("cache", "compiled", "verdict", "value", "about"),
-    [
-        (None, 0, "warning", "not stored", "no folder is writable"),
-        (Path("kept"), 0, "ok", "stored", "the force model for this processor, in kept"),
-        (Path("kept"), 7, "ok", "7 functions compiled", "the force model for this processor, in kept"),
-    ],
-)
-def test_the_check_of_compiled_code_says_where_it_is_stored(cache, compiled, verdict, value, about):
-    check = _compiled_check(cache, compiled)
-    assert (check.verdict, check.value, check.about) == (verdict, value, about)
-
-
-def test_the_check_of_devices_names_those_that_cannot_be_used():
-    falcon, inverse, phantom = (
+def test_the_checks_of_devices_and_of_compiled_code() -> None:
+    falcon, inverse, mouse = (
         Backend(name, "", state=state, can="")
-        for name, state in (("Falcon", "connected"), ("Inverse3", NOT_AVAILABLE), ("Phantom", NONE))
+        for name, state in (("Falcon", "connected"), ("Inverse3", NOT_AVAILABLE), ("SpaceMouse", NONE))
     )
-    check = _device_check((falcon, inverse, phantom))
-    assert (check.verdict, check.value, check.about) == ("ok", "Falcon", "cannot be used now: Inverse3")
-    check = _device_check((phantom,))
-    assert (check.verdict, check.value, check.about) == ("warning", "none connected", "every device can be used")
+    kept, folder = "the force model for this processor, in kept", Path("kept")
+    checks = [*map(_device_check, ((falcon, inverse, mouse), (mouse,)))]
+    checks += [_compiled_check(*compiled) for compiled in ((None, 0), (folder, 0), (folder, 7))]
+    assert [(check.verdict, check.value, check.about) for check in checks] == [
+        ("ok", "Falcon", "cannot be used now: Inverse3"),
+        ("warning", "none connected", "every device can be used"),
+        ("warning", "not stored", "no folder is writable"),
+        ("ok", "stored", kept),
+        ("ok", "7 functions compiled", kept),
+    ]
 
 
 def test_a_haptic_device_is_asked_whether_its_motors_are_masked(qtbot) -> None:

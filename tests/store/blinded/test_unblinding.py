@@ -185,7 +185,7 @@ def test_catch_trials_are_judged_block_by_block(finished: Start, monkeypatch: py
     missed = {1: ("easy", 0), 2: ("easy", 0), 3: ("easy", 0), 4: ("hard", 1), 5: ("hard", 0), 6: ("hard", 1)}
     lines = [event_of("trial_started", trial=number, block=block) for number, (block, _) in missed.items()]
     results = [SimpleNamespace(trial=number, catch=True, correct=not wrong) for number, (_, wrong) in missed.items()]
-    monkeypatch.setattr(module.receipt, "read", lambda _: {"protocol": {"blocks": dict.fromkeys(blocks, {"catch": 1})}})
+    monkeypatch.setattr(module.receipt, "read", lambda _: {"protocol": {"blocks": {"hard": {"catch": 1}}}})
     monkeypatch.setattr(module, "complete_protocol", lambda *_: SimpleNamespace(blocks=blocks))
     monkeypatch.setattr(module, "open_events", lambda *_: lines)
     monkeypatch.setattr(module, "trial_results", lambda *_: results)
