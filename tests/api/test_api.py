@@ -298,7 +298,7 @@ def test_a_participant_replaces_another(tmp_path: Path) -> None:
 @needs_servo
 def test_an_own_observer_answers_with_lists_and_numbers_of_numpy(tmp_path: Path) -> None:
     given = {"age": np.int64(30), "used": ["falcon", "mouse"], "pleasant": np.float64(25.0), "thickness": np.int32(2)}
-    others = {"hand": "left", "since": 1.5, "feels_liquid": 4, "comment": "Fine."}
+    others = {"hand": "both", "since": 1.5, "feels_liquid": 4, "comment": "Fine."}
 
     def observer(question: Any) -> dict[str, Any] | None:
         asked = {item.id for item in getattr(question.page, "items", ())}

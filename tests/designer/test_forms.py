@@ -1,5 +1,6 @@
 """The form: what is shown is no edit, and special editors ask for the same steps as those they replace."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -92,6 +93,23 @@ def test_the_help_is_that_of_the_row_with_the_keyboard(designer: Any) -> None:
         keyboard = next(part for part in row.findChildren(QWidget) if part.focusPolicy() & Qt.FocusPolicy.TabFocus)
         keyboard.setFocus()
         assert designer.place.form.foot.title.text() == row.row.label
+
+
+def test_a_range_goes_from_the_least_to_the_most(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    row = designer.form_row("blocks", "liquids", "repetitions").row
+    assert replace(row, bounds=("at least 1", "at most 9")).range == "1 to 9"
+
+
+def test_the_file_is_handed_on_while_typing_goes_on(designer: Any, qtbot: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("study_app.designer.file.HAND_ON_MS", 60_000)
+    designer.open()
+    editor = designer.place.file.editor
+    editor.insertPlainText("# ")
+    left_ms = editor._rest.remainingTime()
+    qtbot.wait(50)
+    editor.insertPlainText("x")
+    assert 0 < editor._rest.remainingTime() <= left_ms - 40
 
 
 def test_a_text_loses_its_selection_with_the_keyboard(designer: Any) -> None:

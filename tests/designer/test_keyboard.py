@@ -20,6 +20,13 @@ def test_every_key_of_the_place_is_one_shortcut(designer: Any) -> None:
     assert sorted({"Ins": "Insert"}.get(keys, keys) for keys in made) == sorted(wanted)
 
 
+def test_a_tab_that_is_asked_for_comes_to_the_front_in_a_narrow_window(designer: Any) -> None:
+    designer.open(width=1024)
+    designer.place.parts.show_tab("file")
+    assert designer.place.pane.isVisible()
+    assert designer.place.pane.isAncestorOf(designer.keyboard)
+
+
 MOST = 250
 
 

@@ -9,9 +9,12 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
+from study_app.designer.new_study_page import _listed_title
 from study_app.designer.outline import ROW_ROLE
 from study_app.protocol.source.files import shipped
+from study_app.store.drafts import Keeper
 from study_app.store.study_settings import keep_original
+from study_app.store.study_versions import content_hash
 
 pytestmark = pytest.mark.slow
 
@@ -84,6 +87,13 @@ def type_id(qtbot: Any, designer: Any, path: tuple[str, str], name: str) -> None
     qtbot.keyClicks(field, name)
 
 
+def test_down_leads_from_an_empty_search_to_the_outline(designer: Any) -> None:
+    designer.open()
+    outline = designer.place.outline
+    outline.words.setFocus()
+    assert designer.hit("Down") is outline.tree
+
+
 def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, designer: Any) -> None:
     designer.open()
     type_id(qtbot, designer, ("conditions", "thick"), "honey")
@@ -148,6 +158,11 @@ def test_studies_are_listed_by_title_with_their_files_whatever_was_opened_last(d
     designer.place.ask("save")
     designer.controller.enter()
     assert listed(designer) == before
+    file = designer.file.with_name("zeta.toml")
+    kept = Keeper(file, base=content_hash(file.read_bytes()))
+    kept.note_edit(file.read_text("utf-8").replace("apples", "pears"), (), 0.0)
+    kept.write()
+    assert [_listed_title(file, drafted=drafted) for drafted in (False, True)] == ["apples", "pears"]
     box = designer.place.header.study
     assert box.currentText() == "Melons  ·  beta.toml  (copy of alpha)"
     assert (

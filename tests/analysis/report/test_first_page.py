@@ -221,7 +221,12 @@ def test_a_block_without_reaching_measures_says_why(
     measured = SimpleNamespace(reaching=reaching, recorded_in=lambda _block: recorded)
     block = SimpleNamespace(id="reach", title="Reaching")
     results: Any = SimpleNamespace(blocks=[block], performance=measured, delivered=())
-    made = {"_movement_measures": [], "_motion_rows": [["thin", "1", "2"]], "_recordings": "", "settings_noun": "setting"}
+    made = {
+        "_movement_measures": [],
+        "_motion_rows": [["thin", "1", "2"]],
+        "_recordings": "",
+        "settings_noun": "setting",
+    }
     for name, value in made.items():
         monkeypatch.setattr(sections, name, lambda *_, value=value, **__: value)
     page = "".join(sections.motion(results))
