@@ -88,10 +88,11 @@ def type_id(qtbot: Any, designer: Any, path: tuple[str, str], name: str) -> None
 
 
 def test_down_leads_from_an_empty_search_to_the_outline(designer: Any) -> None:
-    designer.open()
+    designer.open("kitchen", "blocks", "liquids")
     outline = designer.place.outline
     outline.words.setFocus()
     assert designer.hit("Down") is outline.tree
+    assert designer.place.form_path == ("blocks", "liquids")
 
 
 def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, designer: Any) -> None:

@@ -31,6 +31,7 @@ def write(path: Path, samples: Any, rate_hz: float = 1000.0) -> Written:
     file = SamplesFile(path, FACTS, rate_hz)
     for first in range(0, len(samples), file.group_rows):
         file.write(samples[first : first + file.group_rows])
+    assert file.taken == len(samples)
     return file.finish(dropped=0)
 
 

@@ -117,12 +117,9 @@ def test_every_moment_is_the_recordings(opened, whole):
     [
         ("target_reached", {"target": 2}, ("target", "target 3 reached")),
         ("stepped", {"steps": -1}, ("answer", "set -1 step")),
-        ("choice", {"item": "thick", "value": 4}, ("answer", "thick: 4")),
         ("choice", {"item": "thick", "value": None}, ("answer", "thick: cannot judge")),
-        ("answer_removed", {"item": "thick"}, ("answer", "thick: answer removed")),
         ("trial_ended", {"outcome": "timeout"}, ("event", "task ended: timeout")),
         ("note", {"text": ""}, ("event", "note: marked")),
-        ("force_stopped", {}, ("event", "force stopped")),
     ],
 )
 def test_each_line_of_the_journal_has_its_mark(event, fields, mark):

@@ -10,39 +10,10 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.columns import TRIALS
 from study_app.store.csv_files import MISSING, Column, csv_bytes, guard_formula, has_same_cells, header, read_table
-from study_app.store.journals.journal_events import Event
 from study_app.store.tables.session_tables import SessionRows
-from tests.journal_lines import event_of
+from tests.store.tables.test_transcripts import Lines
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
-
-
-class Script:
-    """Journal lines in the making."""
-
-    def __init__(self, **session: Any) -> None:
-        self.lines: list[Event] = []
-        told = {"study": "brackish", "participant": "P007", "session": 1, "simulated": False, "pilot": False}
-        self.add("session_started", **told, language="en", device="mouse", **session)
-
-    def add(self, event: str, **fields: Any) -> None:
-        n = len(self.lines) + 1
-        at = f"2026-03-01T10:00:{n:02d}.000+01:00"
-        self.lines.append(event_of(event, n=n, t_s=float(n), at=at, **fields))
-
-    def trial(self, trial: int, attempt: int = 1, phase: str = "main") -> None:
-        told = {"block": "liquids", "phase": phase, "part": 1, "index": trial, "of": 3, "code": f"L{trial}"}
-        self.add("trial_started", trial=trial, attempt=attempt, **told)
-
-    def end(self, trial: int, attempt: int = 1, outcome: str = "complete", **summary: Any) -> None:
-        self.add("trial_ended", trial=trial, attempt=attempt, outcome=outcome, **summary)
-
-    def answer(self, trial: int, *values: int | None, attempt: int = 1) -> None:
-        items = [
-            {"item": f"i{n}", "number": n, "value": v, "onset_s": 1.0, "first_s": 2.0, "last_s": 3.0, "changes": 1}
-            for n, v in enumerate(values, start=1)
-        ]
-        self.add("responses", trial=trial, attempt=attempt, items=items)
 
 
 @pytest.mark.slow
@@ -69,25 +40,25 @@ def test_what_is_not_known_or_not_a_text_has_one_spelling(value: Any, cell: str)
 
 
 def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str, Any]) -> None:
-    script = Script()
-    script.trial(1)
-    script.end(1, **summary)
-    script.add("note", kind="mark", text="-1 and more")
-    rows = SessionRows(script.lines).trials
+    script = Lines()
+    script.started(1)
+    script.ended(1, **summary)
+    script.note("mark", "-1 and more")
+    rows = SessionRows(script._lines).trials
     content = csv_bytes(TRIALS, rows)
     assert b",'-1 and more," in content
     assert read_table(content, TRIALS) == rows
 
 
 def test_the_row_of_an_answer_says_what_was_chosen_and_when() -> None:
-    script, times = Script(), {"onset_s": 1.0, "first_s": 2.0, "last_s": 4.0, "changes": 3}
-    script.trial(1)
-    script.end(1)
+    script, times = Lines(), {"onset_s": 1.0, "first_s": 2.0, "last_s": 4.0, "changes": 3}
+    script.started(1)
+    script.ended(1)
     given: dict[str, Any] = {"scale": 5, "unsure": None, "words": "thick", "several": ["a", "b"], "part": 0.5}
     items = [{"item": item, "number": n, "value": value, **times} for n, (item, value) in enumerate(given.items(), 1)]
-    script.add("responses", trial=1, attempt=1, items=[*items, {"item": "left", "number": 6, "value": None}])
+    script.line("responses", trial=1, attempt=1, items=[*items, {"item": "left", "number": 6, "value": None}])
     columns = ("item", "response", "value", "cannot_judge", "onset_s", "first_choice_s", "last_change_s", "changes")
-    rows = SessionRows(script.lines).responses
+    rows = SessionRows(script._lines).responses
     assert [tuple(row[name] for name in columns) for row in rows] == [
         ("scale", "5", 5, False, 1.0, 2.0, 4.0, 3),
         ("unsure", None, None, True, 1.0, 2.0, 4.0, 3),
@@ -100,11 +71,11 @@ def test_the_row_of_an_answer_says_what_was_chosen_and_when() -> None:
 
 
 def test_a_line_of_a_trial_that_never_started_is_named() -> None:
-    script = Script()
-    script.trial(1)
-    script.end(4)
+    script = Lines()
+    script.started(1)
+    script.ended(4)
     with pytest.raises(StoreError, match=r"^line 3 of the journal refers to trial 4, which never started"):
-        SessionRows(script.lines)
+        SessionRows(script._lines)
 
 
 def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_gives() -> None:
