@@ -199,3 +199,10 @@ def made_samples(count: int, *, first_tick: int = 0, scene: int = 1, seed: int =
 @pytest.fixture
 def samples_of() -> Make:
     return made_samples
+
+
+@pytest.fixture
+def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Return the results folder of the workspace."""
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    return tmp_path / "results"

@@ -41,13 +41,6 @@ def labs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     }
 
 
-@pytest.fixture
-def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the results folder of the workspace."""
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    return tmp_path / "results"
-
-
 def contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 

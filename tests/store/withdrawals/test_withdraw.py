@@ -35,13 +35,6 @@ NOW = datetime(2026, 11, 22, 9, 30, tzinfo=UTC)
 PERSON = "P002"
 
 
-@pytest.fixture
-def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Return the results folder of the workspace."""
-    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
-    return tmp_path / "results"
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a study of three finished sessions, to be copied."""
