@@ -36,6 +36,10 @@ def study_tables(**changes: Any) -> dict[str, Any]:
     return tomllib.loads(text_of("brackish")) | changes
 
 
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+
+
 @pytest.fixture(autouse=True)
 def _no_plug_is_pulled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Waiting for the disk has tests of its own; in all others the system's memory of a file will do."""

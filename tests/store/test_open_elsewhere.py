@@ -12,14 +12,10 @@ from study_app.store import program_log
 from study_app.store.atomic import copy_folder, create_folder, write_file
 from study_app.store.output_files import write_files
 from study_app.store.verification.verify_study import verify_study
-from tests.store.conftest import Start
+from tests.store.conftest import Start, contents
 from tests.windows_rules import LONGEST_PATH, Windows, windows
 
 __all__ = ["windows"]
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_an_output_over_a_file_that_is_open_elsewhere_replaces_no_file(tmp_path: Path, windows: Windows) -> None:

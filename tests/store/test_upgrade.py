@@ -20,6 +20,7 @@ from study_app.store.tables.study_files import check_study
 from study_app.store.unblinding import unblind
 from study_app.store.upgrade import upgrade
 from study_app.store.verification.verify_study import verify_study
+from tests.store.conftest import contents
 
 RELEASES = Path(__file__).parent / "releases"
 LIQUID = "[liquids.honey] # the only one\ndensity_kg_m3 = 1420\nviscosity_pa_s = 10\neffects = 'auto'\n"
@@ -90,10 +91,6 @@ def test_another_file_with_the_name_of_the_copy_is_kept(tmp_path: Path) -> None:
     with pytest.raises(StoreError, match=r"a\.toml\.format-1 is not a copy of a\.toml"):
         upgrade(file)
     assert (file.read_text("utf-8"), other.read_text("utf-8")) == (LIQUID, "mine")
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 @pytest.fixture

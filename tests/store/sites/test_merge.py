@@ -26,6 +26,7 @@ from study_app.store.verification.verify_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
+from tests.store.conftest import contents
 from tests.studies import made_up
 
 pytestmark = pytest.mark.slow
@@ -39,10 +40,6 @@ def labs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         site: rehearse_answers("demo", participants=2, seed=seed, results=root / site / "demo", features=felt)
         for seed, site in enumerate("ABC", start=1)
     }
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def test_an_open_folder_is_refused(labs: dict[str, Path], results: Path, tmp_path: Path) -> None:
