@@ -1,16 +1,16 @@
 """The appendix of questions, and what changed between versions: from the receipts alone."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from markupsafe import escape
 
-from study_app.analysis.report import questions_in_full
-from study_app.analysis.report.write_report import report
+from study_app.analysis.report.write_report import appendix, report
 from study_app.protocol.source.files import shipped_file
 from study_app.store import receipt
-from study_app.store.study_runs import content_changes, recorded_contents
+from study_app.store.study_runs import RecordedContent, content_changes, recorded_contents
 from study_app.store.study_versions import save_study
 from study_app.store.workstation import DEFAULTS, save_settings
 from tests.analysis.conftest import Results
@@ -47,13 +47,12 @@ def test_the_first_session_of_each_version_and_who_saved_it_are_read_from_receip
     assert OLD in sentences[0]
 
 
-def test_versions_are_listed_where_all_texts_are_in_one_language(
-    results: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    texts_of = questions_in_full._texts
-    english = lambda protocol: (text for text in texts_of(protocol) if text.language == "en")  # noqa: E731
-    monkeypatch.setattr(questions_in_full, "_texts", english)
-    page = "".join(questions_in_full.appendix(recorded_contents(results)))
+def test_versions_are_listed_where_all_texts_are_in_one_language(results: Path) -> None:
+    def english(content: RecordedContent) -> RecordedContent:
+        without = lambda texts: {name: text for name, text in texts.items() if name != "nl"}  # noqa: E731
+        return replace(content, protocol=json.loads(json.dumps(content.protocol), object_hook=without))
+
+    page = "".join(appendix([*map(english, recorded_contents(results))]))
     assert (">versions<" in page, ">language<" in page) == (True, False)
 
 

@@ -17,7 +17,6 @@ from study_app.designer.document.steps import (
 )
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.form.drawn_fields import _trial_strip
 from study_app.designer.form.form import form_of
 from study_app.designer.measures.study_facts import facts
 from study_app.designer.outline import addable_elements
@@ -196,9 +195,7 @@ def test_the_trial_strip_has_the_duration_of_each_phase(
     (design,) = study.document["designs"]
     for key, value in {"pause_s": 0.7, "between_s": 0.9, **({"feedback_s": 0.5} if design == "pair" else {})}.items():
         study, _ = study.with_edits(Set(("designs", design, key), value))
-    row = row_at(study.document, ("blocks", block, "design"))
-    assert row is not None
-    strip = _trial_strip(study, row)
-    assert strip is not None
+    rows = form_of(study, ("blocks", block)).rows
+    (strip,) = (row.facts for row in rows if row.path[-1] == "design")
     assert tuple(phase.duration_s for phase in strip.phases) == durations_s
     assert strip.duration_s == pytest.approx(sum(durations_s))
