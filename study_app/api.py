@@ -209,7 +209,7 @@ def simulate_force(
             t_s, position_m = (np.asarray(values, np.float64) for values in motion)
         except (TypeError, ValueError) as error:
             raise StudyError(
-                f"the motion is not possible ({error}): specify times (n,) and positions (n, 3)"
+                f"the motion is invalid ({error}): specify times of shape (n,) and positions of shape (n, 3)"
             ) from error
         return offline.simulate(chosen, motions.Motion(t_s, position_m))
     if str(motion) in motions.NAMES or not (Path(motion).suffix or Path(motion).exists()):
@@ -289,15 +289,17 @@ def fit(
     if not isinstance(trials, pd.DataFrame):
         raise AnalysisError(f"trials are a {type(trials).__name__}: specify a DataFrame")
     if missing := {"level", "success"} - set(trials.columns):
-        raise AnalysisError(f"trials have no column {', '.join(sorted(missing))}: each row needs level and success")
+        raise AnalysisError(
+            f"the column {', '.join(sorted(missing))} is missing from trials: each row needs level and success"
+        )
     kinds = [name for name, kind in KINDS.items() if kind.adaptive]
     if design not in kinds:
-        raise AnalysisError(f"design {design!r} has no threshold that can be fitted: specify one of {', '.join(kinds)}")
+        raise AnalysisError(f"no threshold can be fitted for design {design!r}: specify one of {', '.join(kinds)}")
     given = trials["level"]
     if not (pd.api.types.is_numeric_dtype(given) and given.between(0.0, float("inf"), inclusive="left").all()):
-        raise AnalysisError("column level contains an invalid level: specify finite numbers that are not negative")
+        raise AnalysisError("column level contains an invalid level: specify finite, non-negative numbers")
     if trials.empty or not trials["success"].isin([True, False]).all():
-        raise AnalysisError("column success holds what is neither true nor false, or no trial: specify at least one")
+        raise AnalysisError("column success must contain true or false in every row, and at least one row is needed")
     kind = "difference" if distances else "value"
     try:
         stimulus = Stimulus(vary="level", level=kind, levels=levels, spacing=spacing)
@@ -508,7 +510,7 @@ class ForceLoop:
         from study_app.haptics.model.overrides import override_all
 
         if liquid not in self._scenes:
-            raise StudyError(f"{liquid!r} is not a liquid of the file: it has {', '.join(self._scenes)}")
+            raise StudyError(f"{liquid!r} is not in the file, which contains {', '.join(self._scenes)}")
         scene, servo = override_all(self._scenes[liquid], parameters), self._opened.servo
         if servo.may_adjust(scene):
             servo.adjust(scene)
@@ -530,7 +532,7 @@ class ForceLoop:
 
         hand = hand_of(self._opened.device)
         if hand is None:
-            raise StudyError("a person moves this device: follow is for simulated ones, such as 'scripted'")
+            raise StudyError("follow works only with simulated devices, such as 'scripted'; a person moves this device")
         hand.follow(t_s, position_m)
 
     def read(self) -> np.recarray[Any, Any]:
@@ -595,8 +597,8 @@ def open_force(
 
     if threading.current_thread() is not threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         raise StudyError(
-            "a force loop cannot be opened in a thread, where a request to end the program (SIGTERM) would leave the "
-            "force on: open it in the main thread, or first set a handler of SIGTERM there"
+            "a force loop cannot be opened in a thread, because a termination request (SIGTERM) would leave the "
+            "force on: open it in the main thread, or first install a SIGTERM handler there"
         )
     scenes = load_scenes(scene)
     first = next(iter(scenes.values()))

@@ -86,9 +86,13 @@ def typed_numbers(text: str, unit: str = "") -> list[tuple[str, int | float]]:
     numbers: list[tuple[str, int | float]] = []
     for before, word in zip(["", *words], words, strict=False):
         if _THOUSANDS.fullmatch(both := f"{before} {word}"):
-            raise ValueError(f"“{both}” may be one number or two: write {before}{word} or {before} {int(word)}")
+            raise ValueError(
+                f"“{both}” could be read as one number or two: write {before}{word} or {before} {int(word)}"
+            )
         if word.count(",") > (0 if commas else 1):
-            raise ValueError(f"“{word}” may be one number or several: separate numbers by spaces or semicolons")
+            raise ValueError(
+                f"“{word}” could be read as one number or several: separate numbers with spaces or semicolons"
+            )
         if (value := number_of(word)) is None:
             raise ValueError(unclear_number(word))
         numbers.append((word, value))

@@ -186,7 +186,7 @@ def _warn_if_opened(results: Path) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=click.IntRange(1), help="Include only this trial, if it was excluded individually.")
-@click.option("--rule", metavar="RULE", help="Keep a session that meets this exclusion rule, such as below_chance.")
+@click.option("--rule", metavar="RULE", help="Keep a session that meets this exclusion rule (e.g. below_chance).")
 @BY
 @REASON
 def include(
@@ -216,14 +216,14 @@ def include(
 @PARTICIPANT
 @BY
 @click.option(
-    "--reason", required=True, metavar="TEXT", help="Reason; it is stored, so it must not identify the participant."
+    "--reason", required=True, metavar="TEXT", help="Reason, which is stored and so must not identify the participant."
 )
 @click.option(
     "--also",
     multiple=True,
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     metavar="DIR",
-    help="Folder to search, with its subfolders, for copies of the study; the option can be repeated.",
+    help="Folder to search (including subfolders) for copies of the study; the option can be repeated.",
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase a participant's data; only the date, the operator, the reason and checksums are kept."""
@@ -263,7 +263,13 @@ def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tu
 
 @click.command()
 @click.argument("sites", nargs=-1, required=True, callback=_parse_sites, metavar="NAME=RESULTS...")
-@click.option("--to", required=True, type=Target(), metavar="DIR", help="New folder, or a merged study to add to.")
+@click.option(
+    "--to",
+    required=True,
+    type=Target(),
+    metavar="DIR",
+    help="New folder, or an existing merged study to which the sites are added.",
+)
 def merge(sites: dict[str, Path], to: Path) -> None:
     """Merge the study folders of several sites that ran the same protocol; the folders are copied unchanged.
 
@@ -293,7 +299,9 @@ def rebuild(session: Path) -> None:
     for path in made.swept:
         click.echo(f"removed    {path}, an incomplete file")
     if made.torn_bytes:
-        click.echo(f"the journal ends with an incomplete line of {counted(made.torn_bytes, 'byte')}, which is kept")
+        click.echo(
+            f"the journal ends with an incomplete line of {counted(made.torn_bytes, 'byte')}, which has been kept"
+        )
     if not (made.rewritten or made.swept):
         click.echo("nothing to do: every table agrees with the journal")
 
@@ -370,7 +378,10 @@ def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     "--always",
     type=click.Path(path_type=Path, exists=True, file_okay=False),
     metavar="DIR",
-    help="Write the proof to this folder after every session, time-stamped by --server; both settings are remembered.",
+    help=(
+        "Write the proof to this folder after every session, with a time stamp from --server; both settings are "
+        "remembered."
+    ),
 )
 def proof(
     results: Path, to: Path | None, *, sign: bool, server: str | None, root: Path | None, always: Path | None
@@ -400,7 +411,7 @@ def proof(
 @click.command()
 @takes_session
 def replay(session: Path) -> None:
-    """Recompute every force from the recording, with the same kernel, and list the seconds in which forces differ.
+    """Recompute every force from the recording, with the same kernel, and list every second in which forces differ.
 
     The command also lists the trials whose recordings were lost, are missing or cannot be compared. The exit code is 3
     if a force differs, a recording is missing, or nothing could be compared.

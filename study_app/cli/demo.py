@@ -130,7 +130,7 @@ def _show_results(study: Path) -> int:
         if platform not in _UNSEEN_PLATFORMS:
             from study_app import app
 
-            click.echo("The program is opening with these results; close its window to finish")
+            click.echo("The program is now opening to show these results; close its window to finish")
             return int(app.run_home_window(then=lambda visit: visit.show_study(study)))
         reason = f"QT_QPA_PLATFORM={platform} does not show windows"
     except DisplayError as error:

@@ -82,7 +82,7 @@ def plugins() -> None:
     "faults",
     multiple=True,
     metavar="NAME",
-    help="Fault to simulate with an emulated device, such as nan or drop=0.01.",
+    help="Fault to simulate on an emulated device, such as nan or drop=0.01.",
 )
 @click.option("--to", type=click.Path(path_type=Path), metavar="FILE", help="Write a zip file for support.")
 def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: dict[str, str | Path]) -> None:
@@ -162,8 +162,8 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
 
     Stay within reach of the power switch: the handle moves by itself, with a force of up to 4 N. To stop the force,
     press Enter, Ctrl+C or the handle's stop button, if it has one. You can share the report (bench.md, bench.json); the
-    receipts of later sessions on this machine include the measurements. If somebody touched the handle, the
-    measurements are not stored for receipts, and the exit code is 3.
+    measurements are also copied into the receipt of each later session on this machine. If anyone touched the handle,
+    they are not copied, and the exit code is 3.
     """
     from study_app.devices.registry import check_options, descriptor_of
 
@@ -208,18 +208,20 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
         write_file(folder / name, content.encode())
     click.echo(f"\n{text}\nWritten: {folder / 'bench.md'}, {folder / 'bench.json'}")
     if simulated:
-        click.echo("The device is simulated, so its measurements are not stored for receipts.")
+        click.echo("The device is simulated, so its measurements will not be copied into receipts.")
         return
     if not results.fits:
         click.echo(
-            "Nothing was stored for receipts, because mass, damping and friction do not explain the handle's motion."
+            "The measurements will not be copied into receipts, because mass, damping and friction do not "
+            "explain the handle's motion."
         )
         exit_if(True)
     report = str((folder / "bench.md").resolve())
     bench = workstation.DeviceBench.model_validate({**workstation_results(results, day), "report": report})
     workstation.save_settings(workstation.load_or_default()[0].with_bench(bench))
     click.echo(
-        "The results were saved in this machine's settings. Receipts of later sessions and the Devices page show them."
+        "The results were saved in this machine's settings. They appear on the Devices page and in the "
+        "receipts of later sessions."
     )
 
 

@@ -80,15 +80,15 @@ _REAL = "physical2"
     "every",
     is_flag=True,
     help=(
-        "Instead, print the force error, speed range and computation time per tick of each liquid in FILE (default: "
-        "physical2), with its own model."
+        "Instead, print the force error, speed range and computation time per tick for each liquid in FILE (default: "
+        "physical2), using the liquid's own model."
     ),
 )
 @click.option(
     "--to", type=Target(), metavar="DIR", help="Folder for the table and the figure; default: print the table."
 )
 def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, *, every: bool) -> None:
-    """Compare the accuracy and computation time of a liquid's models.
+    """Compare the accuracy and computation time of the models of a liquid.
 
     FILE is a protocol or scene file; default: rek2024 and physical2. Wakes are compared with exact sums; models of real
     liquids are compared with experiments, exact solutions and a fluid solver.
@@ -312,7 +312,7 @@ def stability(
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable and noisy ones.
 
     Each case combines a liquid, a scale, a rate, a delay, an estimator, a device and a hand. Further groups test a
-    second model of hand and device, a wrong delay estimate, lost samples, releases mid-stroke, and the Falcon's
+    second model of the hand and the device, a wrong delay estimate, lost samples, releases mid-stroke, and the Falcon's
     driver with an emulated Falcon. The exit code is 3 if a case is unstable with the safety layer on, or if more than 1
     in 10,000 cases are noisy.
     """
@@ -418,7 +418,7 @@ _LOAD = click.Choice(("none", "gui", "gui+cpu"))
 @click.option(
     "--devices", "of_devices", is_flag=True, help="Compare each emulated device with the scripted hand instead."
 )
-@click.option("--lsl", is_flag=True, help="Measure the streams of the Lab Streaming Layer instead.")
+@click.option("--lsl", is_flag=True, help="Measure Lab Streaming Layer (LSL) streams instead.")
 @click.option(
     "--triggers",
     metavar="PORT",
@@ -437,8 +437,8 @@ def timing(
 ) -> None:
     """Measure the lateness of the servo, a bare compiled loop, a Python thread and a Qt timer.
 
-    The measurement switches among the four every quarter of a second, in each priority class that the system grants.
-    Ctrl+C ends the command.
+    The measurement switches among the four loops every quarter of a second, in each priority class that the system
+    grants. Ctrl+C ends the command.
 
     With --delays, a session presents the delays of rek2024 on 60 and 144 Hz screens, with and without load, and the
     error of every frame's delay is computed from the session's recordings. No display is needed.
@@ -616,16 +616,16 @@ def _at_intervals(say: Callable[[str], None]) -> Callable[[str], None]:
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for rates.md and rates.csv.")
 def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) -> None:
-    """Measure how often the report's verdicts are wrong in simulated studies with no, some or all effects.
+    """Measure how often the report's verdicts are wrong in simulated studies in which none, some or all effects exist.
 
     The report's own tests are applied to simulated rek2024 studies with 5, 12 and 24 participants. The answers come
     from the answer model used in rehearsals or from an ordinal probit model with random effects. The command prints
     each rate with its Wilson interval and says whether the rate meets its limit. A limit of 5 % is met if the interval
-    ends below 7.5 %, and exceeded if an interval corrected for the number of rates lies above 5 %. The tests for
-    hypotheses, recognition, equivalence with a minority and skewed trends use values drawn directly from distributions.
-    If a rate is still undecided, more studies are simulated for it, up to four times the initial number. Ctrl+C
-    ends the command and prints the results so far. The exit code is 3 if a rate exceeds its limit; otherwise it is 4 if
-    there are too few studies to decide on every rate.
+    ends below 7.5 %, and exceeded if an interval corrected for the number of rates lies above 5 %. For the tests of
+    hypotheses and recognition, of equivalence when a minority of participants respond differently, and of trends with
+    skewed answers, values are drawn directly from distributions. If a rate is still undecided, more studies are
+    simulated for it, up to four times the initial number. Ctrl+C ends the command and prints the results so far. The
+    exit code is 3 if a rate exceeds its limit; otherwise it is 4 if there are too few studies to decide on every rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.evidence.report_rates.simulation import Rate, evidence, validate
@@ -671,7 +671,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
-    """Recover simulated observers' known thresholds, first with methods and analysis only, then with the whole program.
+    """Recover simulated observers' known thresholds, first with the methods and analysis, then with the whole program.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
     analyses many studies with 20 observers whose thresholds differ by a factor of 1.2. For magnitude estimation, the

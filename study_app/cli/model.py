@@ -73,7 +73,7 @@ def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
     default=ASSUMED_TICKS,
     show_default=True,
     metavar="TICKS",
-    help="The device's delay, used for the expected error.",
+    help="The device's delay, used to compute the expected error.",
 )
 def scene(scene: str, liquid: str | None, delay: int) -> None:
     """Print which effects a scene needs and why, the measured cost of each, and the expected force error."""

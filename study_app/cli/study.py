@@ -259,7 +259,7 @@ def rehearse(
 @click.command(cls=TakesDeviceOptions)
 @takes_session
 @click.option(
-    "--protocol", metavar="FILE", help="The session's protocol; by default it is looked up among the known protocols."
+    "--protocol", metavar="FILE", help="The session's protocol; by default, the program searches the known protocols."
 )
 @click.option("--device", cls=DeviceName, help="Device; default: the one used in the interrupted session.")
 @_OPERATOR

@@ -117,7 +117,7 @@ _COPY: Final = "copy"
 TEMPLATES: Final[Mapping[str, tuple[str, str]]] = {
     "compare-liquids": (
         "Compare liquids",
-        "Can participants tell liquids apart, and what do they call them? They rate statements after each liquid.",
+        "Can participants tell liquids apart and identify them? They rate statements after each liquid.",
     ),
     "two-liquids-abx": (
         "Two liquids, ABX",

@@ -86,8 +86,8 @@ def error_report(scene: Scene, delay_ticks: int = ASSUMED_TICKS) -> str:
     error_share, error_n, causes, against = _errors(resolve(scene), delay_ticks)
     split = (f"{name} {f'{100 * it:.2g} %' if it > ROUNDING else 'none'}" for name, it in causes._asdict().items())
     return (
-        f"expected error in its fastest strokes, delay {delay_ticks}: {error_n:.2g} N, {100 * error_share:.2g} % of "
-        f"the force; by {', '.join(split)}; against {against}"
+        f"expected error in the fastest strokes with a delay of {delay_ticks} ticks: {error_n:.2g} N, "
+        f"{100 * error_share:.2g} % of the force; causes: {', '.join(split)}; reference: {against}"
     )
 
 
@@ -163,7 +163,7 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, C
         against = f"the {liquid.non_newtonian.kind} law (no reference in unsteady flow), added mass and buoyancy"
     elif liquid.viscosity_pa_s is not None and liquid.drag.law != "linear" and not {"wake", "local_wake"} & set(kept):
         true_n = physical_n(alone, speed_mps, rate_per_s, motion.t_s)
-        against = "drag by experiments, added mass, buoyancy and the history of creeping flow (an upper bound)"
+        against = "experimental drag, added mass, buoyancy and the history force of creeping flow (an upper bound)"
     else:
         kept = tuple(it for it in kept if it in {"drag", "wake", "local_wake"})
         alone = with_effects(alone, *kept)

@@ -76,7 +76,7 @@ def resistance_nspm(scene: Scene, speed_mps: float) -> float:
 def _filtered(scene: Scene, motion: Motion, interval_s: Floats) -> Floats:
     """Return the exponentially weighted velocity (n, 3), zero at the first row."""
     if not isinstance(scene.velocity, Ewma):
-        raise TypeError(f"the definition filters with ewma alone, not {scene.velocity.kind}")
+        raise TypeError(f"the reference definition supports only ewma, not {scene.velocity.kind}")
     velocity_mps = np.zeros_like(motion.position_m)
     for k in range(1, len(interval_s)):
         weight = 1 - (1 - scene.velocity.alpha) ** (interval_s[k] / 1e-3)

@@ -187,7 +187,7 @@ def steady_truth(scene: Scene) -> Truth | None:
     between = f"Re {known[0] * per_mps:.2g} to {known[-1] * per_mps:.2g}"
     slow = [(reynolds, drag) for reynolds, drag in DRAG_POINTS if reynolds < _OSEEN_REYNOLDS]
     above = max(drag * reynolds / 24 / (1 + 3 / 16 * reynolds) - 1 for reynolds, drag in slow)  # C_d of Oseen 1910
-    scatter = f", which lie up to {100 * above:.0f} % above Oseen's law of slow flow"
+    scatter = f", which lie up to {100 * above:.0f} % above Oseen's law for slow flow"
     low = scatter if known[0] * per_mps < _OSEEN_REYNOLDS else ""
     return Truth(name="steady drag", source=f"experiments with spheres, {between}{low}", cases=tuple(cases))
 
@@ -227,7 +227,7 @@ def starting_truth(scene: Scene) -> Truth:
     history = radius_m / math.sqrt(math.pi * mu / liquid.density_kg_m3) * spread
     force_n = -6 * math.pi * mu * radius_m * speed_mps * (1 + history)
     motion = along_x(t_s, speed_mps * np.maximum(t_s - tick_s / 2, 0.0), velocity_mps)
-    source = "exact for creeping flow (Basset 1888), from 10 ms after the start on"
+    source = "exact for creeping flow (Basset 1888), more than 10 ms after the start"
     return Truth(name="start", source=source, cases=(Case(motion, vectors_x(force_n), t_s >= _UNCOUNTED_S),))
 
 

@@ -78,8 +78,8 @@ def figure_3() -> ThesisFigure:
     return ThesisFigure(
         3,
         "Three circles, drag alone",
-        "The body performs three circles at constant speed and stops. With drag alone the force keeps its size, always "
-        "opposes the motion, and is zero on the tick after the stop.",
+        "The body makes three circles at constant speed and then stops. With drag alone, the force has a constant "
+        "magnitude, always opposes the motion, and is zero on the tick after the stop.",
         (_Run("drag", _scene(Liquid(id="liquid", density_kg_m3=1000)), motion),),
         ((_stop_s(motion), "stop"),),
     )
@@ -91,9 +91,10 @@ def figure_4() -> ThesisFigure:
     return ThesisFigure(
         4,
         "Three circles, drag and wake",
-        "The same motion with the wake. The liquid takes up the motion: the speed relative to it falls linearly while "
-        "the tail fills, and the force as its square. After the stop the liquid pushes on along the former motion, a "
-        "little weaker than the drag at first, and falls to zero as the tail empties.",
+        "The same motion with the wake. The liquid is gradually set in motion: while the tail fills, the relative "
+        "speed falls linearly and the force falls as its square. After the stop, the liquid continues to push in the "
+        "direction of the previous motion, at first slightly less strongly than the drag; the force falls to zero as "
+        "the tail empties.",
         (_Run("drag and wake", tank(), motion),),
         ((_stop_s(motion), "stop"),),
     )
@@ -106,8 +107,8 @@ def figure_5() -> ThesisFigure:
     return ThesisFigure(
         5,
         "Three circles, then 2 s against the flow",
-        "After the circles the body turns back against the whirlpool it has made: the force jumps far above the plain "
-        "drag, then falls as the tail takes up the new direction, and falls again after the stop.",
+        "After the circles, the body reverses against the whirlpool that it has created: the force jumps far above "
+        "the drag alone, falls as the tail takes on the new direction, and falls again after the stop.",
         (_Run("drag and wake", tank(), motion),),
         ((turn_s, "turn back"), (_stop_s(motion), "stop")),
     )
@@ -119,10 +120,10 @@ def _figure_6() -> ThesisFigure:
     return ThesisFigure(
         6,
         "Steps alternating by 90°",
-        "The body moves toward −z in steps that alternate along x. With a breaking angle of 45° every step begins a "
-        "new segment, the directions partly cancel, and the wake stays limited. With 100° the whole path is "
-        "one segment that always follows the newest direction, one tick late at each turn, and the force falls toward "
-        "zero.",
+        "The body moves toward −z in steps that alternate along x. With a breaking angle of 45°, every step begins a "
+        "new segment, the directions partly cancel out, and the wake remains limited. With 100°, the whole path is "
+        "one segment that always follows the newest direction, one tick late at each turn, and the force falls "
+        "toward zero.",
         tuple(_Run(f"breaking angle {angle}°", tank(breaking_angle_deg=angle), motion) for angle in (45, 100)),
     )
 
@@ -134,8 +135,8 @@ def _figure_7() -> ThesisFigure:
     return ThesisFigure(
         7,
         "A straight line at three resolutions of the tail",
-        "The body moves straight at constant speed. A coarser resolution stores fewer elements (here every second, "
-        "every fourth tick), so the tail fills more slowly and the force falls later.",
+        "The body moves in a straight line at constant speed. A coarser resolution stores fewer elements (here every "
+        "second or every fourth tick), so the tail fills more slowly and the force falls later.",
         tuple(_Run(label, tank(resolution_m=step), motion) for label, step in zip(labels, _RESOLUTIONS_M, strict=True)),
     )
 
@@ -145,10 +146,11 @@ def figure_8() -> ThesisFigure:
     motion = paths.line(_RATE_HZ, moving_s=8.0)
     return ThesisFigure(
         8,
-        "A straight line with five responses of the wake",
-        "The body moves straight at constant speed. The wake builds up as the share of the tail that is filled, "
-        "to the power y: y below 1 gives way at once, y = 4 keeps the full drag for long and gives way near the end. "
-        "The decay of the elements leaves all of them a little below the speed of the body.",
+        "A straight line with five wake responses",
+        "The body moves in a straight line at constant speed. The wake is proportional to the filled fraction of the "
+        "tail raised to the power y: with y below 1, the force falls at once; with y = 4, it stays near the full "
+        "drag for a long time and falls only near the end. Because its elements decay, every wake remains slightly "
+        "slower than the body.",
         tuple(_Run(f"y = {exponent:g}", tank(exponent=exponent), motion) for exponent in EXPONENTS),
     )
 
@@ -246,7 +248,7 @@ def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None
         table = run.table
         force.plot(table.t_s, table.fx_n, color=colour, label=run.label)
         liquid.plot(table.t_s, table.wake_x_mps / table.vx_mps, color=colour, label=run.label)
-    headings = ("Force along x [N]; along y and z it is zero", "Speed of the liquid over that of the body")
+    headings = ("Force along x [N]; along y and z it is zero", "Speed of the liquid relative to the body's speed")
     for axes, heading in zip((force, liquid), headings, strict=True):
         _time_axis(axes, float(shown.runs[0].table.t_s[-1]))
         axes.set_title(heading, pad=_HEADING_PT)

@@ -258,7 +258,10 @@ def _order_text(block: Block) -> str:
         return "a different order for each participant"
     match block.order:
         case "fixed":
-            return "in the order of the file, so anyone who reads the protocol can identify the codes"
+            return (
+                "in the order in which they appear in the file, so anyone who reads the protocol can work out "
+                "what the codes stand for"
+            )
         case "shuffled":
             return "a different order for each participant"
         case "constrained":

@@ -100,7 +100,7 @@ def _differences(place: _Place, old: Any, new: Any) -> Iterator[Difference]:
     elif old is None and new is not None:
         yield Difference(place, f"new: {shown_value(new)}")
     elif new is None and old is not None:
-        yield Difference(place, f"removed; it was {shown_value(old)}")
+        yield Difference(place, f"removed; previously {shown_value(old)}")
     elif old != new:
         before, after = shown_value(old), shown_value(new)
         yield Difference(

@@ -28,7 +28,7 @@ class Group(Table):
     share: Annotated[int, within(1, _MOST_SHARE, "shares are small whole numbers")] = Field(
         default=1,
         description=(
-            "Number of participants of this group in each randomisation block; for a pre-existing group, its share "
+            "Number of participants from this group in each randomisation block; for a pre-existing group, its share "
             "in the planned ratio."
         ),
     )

@@ -185,7 +185,9 @@ def _alternatives(node: _Node, headings: Mapping[str, str]) -> Iterator[str]:
         below = [*node.get("patternProperties", {}).values(), node.get("additionalProperties")]
         inside = [_values_text(node, headings) for node in below if isinstance(node, Mapping)]
         yield (
-            f"tables by name, each {inside[0]}" if "patternProperties" in node else f"by language or name: {inside[0]}"
+            f"tables by name, each {inside[0]}"
+            if "patternProperties" in node
+            else f"table keyed by language or by name: {inside[0]}"
         )
     elif node.get("type") != "null":
         yield ", ".join((_TYPES.get(node.get("type", ""), "any"), *_bound_texts(node)))

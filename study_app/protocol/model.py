@@ -84,9 +84,7 @@ class Credits(Table):
     )
     citation: Printable | None = Field(default=None, description="How to cite the data or the paper.")
     funder: Printable | None = Field(default=None, description="Funder of the study.")
-    url: Printable | None = Field(
-        default=None, description="Web address of the study, for example of its preregistration."
-    )
+    url: Printable | None = Field(default=None, description="Web address of the study, such as its preregistration.")
 
 
 class StudyHead(Table):
@@ -122,8 +120,8 @@ class StudyHead(Table):
     codes: Literal["study", "participant"] = later(
         default="study",
         description=(
-            "How codes are assigned to conditions. study: a code means the same for all participants; participant: "
-            "each participant has different codes until unblinding."
+            "How codes are assigned to conditions. study: a code stands for the same condition for all participants; "
+            "participant: each participant has different codes until unblinding."
         ),
     )
     block_order: OrderOfBlocks = later(
@@ -214,7 +212,7 @@ class PageText(Table):
         )
     )
     title: Localised = Field(description="Page heading.")
-    body: PageBody = Field(description="The text; a blank line begins a paragraph.")
+    body: PageBody = Field(description="The text; a blank line starts a new paragraph.")
     button: Localised | None = Field(default=None, description="Text on the button; default: Continue.")
     min_s: Seconds | None = Field(
         default=None,
@@ -325,7 +323,7 @@ class Limits(Table):
     )
 
 
-_Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller")]
+_Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller than this")]
 
 
 class Published(Table):
@@ -389,8 +387,8 @@ class Contrast(Table):
     )
     groups: tuple[Id, Id] | None = Field(
         default=None,
-        description="The two groups to compare; if two blocks or conditions are specified, the groups are compared "
-        "on the difference between them.",
+        description="The two groups to compare; if two blocks or conditions are specified, the difference between "
+        "these is compared between the groups.",
     )
     expected: Literal["higher", "lower"] | None = Field(
         default=None,
@@ -543,8 +541,8 @@ class Analysis(Table):
     )
     names: tuple[Id, ...] = Field(
         default=(),
-        description="Items that each name a liquid. If a participant rates one item higher than all the others, it is "
-        "the participant's choice.",
+        description="Items that each name a liquid. The item that a participant rates higher than all the others is "
+        "taken as the participant's choice.",
     )
     rising: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to increase with delay.")
     falling: tuple[Id, ...] = Field(default=(), description="Items whose answers are expected to decrease with delay.")

@@ -17,7 +17,7 @@ from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.table import Id, Localised, Table, invalid
 from study_app.protocol.wording.languages import language_name, missing_text
 
-_Weight = Annotated[float, within(-1e6, 1e6, "questionnaires use smaller weights")]
+_Weight = Annotated[float, within(-1e6, 1e6, "weights in questionnaires are smaller than this")]
 
 
 class Score(Table):

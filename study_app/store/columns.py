@@ -106,7 +106,9 @@ EXCLUSIONS: tuple[Column, ...] = (
     _PARTICIPANT,
     SESSION,
     replace(_TRIAL, description="Number of the trial; n/a if the whole session is excluded.", may_miss=True),
-    Column("rule_or_person", "text", "The rule that excludes it, or the initials of the person who decided."),
+    Column(
+        "rule_or_person", "text", "The rule that led to the exclusion, or the initials of the person who decided on it."
+    ),
     Column("reason", "text", "Reason for the exclusion."),
     Column("excluded_at", "time", "Time of the decision."),
     optional("key_open", "flag", "Whether the study's key was open when the decision was made."),
@@ -268,9 +270,9 @@ _OUTCOME = [column.name for column in _TRIALS].index("outcome")
 DELIVERED: tuple[Column, ...] = (
     _signed(
         "value_delivered",
-        "Delivered value of the varied quantity, in its unit. Damping is fitted at the hand, a force delay is the lag "
-        "behind the model's force, and any other quantity is as requested; n/a for a visual delay, whose error is in "
-        "delay_error_mean_ms.",
+        "Delivered value of the varied quantity, in its unit. For damping, the value fitted at the hand; for a force "
+        "delay, the lag behind the model's force; for any other quantity, the requested value; n/a for a visual "
+        "delay, whose error is in delay_error_mean_ms.",
     ),
     _signed(
         "force_share",
@@ -301,8 +303,8 @@ VIDEO: tuple[Column, ...] = (
     ),
     _signed(
         "video_age_mean_ms",
-        "Mean age of the camera's frames when they were ready, according to the source's time stamps; this age adds to "
-        "the delay; n/a if the source does not state it, 0 for a file.",
+        "Mean age of the camera's frames when they were ready, according to the source's time stamps; this age is "
+        "added to the delay; n/a if the source does not report it, 0 for a file.",
         "ms",
         of_trial="mean",
     ),

@@ -16,7 +16,7 @@ from study_app.store.folders import StudyFolder
 from study_app.store.merged import folders_of
 from study_app.store.study_versions import content_hash, keep_content, kept_content
 
-_HIDDEN_CHANGE: Final = "only comments have changed, or liquids and conditions, which are not included in the receipts"
+_HIDDEN_CHANGE: Final = "only comments, liquids or conditions have changed; the receipts do not contain these"
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 

@@ -145,8 +145,8 @@ def withdraw(
         with lock_folder(copy.path):
             if others := _other_sessions(copy, tombstone):
                 left += [
-                    f"{other} is not a copy of an erased session: {copy.path} was not changed; if it belongs to "
-                    "the same participant, also withdraw from that folder"
+                    f"{other} is not a copy of an erased session: {copy.path} was not changed; if it belongs to the "
+                    "same participant, also withdraw the participant from that folder"
                     for other in others
                 ]
             elif _erase(copy, replace(tombstone, at=at)):

@@ -145,9 +145,9 @@ class ClusterExecutor(Executor):
         if isinstance(error, CancelledError):
             why = f"the cluster at {self.address} is no longer available: restart it, then repeat the command"
         elif type(error).__name__ == "KilledWorker":
-            why = f"several workers of {self.address} failed on the same case: allocate more memory to each worker"
+            why = f"several workers at {self.address} failed on the same case: allocate more memory to each worker"
         elif isinstance(error, ModuleNotFoundError) and (error.name or "").startswith("study_app"):
-            why = f"liquid-study is not installed on a worker of {self.address}: install this version there"
+            why = f"liquid-study is not installed on the worker at {self.address}: install this version there"
         else:
             return
         raise WorkerError(why) from error

@@ -116,7 +116,7 @@ def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypat
     monkeypatch.setattr(held, "VIRTUAL_HZ", (60.0,))
     lines = []
     found = held.measure_delays(0.5, "gui", progress=lines.append)
-    assert lines == ["virtual, 60 Hz, tank alone", "virtual, 60 Hz, with the cockpit"]
+    assert lines == ["virtual, 60 Hz, tank alone", "virtual, 60 Hz, with the operator's window"]
     assert found.loads == ("none", "gui")
     for load in found.loads:
         trials = found.on("virtual, 60 Hz", load)

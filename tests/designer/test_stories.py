@@ -487,7 +487,7 @@ def adaptive(story: Story) -> None:
     story.act("begin", lambda: story.designer.controller.begin_study("template:viscosity-jnd", "thicker"))
     levels = story.designer.value("methods", "easy", "levels")
     story.play("@methods.easy :methods.easy.levels ctrl+a '0.5 x' Return")
-    assert "“x” is not a number. The study keeps 0.5; press Esc to restore it." in " ".join(
+    assert "“x” is not a number. The study still contains 0.5; press Esc to restore it." in " ".join(
         told(story.designer.place.form)
     )
     story.play("Escape")

@@ -246,7 +246,7 @@ def test_handle_that_is_held_is_reported_and_not_kept(tmp_path, monkeypatch):
     done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))
     assert done.exit_code == 3, done.output
     assert "somebody may have touched the handle" in (tmp_path / "report" / "bench.md").read_text("utf-8")
-    assert "Nothing was stored for receipts" in done.output
+    assert "The measurements will not be copied into receipts" in done.output
     assert workstation.load_settings().benches == ()
 
 
@@ -278,7 +278,7 @@ def test_command_writes_its_report_and_keeps_what_it_found_of_a_real_device_alon
     done = liquid_study("devices", "bench", "scripted", "--to", str(tmp_path / "report"))
     assert done.exit_code == 0, done.output
     assert {path.name for path in (tmp_path / "report").iterdir()} == {"bench.md", "bench.json"}
-    assert "its measurements are not stored" in done.output
+    assert "its measurements will not be copied" in done.output
     assert workstation.load_settings().benches == ()
     real = replace(descriptor_of("scripted"), kind="felt")
     monkeypatch.setattr("study_app.devices.registry.descriptor_of", lambda _name: real)

@@ -48,6 +48,6 @@ def test_a_loop_that_no_signal_would_end_is_refused() -> None:
     finally:
         signal.signal(signal.SIGTERM, before)
     assert refusals == [
-        "a force loop cannot be opened in a thread, where a request to end the program (SIGTERM) would leave the force "
-        "on: open it in the main thread, or first set a handler of SIGTERM there"
+        "a force loop cannot be opened in a thread, because a termination request (SIGTERM) would leave the force on: "
+        "open it in the main thread, or first install a SIGTERM handler there"
     ]

@@ -62,7 +62,7 @@ def test_a_receipt_that_does_not_say_what_a_block_compares_differs_in_nothing():
             'sequence.2: previously "warm_up", now "hello"',
         ]),
         ([('id = "cold"', 'id = "tepid"')], [
-            "questionnaires.short.items.cold: removed; it was a table",
+            "questionnaires.short.items.cold: removed; previously a table",
             "questionnaires.short.items.tepid: new: a table",
         ]),
         ([('en = "It is cold."', 'en = "It is icy."')], [

@@ -50,7 +50,7 @@ def fail_by_a_force_that_is_no_number(bench: Bench) -> None:
 @pytest.mark.parametrize(
     ("fail", "said"),
     [
-        (fail_by_silence, "nothing usable for 50 ms"),
+        (fail_by_silence, "no usable data for 50 ms"),
         (fail_by_loss, "stopped responding"),
         (fail_by_a_force_that_is_no_number, "non-finite force"),
     ],

@@ -491,7 +491,7 @@ _LABELS: Final = {
     "weber": "Weber fraction",
     "whole": "Whole numbers only",
     "williams": "Williams design",
-    "withheld_percent": "Force held back",
+    "withheld_percent": "Withheld force",
     "wrong_most": "Maximum incorrect catch trials",
 }
 """Labels of keys and values whose names are unclear, without their unit; sources in `docs/glossary.md`."""

@@ -285,8 +285,8 @@ class AddLiquid(Request):
         if value_at(study.document, _SCALE) is None:
             return f"{origin}. The scene's scale changes to {theirs:g} for all liquids, as in that study."
         return (
-            f"{origin}. Its forces differ, because the scene's scale is {theirs:g} in that study and {own:g} in "
-            "this one."
+            f"{origin}. The forces differ, because the scene's scale is {theirs:g} in that study and {own:g} in this "
+            "one."
         )
 
     def _scales(self, study: Study) -> tuple[float, float]:

@@ -618,7 +618,7 @@ def kept_value_sentence(value: Any) -> str:
     """Return the sentence about the value that the study keeps while the typed one is rejected."""
     if value is None:
         return "This text is not in the study; press Esc to clear the field."
-    return f"The study keeps {typed_value(value)}; press Esc to restore it."
+    return f"The study still contains {typed_value(value)}; press Esc to restore it."
 
 
 def typed_value(value: Any) -> str:

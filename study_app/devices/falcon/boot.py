@@ -95,7 +95,7 @@ def _refuse_wrong_header(data: bytes) -> None:
     if key != BOOT_KEY:
         raise _refusal(f"it begins with the key 0x{key:04X}, not 0x{BOOT_KEY:04X}")
     if any(reserved):
-        raise _refusal("its header contains other values in fields that must be zero")
+        raise _refusal("its header has non-zero values in fields that must be zero")
 
 
 def _blocks(data: bytes) -> tuple[Block, ...]:

@@ -93,7 +93,8 @@ def fit(
         )
     if np.ptp(pulled_n, axis=0).max() < 0.5:
         raise DeviceError(
-            "a calibration needs two weights at least 0.5 N apart (one may be zero): also measure another weight"
+            "a calibration needs two weights at least 0.5 N apart (one may be zero): measure with another "
+            "weight as well"
         )
     offset_rad = 0.0
     for _ in range(_STEPS):
@@ -325,7 +326,7 @@ class Grip:
             if still >= _STILL_TICKS:
                 return
         raise DeviceError(
-            "the grip does not come to rest: make sure that nothing is touching it, hang the weight on a short "
+            "the grip has not come to rest: make sure that nothing is touching it, hang the weight on a short "
             "string, and start again"
         )
 

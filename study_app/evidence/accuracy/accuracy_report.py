@@ -374,12 +374,12 @@ def evidence(accuracy: Accuracy) -> Evidence:
 
 _WHAT: Final = (
     "Times are the processor time of one thread: the median and the 99th percentile of batches of 1,000 ticks. Each "
-    "is the median over the repeats of one interleaved run. RMS errors are given as a percentage of the RMS reference "
-    "force, and maximum errors as a percentage of the maximum reference force. Direction is the RMS angular error "
-    "while the reference force is perceptible. Rows with fewer ticks per second show only the force error, not the "
-    "effect on stability. For each motion from the fluid solver, the unsteady-drag constants were fitted to the other "
-    "motions. ●: no other model is both faster and more accurate, based on each model's largest error; ◎: the model "
-    "that the program uses."
+    "value is the median of the repeats in one interleaved run. RMS errors are given as a percentage of the RMS "
+    "reference force, and maximum errors as a percentage of the maximum reference force. Direction is the RMS "
+    "angular error while the reference force is perceptible. Rows with fewer ticks per second show only the force "
+    "error, not the effect on stability. For each motion from the fluid solver, the unsteady-drag constants were "
+    "fitted to the other motions. ●: no other model is both faster and more accurate, based on each model's largest "
+    "error; ◎: the model that the program uses."
 )
 _HEADINGS: Final = (
     "", "model", "ns per tick", "p99", "RMS error [N]", "max [N]", "RMS [%]", "max [%]", "direction [°]",

@@ -143,7 +143,10 @@ def accuracy(
         motion = with_velocity(motion)
     fewest = len(motion.t_s) // max(models.SLOWER)
     if fewest < Candidate.BATCH:
-        said.append(f"the motion is short: batches have {fewest} ticks, not 1,000, so calls add some µs to their times")
+        said.append(
+            f"the motion is short: each batch has {fewest} ticks instead of 1,000, so call overhead adds some µs to "
+            "the times"
+        )
     measured: list[Row] = []
     found: list[Truth] = []
     if numerical is not None:
@@ -152,7 +155,8 @@ def accuracy(
         truth = truths.definition_truth(with_given_velocity(scene), motion)
         if not truth.cases[0].force_n.any():
             raise StudyError(
-                f"{scene.liquids[0].id} does not exert a force along {named}, so its error cannot be given in percent"
+                f"{scene.liquids[0].id} does not exert a force along {named}, so its error cannot be "
+                "expressed as a percentage"
             )
         measured += _rows("numerical", scene, candidates, choice, (truth,), progress)
         found.append(truth)
@@ -192,9 +196,9 @@ def _in_plain_c(scene: Scene, batches: int) -> str:
     except StudyError as error:
         return f"The time of a tick relative to plain C was not measured: {error}."
     return (
-        f"A whole tick of the servo in {liquid}, with estimator and safety layer, takes {found.tick_ns:.0f} ns, "
-        f"{found.ratio:.1f} times as long as velocity and force in plain C ({found.plain_ns:.0f} ns; the forces differ "
-        f"by at most {found.difference:.0e} of the greatest)."
+        f"A complete servo tick in {liquid}, with the estimator and the safety layer, takes {found.tick_ns:.0f} ns, "
+        f"{found.ratio:.1f} times as long as computing velocity and force in plain C ({found.plain_ns:.0f} ns; the "
+        f"forces differ by at most {found.difference:.0e} of the largest force)."
     )
 
 

@@ -148,11 +148,13 @@ def _parameters(scene: Scene) -> _Parameters:
     scene = resolve(scene)
     liquid, wake, estimator = scene.liquids[0], scene.liquids[0].wake, scene.velocity
     if not isinstance(estimator, Ewma) or scene.knee.law != "sqrt" or not isinstance(liquid.region, Everywhere):
-        raise StudyError('the C program has only velocity "ewma", knee "sqrt" and one liquid that is everywhere')
+        raise StudyError(
+            'the C program supports only velocity "ewma", knee "sqrt" and a single liquid that fills the scene'
+        )
     if scene.rate_hz != _RATE_HZ:
         raise StudyError(f"the C program runs at {_RATE_HZ:g} Hz only, not at {scene.rate_hz:g} Hz")
     if liquid.effects not in (("drag",), ("drag", "wake")) or liquid.drag.law != "constant":
-        raise StudyError("the C program has only drag with a constant coefficient, with or without a wake")
+        raise StudyError("the C program supports only drag with a constant coefficient, with or without a wake")
     parameters = _Parameters(
         scale=scene.scale,
         origin_m=tuple(scene.origin_m),
@@ -163,7 +165,7 @@ def _parameters(scene: Scene) -> _Parameters:
     )
     if "wake" in liquid.effects and wake is not None:
         if wake.resolution_m > 0:
-            raise StudyError("the C program stores an element of the wake in every tick (resolution 0)")
+            raise StudyError("the C program stores a wake element on every tick (resolution 0)")
         parameters.length = wake.length
         parameters.scaling = wake.scaling
         parameters.exponent = wake.exponent

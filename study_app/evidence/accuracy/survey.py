@@ -155,18 +155,18 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
 
 
 _HEADINGS: Final = (
-    "liquid", "greatest Re (speed)", "model", "creeping flow", "steady drag", "fluid solver", "solved up to",
+    "liquid", "highest Re (speed)", "model", "creeping flow", "steady drag", "fluid solver", "solved up to",
     "drag laws differ by", "strokes, known velocity", "strokes, estimated velocity", "ns per tick",
 )  # fmt: skip
 _WHAT: Final = (
-    "Errors are RMS errors divided by the RMS force, at known velocities, for the worst of several references: "
-    "creeping flow at Re 0.01, experiments on steady drag, and a fluid solver at 1 kHz. Unsteady drag predicts each "
-    "motion with constants fitted to the other motions. Motions have been solved up to Re {:.3g}, or up to the scene's "
-    f"highest speed. Above Re {_NO_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, and the "
-    "uncertainty of steady drag is the difference between the published laws. "
-    "Strokes are compared with the laws at the scene's highest speed and acceleration, with known velocities and with "
-    "those that the scene's estimator derives from encoder counts, after limits. The second table lists the drag "
-    "coefficients of each law."
+    "Errors are RMS errors divided by the RMS force, with known velocities, for the reference with the largest "
+    "error: creeping flow at Re 0.01, experiments on steady drag, and a fluid solver at 1 kHz. Unsteady drag "
+    "predicts each motion with constants fitted to the other motions. Motions have been solved up to Re {:.3g}, or "
+    f"up to the scene's highest speed. Above Re {_NO_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, "
+    "and the uncertainty of steady drag is the difference between the published laws. Strokes are compared with the "
+    "laws at the scene's highest speed and acceleration, with known velocities, and with velocities that the scene's "
+    "estimator derives from encoder counts, after the force limits. The second table lists the drag coefficients of "
+    "each law."
 )
 
 

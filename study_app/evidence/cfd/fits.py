@@ -50,7 +50,7 @@ class Model:
 MODELS: Final = (
     Model("drag, constant C_d", ("drag",), "constant", ("drag_coefficient",)),
     Model("constant C_d, wake", ("drag", "wake"), "constant", ("drag_coefficient", "length", "scaling", "exponent")),
-    Model("drag of the Reynolds number", ("drag",)),
+    Model("Reynolds-dependent drag", ("drag",)),
     Model("... and wake", ("drag", "wake"), free=("length", "scaling", "exponent")),
     Model("... and local wake", ("drag", "local_wake"), free=("length", "scaling", "exponent", "spreading_m2ps")),
     Model("... and added mass", ("drag", "added_mass")),
@@ -251,7 +251,7 @@ def score_all(progress: Callable[[str], object] = lambda _line: None) -> Evidenc
             scores[title].append(min(of_engine, key=lambda it: it.tick_ns))
     rows, first = [], next(iter(scores.values()))
     for title, engine in engines.items():
-        progress(f"{title}: handles let go ...")
+        progress(f"{title}: released handles ...")
         rows.append(score.row(title, scores[title], score.all_releases(engine, over), first))
     table = Table(score.HEADINGS, rows, left=1)
     text = table.markdown() + "\n"
@@ -345,7 +345,7 @@ def _fits_markdown(fits: Sequence[Fitted]) -> str:
     for case in dict.fromkeys(it.case for it in fits):
         parts.append(f"{case.liquid_id}, {case.speed_mps:g} m/s (Re {case.reynolds:.3g})")
         parts.append(Table(_HEADINGS, [_row(it) for it in fits if it.case == case], left=2).markdown())
-    return "\n\n".join([*parts, "\\* at the edge of what a scene permits: the best value may lie beyond."])
+    return "\n\n".join([*parts, "\\* at the edge of the permitted range: the best value may lie outside it."])
 
 
 def fits_csv(fits: Sequence[Fitted]) -> str:

@@ -95,7 +95,7 @@ class Flow:
                 if step.Norm() < _SETTLED * flow.vec.Norm():
                     break
             else:
-                raise StudyError(f"no steady flow was found at Re = {value:g}: take smaller steps up to it")
+                raise StudyError(f"no steady flow was found at Re = {value:g}: approach it in smaller steps")
             form.Apply(flow.vec, residual)
             forces.append(-2 * math.pi * ng.InnerProduct(residual, self._at_ball) / (math.pi / 8))
         return forces
@@ -143,7 +143,9 @@ class Flow:
             before.data, previous.data = previous, flow.vec
             drag[k] = 2 * math.pi * ng.InnerProduct(load, self._at_ball)
             if not math.isfinite(drag[k]):
-                raise StudyError(f"the flow blew up at t = {moments[k]:g} D/U: take shorter steps than {step:g} D/U")
+                raise StudyError(
+                    f"the solution diverged at t = {moments[k]:g} D/U: use steps shorter than {step:g} D/U"
+                )
         return drag
 
     def _with_inverse(self, stokes: Any, mass: Any, weight: float) -> tuple[Any, Any]:

@@ -101,7 +101,7 @@ def refit(
         There are fewer than two tables, or a search does not end.
     """
     if len(tables) < 2:
-        raise StudyError(f"{len(tables)} solved motion(s): a fit that leaves one out needs at least two")
+        raise StudyError(f"{len(tables)} solved motion(s): leave-one-out fitting needs at least two")
     solved = [_Solved(it) for it in tables]
     progress(f"fitting the constants to {len(tables)} motions ...")
     constants = fit_constants(tables)

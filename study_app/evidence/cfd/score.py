@@ -162,7 +162,7 @@ def score(engine: _Engine, motion: Motion) -> Score:
             times_ns[k] = time.perf_counter_ns() - began_ns
         tick_ns = float(np.median(times_ns))
     if force_n.shape != motion.force_n.shape or not np.isfinite(force_n).all():
-        raise _EngineError(f"{motion.name}: a force is not a finite number, or is missing")
+        raise _EngineError(f"{motion.name}: a force is missing or is not a finite number")
     error_n = force_n - motion.force_n
     rms = float(np.linalg.norm(error_n) / np.linalg.norm(motion.force_n))
     return Score(
@@ -258,13 +258,13 @@ def all_releases(
     let = []
     for name in LIQUIDS:
         if name in first:
-            progress(f"handles let go in {name}")
+            progress(f"released handles in {name}")
             let.append(releases(engine, first[name], delays))
     return let
 
 
 HEADINGS: Final = (
-    "engine", "RMS error, fitted", "not fitted", "greatest error, not fitted", "time of a tick",
+    "engine", "RMS error, fitted", "not fitted", "largest error, not fitted", "time per tick",
     "energy given", *(f"delay borne, {name.replace('_', ' ')}" for name in LIQUIDS),
 )  # fmt: skip
 
@@ -333,7 +333,7 @@ class _Program:
             said = ""
         if not said:
             code = self._process.wait()  # a program that only closed its output is ended, too
-            why = f"gave no answer within {ANSWER_S:g} s" if self._late else f"ended with code {code}"
+            why = f"did not answer within {ANSWER_S:g} s" if self._late else f"ended with code {code}"
             raise _EngineError(f"{self._name} {why}")
         self._asked_s = math.inf
         return said.strip()

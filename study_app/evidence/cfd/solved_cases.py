@@ -52,7 +52,7 @@ class VelocityProfile:
 
     @property
     def description(self) -> str:
-        changes = ", ".join(f"{by:+g} U within {RAMP:g} D/U from {at:g} D/U on" for at, by in self.steps)
+        changes = ", ".join(f"{by:+g} U over {RAMP:g} D/U, starting at {at:g} D/U" for at, by in self.steps)
         sines = " + ".join(f"{a:g} sin(2πt/{T:g} + {phase:g})" for a, T, phase in self.sines)
         return f"speed {changes}{f', times {sines}' if sines else ''}; end at {self.end:g} D/U"
 
@@ -217,8 +217,8 @@ class Case:
     def __post_init__(self) -> None:
         if self.reynolds > _HIGHEST_REYNOLDS:
             raise StudyError(
-                f"{self.liquid_id} at {self.speed_mps:g} m/s has a Reynolds number of {self.reynolds:.0f}: the flow is "
-                f"axisymmetric, as the solver takes it to be, up to {_HIGHEST_REYNOLDS:g}"
+                f"{self.liquid_id} at {self.speed_mps:g} m/s has a Reynolds number of {self.reynolds:.0f}: the solver "
+                f"assumes axisymmetric flow, which holds only up to {_HIGHEST_REYNOLDS:g}"
             )
 
     @property

@@ -101,7 +101,7 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> b
         "from_coarse": _check(case, "the coarse solution", by_grid, drag, times),
         "from_exact": _check(case, "the exact force without convection", linear - exact, exact, times),
     }
-    steps = f"{step:g}, {2 * step:g}, {4 * step:g} D/U: the longer, the longer after start and stop"
+    steps = f"{step:g}, {2 * step:g}, {4 * step:g} D/U, increasing with the time after each start and stop"
     notes = {
         "title": case.title,
         **notes_of(case),
@@ -111,7 +111,7 @@ def motion_table(case: Case, flow: Flow, coarse: Flow, step: float = _STEP) -> b
         "method": f"axisymmetric, order {ORDER}, {flow.unknowns} unknowns, {flow.grid}, steps {steps}",
         "from_coarse": f"{checks['from_coarse']} ({coarse.unknowns} unknowns, steps twice as long)",
         "from_exact": f"{checks['from_exact']} (convection off; Stokes, added mass and Basset)",
-        "computing": "time of one core, one thread, per second of motion",
+        "computing": "single-threaded processor time per second of motion",
         "computing_s_per_s": f"{took_s / (profile.end * case.unit_s):.3g}",
     }
     columns = (times * case.unit_s, case.speed_mps * profile.speed(times), 0.0 - drag * case.unit_n)
@@ -141,11 +141,11 @@ def _check(case: Case, what: str, difference: Floats, force: Floats, times: Floa
     worst = float(size.max())
     if not worst <= PERMITTED:
         raise StudyError(
-            f"{case.liquid_id}, {case.title}, differs from {what} by {worst:.1%} of the greatest force, "
-            f"more than {PERMITTED:.0%}: nothing is stored"
+            f"{case.liquid_id}, {case.title}, differs from {what} by {worst:.1%} of the largest force, which is more "
+            f"than the permitted {PERMITTED:.0%}: nothing was stored"
         )
     return (
-        f"at most {size[ramps].max():.2%} of the greatest force near steps of the speed, {size[~ramps].max():.3%} else"
+        f"at most {size[ramps].max():.2%} of the largest force near speed changes, {size[~ramps].max():.3%} elsewhere"
     )
 
 

@@ -88,7 +88,9 @@ def load_tables(folder: Traversable | None = None, of: str = "") -> tuple[Table,
     names = place.iterdir() if place.is_dir() else ()
     files = sorted((it for it in names if it.name.endswith("mmps.csv")), key=lambda it: it.name)
     if not files:
-        raise StudyError(f"{place} holds no tables of the fluid solver: make them with liquid-study cfd --solve")
+        raise StudyError(
+            f"{place} does not contain the fluid solver's tables: create them with liquid-study cfd --solve"
+        )
     return tuple(read_table(it, MOTION, _OF_THE_MODEL) for it in files)
 
 
@@ -110,7 +112,7 @@ def load_left_out(folder: Traversable | None = None) -> dict[str, Constants]:
         return {name: Constants._make(map(float, values)) for name, *values in rows}
     except (OSError, ValueError, TypeError) as error:
         raise StudyError(
-            f"{file.name} cannot be used ({error}): make it again with liquid-study cfd --refit --to DIR"
+            f"{file.name} cannot be used ({error}): recreate it with liquid-study cfd --refit --to DIR"
         ) from error
 
 
@@ -137,7 +139,7 @@ def read_table(file: Traversable, names: Sequence[str], noted: Sequence[str] = (
         said = (line[1:].split(":", 1) for line in lines if line.startswith("#"))
         notes = {name.strip(): value.strip() for name, value in said}
         for name in noted:
-            float(notes.get(name, f"no note of {name}"))
+            float(notes.get(name, f"the note {name} is missing"))
         header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
         if tuple(header) != tuple(names):
             raise ValueError(f"its columns are {','.join(header)}, not {','.join(names)}")  # noqa: TRY301
@@ -145,7 +147,7 @@ def read_table(file: Traversable, names: Sequence[str], noted: Sequence[str] = (
         columns = dict(zip(names, numbers, strict=True))
     except (OSError, ValueError) as error:
         raise StudyError(
-            f"the solver's table {file.name} cannot be used ({error}): make it again with liquid-study cfd --solve"
+            f"the solver's table {file.name} cannot be used ({error}): recreate it with liquid-study cfd --solve"
         ) from error
     return Table(notes, columns)
 

@@ -114,7 +114,7 @@ def solve_materials(to: Path, executor: Executor, progress: Callable[[str], None
         rows += found
         progress(f"n {index:g}: drag {', '.join(f'{row[2]:.4f}' for row in found)}")
     notes = {
-        "title": "creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n",
+        "title": "drag on a sphere in creeping flow of Herschel–Bulkley liquids, divided by 3πD² K (U/D)^n",
         **provenance_notes(COMMAND),
         "method": f"axisymmetric, order {ORDER}, ε/√(1 + Bi) {SMOOTHING[-1]:g} and {SMOOTHING[-2]:g}: {GRID}; {COARSE}",
     }

@@ -30,7 +30,7 @@ def open_inlet(lsl: Any, name: str) -> Any:
     """Open an inlet for a stream and return it."""
     streams = lsl.resolve_byprop("name", name, 1, _FOUND_WITHIN_S)
     if not streams:
-        sys.exit(f"no stream is called {name!r}")
+        sys.exit(f"there is no stream named {name!r}")
     inlet = lsl.StreamInlet(streams[0])
     inlet.open_stream(_FOUND_WITHIN_S)
     return inlet

@@ -43,7 +43,7 @@ class Listener:
     def ready(self) -> None:
         assert self._process.stdout is not None  # noqa: S101 - asked for above
         if self._process.stdout.readline() != "ready\n":
-            raise WorkerError(f"the listener receives nothing: {self._process.communicate()[1].strip()}")
+            raise WorkerError(f"the listener does not receive anything: {self._process.communicate()[1].strip()}")
 
     def end(self) -> Any:
         said, error = self._process.communicate(timeout=PATIENCE_S)
@@ -270,11 +270,11 @@ def evidence(streams: Streamed, ratios: Sequence[Ratio]) -> Evidence:
         f"{'intact' if streams.intact else 'NOT intact'}",
         f"  longest gap between their times: {streams.worst_gap_ms:.2f} ms",
         f"  markers: {streams.markers_sent} sent, {streams.markers_lost} lost",
-        f"  marker's time against the servo's clock: p50 {p50_us:.1f} us, p99 {1e3 * streams.error_p99_ms:.1f} us, "
-        f"limit {1e3 * _MOST_ERROR_MS:g} us",
+        f"  difference between marker time and servo clock: p50 {p50_us:.1f} us, p99 {1e3 * streams.error_p99_ms:.1f} "
+        f"us, limit {1e3 * _MOST_ERROR_MS:g} us",
         f"  from event to arrival: p50 {p50_ms:.2f} ms, p99 {p99_ms:.2f} ms",
         f"  {'met' if streams.met else 'missed'}",
-        "lateness of the servo, with both streams and without, alternating every 0.25 s",
+        "servo lateness with and without both streams, alternating every 0.25 s",
     ]
     lines += [
         f"  p{ratio.percentile}: {ratio.with_us:.0f} us with, {ratio.without_us:.0f} us without, ratio "

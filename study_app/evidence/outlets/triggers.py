@@ -135,12 +135,12 @@ def _send(
 def evidence(delays: TriggerDelays) -> Evidence:
     """Return the results as text."""
     lines = [
-        f"{len(delays.written_us)} events, twenty a second, on {delays.port}",
-        f"  from event to the byte being written: {_spread(delays.written_us)} us",
+        f"{len(delays.written_us)} events, 20 per second, on {delays.port}",
+        f"  from the event until the byte is written: {_spread(delays.written_us)} us",
     ]
     if delays.read_us is not None and delays.high_ms is not None:
         lines += [
-            f"  from event to the byte being read by another process: {_spread(delays.read_us)} us",
+            f"  from the event until another process reads the byte: {_spread(delays.read_us)} us",
             f"  from the code to 0: {_spread(delays.high_ms)} ms, nominal {1e3 * HIGH_S:g} ms",
             f"  wrong or missing bytes: {delays.wrong}",
         ]

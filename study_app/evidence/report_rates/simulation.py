@@ -463,7 +463,7 @@ _Case: TypeAlias = tuple[str, int]
 Trial: TypeAlias = Callable[[np.random.Generator], float | None]
 """Simulates one study; returns 1 for a hit, 0 for none, of an interval the error over its half; None: it has none."""
 
-COVERS: Final = "interval covers the threshold, where one is printed"
+COVERS: Final = "interval covers the threshold, if one is printed"
 HALF: Final = "half the interval covers the threshold"
 """Of a normal distribution 67 %; 51 % where intervals are 30 % narrower, 80 % where they are 30 % wider."""
 PRINTED: Final = "threshold printed, with its interval"

@@ -56,7 +56,7 @@ class Ledger:
     def __init__(self, scene: Scene) -> None:
         wake = wake_of(scene)
         if wake is None:
-            raise ValueError("this scene's wake cannot be written down")
+            raise ValueError("the exact definition does not support this scene's wake")
         self._wake, self._elements = new_wake_list(wake, scene.rate_hz)
         self._ledger = records(_LEDGER, 1)
         ledger = self._ledger[0]

@@ -105,31 +105,31 @@ class SoakResult:
         yield f"{counts.excess} forces above the limit of {counts.limit_n:g} N{first}", counts.excess > 0
         yield f"{counts.no_number} non-finite forces{first}", counts.no_number > 0
         spoilt = int(counts.limiters[LIMITER_NAMES.index("non_finite")])
-        yield f"{spoilt} non-finite forces of the liquids", spoilt > 0
+        yield f"{spoilt} non-finite liquid forces", spoilt > 0
         yield f"{device.not_finite} non-finite forces were written", device.not_finite > 0
         yield f"a force of {device.most_n:.3g} N was written", device.most_n > counts.limit_n + TOLERANCE_N
         yield (
-            f"{counts.steps} steps of up to {counts.steepest_n:.3g} N, not {counts.slew_n:g} N{first}",
+            f"{counts.steps} steps of up to {counts.steepest_n:.3g} N, above the limit of {counts.slew_n:g} N{first}",
             counts.steps > 0,
         )
         yield f"{counts.unstopped} forces other than zero while stopped{first}", counts.unstopped > 0
         yield f"{counts.accepted} implausible readings accepted{first}", counts.accepted > 0
-        yield f"the clock is off its ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
+        yield f"the clock deviates from the ticks by up to {counts.drift_ns} ns{first}", counts.drift_ns > 0
         yield f"the last force written is {device.last_n.tolist()} N, not zero", bool(device.last_n.any())
         drift, rests = self.drift.worst, self.rests  # values that must not accumulate; NaN counts as too large
-        yield f"the wake is off its definition by {drift:.2g} of Σ|e|/S", not drift <= _MOST_DRIFT
-        yield f"a wake of {rests.wake_mps:.2g} m/s is left after a rest", rests.wake_mps != 0.0
-        yield f"a force of {rests.force_n:.2g} N is left after a rest", not rests.force_n <= _MOST_RESIDUE_N
+        yield f"the wake deviates from its definition by {drift:.2g} of Σ|e|/S", not drift <= _MOST_DRIFT
+        yield f"a wake of {rests.wake_mps:.2g} m/s remains after a rest", rests.wake_mps != 0.0
+        yield f"a force of {rests.force_n:.2g} N remains after a rest", not rests.force_n <= _MOST_RESIDUE_N
         yield f"memory grew by {_mib(self.growth_bytes):.1f} MiB", self.growth_bytes > _MOST_GROWTH_BYTES
 
     def _sums(self) -> Iterator[tuple[str, bool]]:
         """Yield consistency checks between two independent counts; some require that no sample is missing."""
         counts = self.counts
         lost = counts.samples + self.dropped != self.ticks or counts.missing > self.dropped
-        yield f"{self.ticks} ticks are not {counts.samples} samples and {self.dropped} dropped", lost
+        yield f"{self.ticks} ticks do not equal {counts.samples} samples plus {self.dropped} dropped", lost
         if self.dropped == 0:
             wrong = counts.overruns != self.overruns
-            yield f"{self.overruns} overruns, but {counts.overruns} follow from the ticks", wrong
+            yield f"{self.overruns} overruns, but the ticks imply {counts.overruns}", wrong
             for name, _, readings, seen in self.faults:
                 yield f"{readings} readings of {name}, but {seen} in telemetry", seen not in {None, readings}
 
@@ -137,8 +137,8 @@ class SoakResult:
     def verdict(self) -> str:
         if self.findings:
             return f"found: {'; '.join(self.findings)}"
-        part = "" if self.ticks >= self.planned else f" in the {100 * self.ticks / self.planned:.1f} % that were run"
-        return f"sound: nothing found{part}"
+        part = "" if self.ticks >= self.planned else f" in the {100 * self.ticks / self.planned:.1f} % that was run"
+        return f"passed: no faults found{part}"
 
     def text(self) -> str:
         clock = "virtual" if self.virtual else "real"
@@ -146,7 +146,7 @@ class SoakResult:
         fast = f", {pace:.0f} times as fast as real time" if self.virtual else ""
         return "\n".join(
             (
-                f"soak of {self.hours:g} h in {clock} time at {self.rate_hz:g} Hz, seed {self.seed}",
+                f"soak test of {self.hours:g} h in {clock} time at {self.rate_hz:g} Hz, seed {self.seed}",
                 f"liquids: {', '.join(self.scenes)}",
                 f"{self.ticks:,} of {self.planned:,} ticks in {self.took_s:.1f} s{fast}",
                 *self._drift_text(),
@@ -166,10 +166,10 @@ class SoakResult:
             "",
             "drift",
             f"  clock against ticks   {self.counts.drift_ns} ns",
-            f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} comparisons; "
-            f"a wake ran for {drift.longest_s:,.0f} s",
-            f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; "
-            f"more than {PERCEPTIBLE_N} N for {rests.pushed_s:.2f} s at most",
+            f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} comparisons; the "
+            f"longest wake lasted {drift.longest_s:,.0f} s",
+            f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; above "
+            f"{PERCEPTIBLE_N} N for at most {rests.pushed_s:.2f} s",
         )
 
     def _force_text(self) -> tuple[str, ...]:
@@ -177,7 +177,7 @@ class SoakResult:
         return (
             "",
             "forces",
-            f"  largest written       {device.most_n:.6f} N of {counts.limit_n:g} N, {device.writes:,} writes",
+            f"  largest written       {device.most_n:.6f} N (limit {counts.limit_n:g} N), {device.writes:,} writes",
             f"  largest step          {counts.steepest_n:.6f} N",
             f"    let go              {counts.release_step_n:.6f} N at a stop or a fault",
             f"    paid back           {counts.energy_step_n:.6f} N by the passivity controller",

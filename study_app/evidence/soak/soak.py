@@ -177,7 +177,7 @@ class Soak:
         self.hours, self.virtual, self.seed = hours, virtual, seed
         fewest = _FEWEST_TICKS / self._rate_hz / 3600
         if not fewest <= hours <= _MOST_HOURS:
-            raise StudyError(f"a soak lasts {fewest:.2g} to {_MOST_HOURS:g} hours, not {hours:g}")
+            raise StudyError(f"a soak test lasts {fewest:.2g} to {_MOST_HOURS:g} hours, not {hours:g}")
         self.ticks = round(hours * 3600 * self._rate_hz)
         self._draw = Random(seed).random  # noqa: S311 - simulated faults, not secrets
         clock = VirtualClock() if virtual else SystemClock()
@@ -246,7 +246,7 @@ class Soak:
         if self.done > before:
             self._ticked_s = now_s
         elif now_s - self._ticked_s > PATIENCE_S:
-            raise ServoFault(f"the servo has taken no tick for {PATIENCE_S:g} s, after {before} of {self.ticks} ticks")
+            raise ServoFault(f"the servo has not run a tick for {PATIENCE_S:g} s, after {before} of {self.ticks} ticks")
 
     def report(self) -> SoakResult:
         """Stop the servo, check the remaining samples, and return the result so far."""
@@ -396,7 +396,7 @@ def soak(
     """
     ending = ending or threading.Event()
     with Soak(scenes, hours, virtual=virtual, seed=seed) as run:
-        progress(f"{run.ticks:,} ticks begin; Ctrl+C ends the run with the report so far")
+        progress(f"starting {run.ticks:,} ticks; Ctrl+C ends the run and prints the report so far")
         tenth = 0
         while run.done < run.ticks and not ending.is_set():
             run.step(ending)

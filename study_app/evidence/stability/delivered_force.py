@@ -268,10 +268,12 @@ def evidence(found: Sequence[Delivered]) -> Evidence:
 
 
 def _lines(found: Sequence[Delivered]) -> Iterator[str]:
-    yield "Force that acts on the hand, delay included, against the law on the handle's true motion; 1 kHz, 38 µm."
-    yield "The hand follows a sine and random motion with the power of ±20 mm. RMS error [% of the law], least error of"
-    yield "a linear estimator on the same random motion, parts of the law that act on the sine [%] (inertia with"
-    yield "history), and force withheld [%]. A limit follows its value after a slash; * marks a value beyond it."
+    yield "Force on the hand, including the delay, compared with the law for the handle's true motion; 1 kHz, 38 µm."
+    yield (
+        "The hand follows a sine, and random motion with the power of ±20 mm. Columns: RMS error [% of the law], least"
+    )
+    yield "error of any linear estimator on the same random motion, parts of the law that act on the sine [%] (inertia"
+    yield "with history), and withheld force [%]. A limit follows its value after a slash; * marks a value beyond it."
     yield ""
     headings = ("liquid", "estimator", "hand", "kg", "Hz", "ticks", "sine", "random", "least", "drag", "wake")
     rows = []

@@ -404,7 +404,7 @@ def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidenc
     off = [verdict for verdict in swept.off if verdict.grade == UNSTABLE]
     for name, verdicts in (("unstable-safety-off", off), *((f"{grade}-safety-on", on[grade]) for grade in on)):
         files[f"{name}.txt"] = "".join(f"{verdict.case}\n" for verdict in verdicts)
-    figures = plot_files("map", "Where a liquid stays stable", draw_map, swept.off)
+    figures = plot_files("map", "Where a liquid can be rendered stably", draw_map, swept.off)
     return Evidence(f"{text}\n", files, figures, missed=swept.missed)
 
 

@@ -312,7 +312,7 @@ def _lines(rows: Sequence[Row]) -> Iterator[str]:
         values = "".join(f"{value:9.4g}" if value >= 100 else f"{value:9.2f}" for value in row.values)
         goal = "" if row.goal is None else f"   {'≥' if row.least else '≤'} {row.goal:.3g}: "
         judged = "" if row.goal is None else "met" if row.met else "not met"
-        bound = "" if row.bound is None else f"   least of linear estimators {row.bound:.3g}"
+        bound = "" if row.bound is None else f"   least of any linear estimator {row.bound:.3g}"
         yield f"{row.name:{width}} {values}{goal}{judged}{bound}"
 
 
@@ -353,7 +353,7 @@ def _boundaries() -> Iterator[Row]:
 def _held() -> Iterator[Row]:
     errors = _each(_plain_errors)
     yield Row("held, 1–3 Hz ±20 mm, mean error [%]", tuple(map(statistics.mean, errors)), _HELD_PERCENT)
-    yield Row("held, 1–3 Hz ±20 mm, greatest error [%]", tuple(map(max, errors)))
+    yield Row("held, 1–3 Hz ±20 mm, largest error [%]", tuple(map(max, errors)))
     quick = _each(lambda velocity: statistics.mean(_plain_errors(velocity, (_QUICK,))))
     yield Row(f"held, {_QUICK}, mean error [%]", quick)
 
@@ -368,7 +368,7 @@ def _whole() -> Iterator[Row]:
 
 
 def _cost() -> Iterator[Row]:
-    yield Row("cost above the plain difference [ns per tick]", _each(_cost_ns), _MOST_COST_NS)
+    yield Row("time above that of the plain difference [ns per tick]", _each(_cost_ns), _MOST_COST_NS)
 
 
 PARTS: Final[Mapping[str, Callable[[], Iterator[Row]]]] = {

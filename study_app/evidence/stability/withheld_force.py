@@ -126,7 +126,7 @@ def evidence(found: Sequence[Withheld]) -> Evidence:
 
 
 def _lines(found: Sequence[Withheld]) -> Iterator[str]:
-    yield "force withheld by passivity controller and slew limit [%]: Σ|F_a - F_b| / Σ|F_a|; strokes in mm"
+    yield "force withheld by the passivity controller and the slew limit [%]: Σ|F_a - F_b| / Σ|F_a|; strokes in mm"
     for (estimator, mode), rows in itertools.groupby(found, key=lambda one: (one.estimator, one.mode)):
         yield ""
         strokes = "".join(f"{stroke!s:>11}" for stroke in STROKES)
@@ -145,7 +145,7 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
         which = "tar aside" if most == _MOST else " with ".join(_REVERSED)
         yield f"at most {most:.0%} in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
     met = _goal(lasting < MOST_AFTER)
-    yield f"nothing (< {MOST_AFTER:.1%}) from one second after a shake on, tar aside: {met} ({lasting:.1%})"
+    yield f"less than {MOST_AFTER:.1%} later than one second after a shake, except in tar: {met} ({lasting:.1%})"
 
 
 def _goal(met: bool) -> str:

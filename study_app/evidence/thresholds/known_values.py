@@ -356,7 +356,7 @@ class KnownThreshold(_KnownValue):
 
         return Measure(
             study=self.name,
-            what=f"threshold of {REHEARSED} people, {'ms' if self.threshold > 1 else 'Weber fraction'}",
+            what=f"threshold of {REHEARSED} participants, {'ms' if self.threshold > 1 else 'Weber fraction'}",
             value=self.threshold * math.exp(error),
             interval=ends,
             least=self.threshold,
@@ -427,7 +427,7 @@ class KnownExponent(_KnownValue):
         mean = float(np.mean(values))
         return Measure(
             study=self.name,
-            what=f"exponent of {len(values)} people",
+            what=f"exponent of {len(values)} participants",
             value=mean,
             interval=lambda sure: (mean - _normal_half(sure) * spread, mean + _normal_half(sure) * spread),
             least=EXPONENT,
@@ -465,8 +465,8 @@ def known_value(name: str, protocol: Protocol) -> Known:
         if stimulus_of(protocol, block).level_kind != "value" and not all(standard is None for standard in standards):
             return KnownThreshold(name, protocol, block, _SHIPPED.get(name, OBSERVER))
     raise ValueError(
-        f"{name} has no main block with levels above a standard, or with magnitude estimation of a liquid at a pace: "
-        "nothing is known of it in advance"
+        f"{name} does not have a main block with levels above a standard, or with magnitude estimation of a liquid at "
+        "a set pace, so its true values are unknown"
     )
 
 
@@ -599,7 +599,7 @@ def validate(
         measures += [*one.measures(found), *coverage(one.name, found)]
         progress(f"{one.name}: rehearsing {REHEARSED} participants", None)
         measures += rehearsed_measures(one, rehearsal.result(), one.spread(found, REHEARSED))
-        say(f"{one.name}: {len(cases)} studies and {REHEARSED} rehearsed participants")
+        say(f"{one.name}: {len(cases)} studies and {REHEARSED} simulated participants")
     measures += coverage("all of them", every)
     of_thresholds = [one for _, one in known if isinstance(one, KnownThreshold)]
     cases = cases[:: max(1, min(_KIND_SHARE, len(cases) // 2))]

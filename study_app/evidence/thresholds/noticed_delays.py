@@ -132,7 +132,7 @@ def _rating(person: Person, delay_s: float, draw: Draw) -> int:
 
 _THESIS_MS: Final = 125.0
 GUESS, LAPSE = 0.5, 0.02
-TITLE: Final = "Which delay is noticed? Two questions to the same people"
+TITLE: Final = "Which delays are noticed? Two questions, the same participants"
 
 
 @style.own_settings(style.PLOT_SETTINGS)
@@ -154,7 +154,7 @@ def draw(comparison: Compared) -> Figure:
     thresholds.axhspan(low, high, color=style.BAND, linewidth=0)
     thresholds.axhline(middle, color=style.TEXT, dashes=(4, 2), label=FORCED_CHOICE)
     thresholds.axhline(
-        _THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="“125 ms” of the thesis"
+        _THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="“125 ms” in the thesis"
     )
     for rating, colour in zip(comparison.rated, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
         test, at = rating.found, 1000 * rating.criterion_s + (5 if rating.adapted_s else 0)

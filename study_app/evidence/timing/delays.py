@@ -26,8 +26,8 @@ VIRTUAL_HZ: Final = (60.0, 144.0)
 
 BESIDE: Final[dict[LoadName, str]] = {
     "none": "tank alone",
-    "gui": "with the cockpit",
-    "gui+cpu": "with the cockpit and busy cores",
+    "gui": "with the operator's window",
+    "gui+cpu": "with the operator's window and busy cores",
 }
 
 _MEAN_FRAMES: Final = 0.5
@@ -155,9 +155,9 @@ def draw(delays: Delayed) -> Figure:
     """Draw the delay errors of all trials."""
     width, height = delays.size_px
     caption = (
-        f"Marks: mean of all frames; lines reach up to the {_TAIL_PERCENT:g}th percentile, which is written if it is "
-        f"off the scale. {delays.seconds:g} s of reaching at each delay with the tank at {width} × {height}, from the "
-        f"sample that is drawn to the end of its painting. {delays.machine}."
+        f"Marks show the mean of all frames; lines extend to the {_TAIL_PERCENT:g}th percentile, whose value is "
+        f"printed if it is off the scale. {delays.seconds:g} s of reaching at each delay, with the tank at {width} × "
+        f"{height}; measured from the drawn sample to the end of painting. {delays.machine}."
     )
     handles = [
         Line2D([], [], markersize=4.5, linewidth=1.3, label=BESIDE[load].capitalize(), **_LOOKS[load])
@@ -237,7 +237,7 @@ def evidence(delays: Delayed) -> Evidence:
     width, height = delays.size_px
     head = (
         f"{delays.seconds:g} s of reaching at each delay, the tank at {width} × {height}; error: achieved minus "
-        "requested delay, from the sample drawn to the end of its painting; late: by more than a frame. "
+        "requested delay, from the drawn sample to the end of painting; late: more than one frame late. "
         f"{delays.machine}."
     )
     lines = [head]

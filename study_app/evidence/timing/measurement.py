@@ -403,14 +403,14 @@ class Timed:
         ratio = self.ratio(servo, 99)
         took_us = servo.busy_us(99)
         late = (
-            f"{servo.late:,} ticks over 1 ms late, {_fewer(thread, servo)} than with a Python thread "
-            f"(at least {_FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
+            f"{servo.late:,} ticks more than 1 ms late, {_fewer(thread, servo)} than with a Python thread (at least "
+            f"{_FEWER_LATE:g} times fewer; the bare loop: {_fewer(thread, bare)})"
         )
         return tuple(
             Limit(level, said, held)
             for said, held in (
                 (
-                    f"median {above_us:+.1f} µs against the bare loop (at most +{_MEDIAN_US:g} µs)",
+                    f"median {above_us:+.1f} µs relative to the bare loop (at most +{_MEDIAN_US:g} µs)",
                     above_us <= _MEDIAN_US,
                 ),
                 (f"p99 {ratio:.2f} times the bare loop's (at most {_TAIL_RATIO:g})", ratio <= _TAIL_RATIO),

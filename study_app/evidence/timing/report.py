@@ -81,9 +81,9 @@ _LOADS: Final = {
 def draw(timing: Timed) -> Figure:
     """Draw the lateness of all loops."""
     caption = (
-        f"Share of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom: the 99th percentile of each. "
-        f"{timing.seconds:g} s of each loop at 1 kHz alternating every quarter second, {_LOADS[timing.load]}. "
-        f"{timing.machine}."
+        f"Proportion of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom show the 99th "
+        f"percentile of each loop. {timing.seconds:g} s of each loop at 1 kHz, alternating every quarter of a second, "
+        f"{_LOADS[timing.load]}. {timing.machine}."
     )
     handles = []
     for kind in (kind for kind in NAMES if any(loop.kind == kind for loop in timing.loops)):
@@ -156,12 +156,13 @@ _HEADINGS: Final = (
 def evidence(timing: Timed) -> Evidence:
     """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
     head = (
-        f"{timing.seconds:g} s of each loop at 1 kHz, alternating every quarter second; {_LOADS[timing.load]}"
-        f"{'' if timing.frames_hz is None else f', {timing.frames_hz:.0f} frames per second'}. {timing.machine}."
+        f"{timing.seconds:g} s of each loop at 1 kHz, alternating every quarter of a second; "
+        f"{_LOADS[timing.load]}{'' if timing.frames_hz is None else f', {timing.frames_hz:.0f} frames per second'}. "
+        f"{timing.machine}."
     )
     notes = timing.notes
     if timing.spin_us > 0:
-        notes += (f"a spin of {timing.spin_us:g} µs before each deadline took {timing.spun_share:.1%} of a core",)
+        notes += (f"spinning for {timing.spin_us:g} µs before each deadline used {timing.spun_share:.1%} of a core",)
     table = Table(_HEADINGS, [_row(timing, loop) for loop in timing.loops], left=2)
     what = "lateness in µs; skipped: deadlines that passed during a longer tick"
     text = "\n".join((head, what, "", table.text(), "", *map(str, timing.limits()), "", *notes)) + "\n"

@@ -140,8 +140,10 @@ class RehearsalDialog(Work):
 _FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
 _HOLDS = "It will contain the folders protocols and results."
-_ROW_HINT = "the session uses that participant's order; leave empty if nobody is replaced"
-_PLACE_HINT = "the session uses that participant's order and position in the group; leave empty if nobody is replaced"
+_ROW_HINT = "the session uses that participant's order; leave empty if no one is being replaced"
+_PLACE_HINT = (
+    "the session uses that participant's order and position in the group; leave empty if no one is being replaced"
+)
 _GROUP_HINT = "recorded as a property of the participant"
 
 
@@ -461,8 +463,8 @@ class WorkspaceDialog(Question):
             parent,
             theme,
             "Choose your workspace",
-            "This computer's protocols and results are stored in one folder. Windows and commands use it "
-            "wherever they are started. You can change it later under This machine.",
+            "This computer's protocols and results are stored in one folder. All windows and commands use this "
+            "folder, wherever you start them. You can change it later under This machine.",
             ActionButton("check", "Use this folder", role="primary"),
             back="Not now",
             fields=(Field("workspace", "Workspace folder", "folder", hint=_HOLDS),),

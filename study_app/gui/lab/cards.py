@@ -301,7 +301,7 @@ class CostCard(_ReadingCard):
     """The time of each effect per tick."""
 
     def __init__(self) -> None:
-        super().__init__("Cost per tick", label("", "small", "text2"), "Computation times would reveal the settings.")
+        super().__init__("Time per tick", label("", "small", "text2"), "Computation times would reveal the settings.")
         self.lines: list[CostLine] = []
         self.absent: list[AbsentLine] = []
         self._costs = vbox(spacing=0)

@@ -471,5 +471,5 @@ def _answer_lines(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) ->
     seconds = [answer.seconds for answer in answers if answer.seconds is not None]
     if seconds:
         middle = median(seconds)
-        lines.append(f"median answer time {middle:.2f} s" + (": check" if middle < _FAST_S else ""))
+        lines.append(f"median response time {middle:.2f} s" + (": check" if middle < _FAST_S else ""))
     return lines

@@ -167,7 +167,7 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bo
     outside = [trial for trial in judged if not trial.valid]
     if verdict is False and not outside:
         return "Out of limits: at least one trial exceeded one of the study's limits. Unblinding will show which trial."
-    later = " Delay error, force held back and targets reached will be checked after unblinding."
+    later = " The delay error, the withheld force and the targets reached will be checked after unblinding."
     later = later if sealed and not verdict else ""
     if not judged:
         return f"Trials have not been measured yet.{later}"

@@ -327,7 +327,7 @@ FIELDS = (
     ),
     Field("stamps", "Time-stamp server for proofs (RFC 3161)", hint=_STAMPS, parse=_check_server),
     Field(
-        "stamp_root", "The server's root certificate (PEM), for verifying its stamps", "file",
+        "stamp_root", "The server's root certificate (PEM), for verifying its time stamps", "file",
         file_filter="Certificates (*.pem *.crt *.cer)", parse=_check_path, write=_text_or_empty,
     ),
 )  # fmt: skip

@@ -248,7 +248,7 @@ class WatchWindow(Themed, QDialog):
         self.interval.setAccessibleName("Interval")
         self.seen = Toggle("As on the screen")
         self.seen.setToolTip(
-            "Shows the ball with the delay that the participant saw; arrows and curves show the current moment"
+            "Shows the ball with the delay that the participant saw; the arrows and curves are not delayed"
         )
         self.export = ActionButton("download", "Export as video …", height=40)
         self.play = ActionButton("play", "Play", cap="Space", height=40)

@@ -293,7 +293,7 @@ def _chosen_verdicts(
             left_out_n = with_it_n
             judged[effect] = False, _omission_reason(bound_of[effect], left_out_n, budget_n)
         else:
-            omitted = f"omitting it would raise the omitted force to {with_it_n:.3g} N"
+            omitted = f"omitting it would raise the total omitted force to {with_it_n:.3g} N"
             judged[effect] = True, f"{omitted}, above the limit of {budget_n:.3g} N"
     for name in [name for name, (taken, _) in judged.items() if taken and NAMED[name].through]:
         carrier = next(it for it in NAMED[name].through if it not in barred)
@@ -311,7 +311,7 @@ def _chosen_verdicts(
 
 def _omission_reason(bound_n: float, left_out_n: float, budget_n: float) -> str:
     if bound_n == 0.0:
-        return "does nothing here"
+        return "has no effect here"
     return f"{left_out_n:.3g} N omitted in total, within the {budget_n:.3g} N allowed"
 
 

@@ -132,7 +132,7 @@ class ModelAlong:
             scene = scene.model_copy(update={"velocity": Given()})
         elif isinstance(scene.velocity, Given) and not given:
             raise StudyError(
-                "the scene uses the given velocity, but the motion does not contain vx_mps, vy_mps and vz_mps"
+                'the scene uses velocity "given", but the motion does not contain vx_mps, vy_mps and vz_mps'
             )
         if dynamics is None:
             self._model = pack(scene, limits=handle_limits(1e-3, 1, estimator), dynamics=Dynamics(delay_s=1e-3))

@@ -23,13 +23,13 @@ _FAULTS = {
     STATUS_DEVICE_LOST: (
         "stopped responding or lost its guard process; turn it off if it is still pushing, and reconnect it"
     ),
-    STATUS_STALE_FAULT: "sent nothing usable for 50 ms; check its cable",
+    STATUS_STALE_FAULT: "sent no usable data for 50 ms; check its cable",
     STATUS_NON_FINITE: "would have received a non-finite force (NaN or infinite); check the scene's parameters",
 }
 
 
 _STUCK = (
-    "or the computer blocked the servo, which has not run a tick for 75 ms; turn the device off if it is still pushing"
+    "or the computer stalled the servo loop, which has not run for 75 ms; turn the device off if it is still pushing"
 )
 
 

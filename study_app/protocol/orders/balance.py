@@ -290,7 +290,7 @@ def _advice(block: _BlockBalance) -> Iterator[str]:
             if square == "williams" and not has_even_borders(codes, repetitions):
                 enough = next(more for more in count(repetitions) if has_even_borders(codes, more))
                 yield (
-                    f"Carry-over cannot be balanced with this number of repetitions, but it can with {enough} "
+                    f"Carry-over cannot be balanced with this number of repetitions, but it can be with {enough} "
                     "repetitions."
                 )
             if square == "latin" and codes > 2:

@@ -71,7 +71,7 @@ class Condition(Table):
     view: str = later(
         default="tank",
         pattern=r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$",
-        description="tank: the drawn tank; camera: the live picture from this computer's camera; or the path of a "
+        description="tank: the drawn tank; camera: the live image from this computer's camera; or the path of a "
         "video file, relative to this file.",
     )
     overlay: Literal["shown", "hidden"] = later(

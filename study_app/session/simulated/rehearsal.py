@@ -722,7 +722,10 @@ def reopen_session(
     lines = journal.read(locate_session(session_folder)[1].journal)
     begun = start_of(lines)
     if not is_rehearsal(receipt.read(locate_session(session_folder)[1].receipt)):
-        raise SessionError(f"{session_folder} is a participant's session, not a simulated one: resume it in a window")
+        raise SessionError(
+            f"{session_folder} is a participant's session, not a simulated one: resume it in the program's session "
+            "window"
+        )
     read = partial(source_to_resume, session_folder)
     name = find_protocol(begun, read=read) if protocol is None else str(protocol)
     source = read(name)

@@ -238,7 +238,9 @@ def check_choice(
     if group is not None and group not in protocol.groups:
         raise StudyError(f"group {group!r}: {name} does not have this group; permitted: {permitted}")
     if protocol.asks_group and own is not None and own.group not in protocol.groups:
-        raise StudyError(f"participant {participant} is recorded in group {own.group}, which {name} no longer has")
+        raise StudyError(
+            f"participant {participant} is recorded in group {own.group}, which no longer exists in {name}"
+        )
     if own is not None and group not in (None, own.group):
         raise StudyError(
             f"participant {participant} is recorded in group {own.group}, not {group}; specify {own.group}"
@@ -260,7 +262,7 @@ def _check_replaced(
     elif own is not None:
         if own.replaces != row_of:
             now = "nobody" if own.replaces is None else own.replaces
-            raise StudyError(f"{row_of!r} cannot be replaced: {participant} has replaced {now} since the first session")
+            raise StudyError(f"{row_of!r} cannot be replaced: {participant} is recorded as replacing {now}")
     elif replaced is None:
         raise StudyError(
             f"participant {row_of!r} cannot be replaced: this ID does not exist in this folder; specify an existing ID"

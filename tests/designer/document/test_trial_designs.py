@@ -147,7 +147,7 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert slime.help.endswith("The scene's scale changes to 3 for all liquids, as in that study.")
     other = after(study, SetValue(("scene", "scale"), 10))
     assert slime.asks.help(other).endswith(
-        "Its forces differ, because the scene's scale is 3 in that study and 10 in this one."
+        "The forces differ, because the scene's scale is 3 in that study and 10 in this one."
     )
     assert after(other, slime.asks).document["scene"] == {"scale": 10}
     same = after(study, SetValue(("scene", "scale"), 3))

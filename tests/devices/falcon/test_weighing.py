@@ -124,7 +124,7 @@ class TestTheGrip:
 
     def test_one_that_somebody_shakes_does_not_come_to_rest(self):
         emulator = emulated(tremor_m=2e-3)
-        with EmulatedFalcon(emulator=emulator) as device, pytest.raises(DeviceError, match="does not come to rest"):
+        with EmulatedFalcon(emulator=emulator) as device, pytest.raises(DeviceError, match="has not come to rest"):
             Grip(device, virtual=True).move_to((0.01, 0.0, 0.0))
         assert emulator.torques == (0, 0, 0)
 

@@ -269,5 +269,5 @@ def test_a_position_far_away_is_rejected_while_the_force_fades_and_the_servo_end
     assert (samples["limiters"][-40:] & LIMITER_GLITCH).all()
     assert (sizes_n <= 1.05 * before_n).all()  # nor NaN
     assert sizes_n[-1] == np.linalg.norm(service.force_n) == 0.0
-    with pytest.raises(ServoFault, match="sent nothing usable for 50 ms"):
+    with pytest.raises(ServoFault, match="sent no usable data for 50 ms"):
         servo.check()

@@ -32,7 +32,7 @@ def test_all_that_keeps_the_definition_differs_by_rounding(found):
 
 @compiled
 def test_the_whole_tick_is_compared_with_plain_c(found):
-    compared = r"A whole tick of the servo in water, .* takes \d+ ns, \d+\.\d times as long as .* in plain C \(\d+ ns"
+    compared = r"A complete servo tick in water, .* takes \d+ ns, \d+\.\d times as long as .* in plain C \(\d+ ns"
     missing = r"The time of a tick relative to plain C was not measured: there is no C compiler \(gcc\)\."
     assert re.match(compared if shutil.which("gcc") else missing, found.plain_c)
 

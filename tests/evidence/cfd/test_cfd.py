@@ -250,5 +250,5 @@ def test_a_coarse_flow_resists_as_it_should(coarse):
 
 def test_a_solution_that_misses_the_coarse_one_is_not_stored(coarse, monkeypatch):
     monkeypatch.setattr(solver, "PERMITTED", 1e-6)
-    with pytest.raises(StudyError, match=r"differs from the coarse solution .* nothing is stored"):
+    with pytest.raises(StudyError, match=r"differs from the coarse solution .* nothing was stored"):
         solver.motion_table(solved_cases.cases()[0], coarse, coarse, step=0.025)

@@ -54,7 +54,7 @@ def test_a_program_over_a_pipe_and_a_function_get_the_same_score(alone: Path) ->
     expected = score.row("", scores, let)
     words = [sys.executable, "-I", "score.py", sys.executable, "stokes.py"]
     done = subprocess.run(words, cwd=alone, capture_output=True, text=True, check=False, timeout=120)
-    assert (done.returncode, done.stderr.splitlines()) == (0, [f"{NAME} ...", "handles let go in honey ..."])
+    assert (done.returncode, done.stderr.splitlines()) == (0, [f"{NAME} ...", "released handles in honey ..."])
     cells = [cell.strip() for cell in done.stdout.splitlines()[-1].split("|")[2:-1]]
     assert cells[:3] + cells[4:] == expected[1:4] + expected[5:]
     assert f"| {NAME} | 2 | no | {scores[0].rms:.1%} | {scores[0].greatest:.1%} |" in done.stdout
@@ -134,10 +134,10 @@ def test_the_safety_layer_bears_delays_that_the_law_alone_does_not() -> None:
         ("print('yes')", "answered 'yes' to a new ball, not 'ready'"),
         ("input(); print('ready'); input(); print('much')", "answered 'much' to a tick, not a number"),
         ("input(); print('ready'); input(); print('nan')", "ended with code 0"),
-        (STOKES.replace("v_mps)", "math.nan)").replace("* v_mps", "* math.nan"), "a force is not a finite number"),
+        (STOKES.replace("v_mps)", "math.nan)").replace("* v_mps", "* math.nan"), "a force is missing or is not a finite number"),
         ("import sys; sys.exit(7)", "ended with code 7"),
-        ("import time; time.sleep(60)", "gave no answer within 0.5 s"),
-        ("import os, time; os.close(1); time.sleep(60)", "gave no answer within 0.5 s"),
+        ("import time; time.sleep(60)", "did not answer within 0.5 s"),
+        ("import os, time; os.close(1); time.sleep(60)", "did not answer within 0.5 s"),
         (None, "cannot be started: "),
         ("changed", "is not the published table: its checksum is not in SHA256SUMS"),
     ],

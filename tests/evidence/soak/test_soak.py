@@ -36,7 +36,7 @@ def found(scenes):
 
 def test_two_virtual_minutes_of_every_fault_find_nothing(found):
     assert found.findings == ()
-    assert found.verdict == "sound: nothing found"
+    assert found.verdict == "passed: no faults found"
     assert found.ticks == found.planned == 120_000
     for name, times, readings, seen in found.faults:
         assert 0 < times <= readings == seen, name
@@ -90,7 +90,7 @@ def test_one_that_is_asked_to_end_says_what_it_has(scenes):
     found = soak(scenes, SHORT_H, virtual=True, ending=ending, progress=tell)
     assert lines[-1].startswith(" 10 %")
     assert 12_000 <= found.ticks < 20_000
-    assert found.verdict.startswith("sound: nothing found in the 1")
+    assert found.verdict.startswith("passed: no faults found in the 1")
     assert not found.device.last_n.any()
 
 
@@ -131,7 +131,7 @@ def run_soak(tmp_path, monkeypatch, capsys):
 def test_the_command_prints_and_writes_the_report(run_soak):
     code, said, complaint = run_soak("--hours", "0.002", "--virtual", "--to", "out")
     assert (code, complaint) == (0, "")
-    assert "sound: nothing found" in said
+    assert "passed: no faults found" in said
     assert Path("out/soak.txt").read_text(encoding="utf-8").strip() in said
     table = json.loads(Path("out/soak.json").read_text(encoding="utf-8"))
     assert table["ticks"] == 7200
@@ -152,4 +152,4 @@ def test_ctrl_c_ends_with_the_report_so_far(tmp_path):
             running.kill()
     assert complaint == ""
     assert running.returncode == 130
-    assert "sound: nothing found in the 0.0 % that were run" in said
+    assert "passed: no faults found in the 0.0 % that was run" in said

@@ -128,11 +128,11 @@ def test_people_prefer_an_interval_or_their_last_answer_and_learn(delays: bool) 
 
 @pytest.mark.slow
 def test_what_has_no_threshold_is_refused() -> None:
-    with pytest.raises(ValueError, match="rek2024 has no main block"):
+    with pytest.raises(ValueError, match="rek2024 does not have a main block"):
         known_value("rek2024", load("rek2024"))
     ran = CliRunner().invoke(commands, ["validate", "rek2024"])
     assert ran.exit_code == 2
-    assert "nothing is known of it in advance" in ran.output
+    assert "so its true values are unknown" in ran.output
 
 
 @pytest.mark.slow
@@ -244,7 +244,7 @@ def test_studies_of_all_seeds_count_together_and_each_seed_once(
             [(b"", threshold)], 2, (1, 2, 1), executor, lambda words, _share: told.append(words), said.append
         )
     assert "small: 4 of 4 studies" in told
-    assert said[0] == "small: 4 studies and 3 rehearsed participants"
+    assert said[0] == "small: 4 studies and 3 simulated participants"
     assert said[-1].startswith("people, a mix of these: ")
     found = [threshold.simulate(number, seed) for seed in (1, 2) for number in range(2)]
     own = [*threshold.measures(found), *coverage("small", found)]

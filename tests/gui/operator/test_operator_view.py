@@ -159,7 +159,7 @@ def test_tracks_after_each_event_are_the_reviewed_ones(told, pytestconfig):
             firsts = sum(at != 2 for at in own)
             share, other = (round(100 * count / len(own)) for count in (firsts, len(own) - firsts))
             assert f"First {share} %, Second {other} %" in view.track[1]
-            assert f"median answer time {sum((at + 1) / 2 for at in own) / len(own):.2f} s" in view.track[3]
+            assert f"median response time {sum((at + 1) / 2 for at in own) / len(own):.2f} s" in view.track[3]
     compare(Path(__file__).parent / "golden" / "operator_tracks.txt", each_once(what_comes(lines)), pytestconfig)
     assert set(REASONS) == {*Limits.model_fields, "force_limit_n"} - {"attempts", MISSING_PERCENT}
 

@@ -138,7 +138,7 @@ def test_a_device_without_news_for_50_ms_is_a_fault(servo, probe):
     assert servo.advance(1000) == 50
     assert servo.telemetry.latest().status == STATUS_STALE_FAULT
     assert is_zero(probe.forces_n[-1])
-    with pytest.raises(ServoFault, match="nothing usable for 50 ms"):
+    with pytest.raises(ServoFault, match="no usable data for 50 ms"):
         servo.check()
 
 

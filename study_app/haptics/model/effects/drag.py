@@ -103,7 +103,7 @@ def _is_true_enough(extremes: Extremes, law: Law) -> bool:
 
 def _choose(extremes: Extremes) -> tuple[Drag, str]:
     if extremes.liquid.drag.law == "linear":
-        return extremes.liquid.drag, "linear law, as stated in the file"
+        return extremes.liquid.drag, "linear law, as specified in the file"
     law, accuracy = cheapest_law(extremes), extremes.scene.accuracy
     if extremes.liquid.viscosity_pa_s is None:
         return Drag(law=law), "constant law, because the liquid's viscosity is not specified"

@@ -130,7 +130,7 @@ EFFECT = Effect(
     bound_n=_bound_n,
     exerted_n=_exerted_n,
     extent="area",
-    bars=lambda extremes: (_REPLACES, "replaced by non-Newtonian drag, because the liquid has flow curve parameters"),
+    bars=lambda extremes: (_REPLACES, "replaced by non-Newtonian drag, because the liquid has flow-curve parameters"),
     note=lambda liquid: f"; {liquid.non_newtonian.kind}, {_NOT_MODELLED}",
     model=laws.Rheology,
     missing='kind = "herschel-bulkley", "carreau", "maxwell" or "shear-thickening", ...',

@@ -88,7 +88,7 @@ class _Bus:
         while not said.endswith(b"\r\n"):
             said += self._receive(1)
         if not said.startswith(b"OK "):
-            raise PermissionError(f"the bus rejects this user: {said.decode(errors='replace').strip()}")
+            raise PermissionError(f"D-Bus denied access to this user: {said.decode(errors='replace').strip()}")
         self._socket.sendall(b"BEGIN\r\n")
         self.call(_BUS, "/org/freedesktop/DBus", _BUS, "Hello")
 
@@ -121,7 +121,7 @@ class _Bus:
         while True:
             kind_of_answer, answer = self._next()
             if kind_of_answer == _ERROR:
-                raise PermissionError(f"the real-time service rejects {member}")
+                raise PermissionError(f"the real-time service rejected {member}")
             if kind_of_answer == _RETURN:
                 return answer
 

@@ -123,7 +123,7 @@ def test_the_service_is_asked_for_what_it_grants_at_most(serve, limits):
 
 def test_a_bus_without_the_service_changes_no_limit(serve, limits):
     _, path = serve(refuses=("Get",))
-    with pytest.raises(PermissionError, match="rejects Get"):
+    with pytest.raises(PermissionError, match="rejected Get"):
         make_real_time(1, path)
     assert limits == []
 
