@@ -165,7 +165,7 @@ def _accuracy(liquid: Liquid) -> tuple[str, ...]:
 def _parameter(scene: Scene, name: str) -> Parameter:
     """Return a parameter with its range, default and unit for display."""
     if name == "effects":
-        return Parameter(name, "Chosen", default=ON, choices=((ON, "Selected manually"), (AUTO, "Automatic")))
+        return Parameter(name, "Selection", default=ON, choices=((ON, "Manual"), (AUTO, "Automatic")))
     if name.startswith("effects."):
         label = NAMED[name.partition(".")[2]].label
         return Parameter(name, label, default=OFF, choices=((OFF, "Off"), (ON, "On")))

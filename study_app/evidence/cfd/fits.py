@@ -61,7 +61,7 @@ MODELS: Final = (
     Model("unsteady drag", ("unsteady_drag",)),
 )
 """From the thesis' drag alone to all that creeping flow has, and the law whose constants are fitted to the solver;
-"..." is the drag of the Reynolds number."""
+"..." is the Reynolds-dependent drag."""
 
 _START: Final = {"length": 300, "scaling": 1000.0}
 
@@ -261,7 +261,7 @@ def score_all(progress: Callable[[str], object] = lambda _line: None) -> Evidenc
 _WIDTH_PT: Final = 85 / 25.4 * 72
 _PANEL_PT: Final = 118.0
 _LOOKS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
-    "drag of the Reynolds number": ("drag alone", {"color": "#5d6a75", "linestyle": (0, (1, 1.2))}),
+    "Reynolds-dependent drag": ("drag alone", {"color": "#5d6a75", "linestyle": (0, (1, 1.2))}),
     "constant C_d, wake": ("constant $C_d$ and wake", {"color": "#b35600", "linestyle": (0, (5, 2))}),
     "... history, added mass": ("drag, history, added mass", {"color": "#0b65a3", "linestyle": "-"}),
 }

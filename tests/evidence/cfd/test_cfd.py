@@ -157,12 +157,12 @@ def test_a_stored_table_is_taken_for_its_own_liquid_alone(tmp_path):
     assert case.force_n[5, 0] == pytest.approx(-0.5)
     assert case.motion.position_m[10, 0] == pytest.approx(0.5e-3)
     assert solver_truths(glycerin, tmp_path) == ()
-    with pytest.raises(StudyError, match="holds no tables"):
+    with pytest.raises(StudyError, match="does not contain the fluid solver"):
         solver_truths(honey, tmp_path / "absent")
 
 
 def test_a_table_that_was_damaged_is_named(tmp_path):
-    with pytest.raises(StudyError, match="holds no tables"):
+    with pytest.raises(StudyError, match="does not contain the fluid solver"):
         stored_flows.load_tables(tmp_path)
     shutil.copy(str(PACKAGE / f"{NAMES[0]}.csv"), tmp_path)
     file = tmp_path / f"{NAMES[0]}.csv"

@@ -134,7 +134,10 @@ def test_the_safety_layer_bears_delays_that_the_law_alone_does_not() -> None:
         ("print('yes')", "answered 'yes' to a new ball, not 'ready'"),
         ("input(); print('ready'); input(); print('much')", "answered 'much' to a tick, not a number"),
         ("input(); print('ready'); input(); print('nan')", "ended with code 0"),
-        (STOKES.replace("v_mps)", "math.nan)").replace("* v_mps", "* math.nan"), "a force is missing or is not a finite number"),
+        (
+            STOKES.replace("v_mps)", "math.nan)").replace("* v_mps", "* math.nan"),
+            "a force is missing or is not a finite number",
+        ),
         ("import sys; sys.exit(7)", "ended with code 7"),
         ("import time; time.sleep(60)", "did not answer within 0.5 s"),
         ("import os, time; os.close(1); time.sleep(60)", "did not answer within 0.5 s"),
