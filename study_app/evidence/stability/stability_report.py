@@ -385,8 +385,8 @@ def _limiters(swept: Swept) -> Iterator[str]:
 
 
 def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
-    yield "RMS difference between the force sent and the model force clamped to 8 N, hand attached, worst of twelve"
-    yield "motions, as a percentage of the RMS force; * marks more than 5 % and 0.05 N. The second number is the"
+    yield "RMS difference between the sent force and the model force clamped to 8 N, with the hand attached (worst of"
+    yield "twelve motions), as a percentage of the RMS force; * marks more than 5 % and 0.05 N. The second number is the"
     yield "largest proportion of ticks with such a difference."
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
     for liquid, row in itertools.groupby(fidelities, key=lambda one: one.liquid):

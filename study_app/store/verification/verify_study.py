@@ -421,7 +421,8 @@ def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> N
         for number, torn in blinding.unreadable_reveals(study.path):
             if torn:
                 findings.warning(
-                    study.reveals, f"line {number} is an incomplete record of an unblinding (possibly a power failure)"
+                    study.reveals,
+                    f"line {number} is an incomplete record of an unblinding (possibly because of a power failure)",
                 )
             else:
                 findings.error(
