@@ -75,7 +75,7 @@ _COMPRESSION = ("zstd", 9)
 def _columns(field: SampleField) -> list[Column]:
     """Return the columns of a recording that store a field of ``layout.SAMPLE``."""
     kind: Kind = "flag" if field.stored is np.bool_ else "integer" if issubclass(field.stored, np.integer) else "number"
-    meanings = [field.meaning.replace("*", meaning) for meaning in field.parts.values()] or [field.meaning]
+    meanings = [field.meaning.replace("{component}", meaning) for meaning in field.parts.values()] or [field.meaning]
     return [
         Column(name, kind, meaning, unit=field.unit, levels=field.levels, minimum=field.minimum, maximum=field.maximum)
         for name, meaning in zip(field.named(), meanings, strict=True)

@@ -386,8 +386,8 @@ def _limiters(swept: Swept) -> Iterator[str]:
 
 def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
     yield "RMS difference between the sent force and the model force clamped to 8 N, with the hand attached (worst of"
-    yield "twelve motions), as a percentage of the RMS force; * marks more than 5 % and 0.05 N. The second number is the"
-    yield "largest proportion of ticks with such a difference."
+    yield "twelve motions), as a percentage of the RMS force; * marks more than 5 % and 0.05 N. The second number is"
+    yield "the largest proportion of ticks with such a difference."
     yield f"{'rate, ticks of delay':22}" + "".join(f"{f'{rate_hz:g} Hz, {delay}':>16}" for rate_hz, delay in LOOPS)
     for liquid, row in itertools.groupby(fidelities, key=lambda one: one.liquid):
         cells = (f"{f'{fidelity.share:.1%}' + ' *'[not fidelity.within]} {fidelity.beyond:6.1%}" for fidelity in row)

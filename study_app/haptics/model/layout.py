@@ -130,7 +130,7 @@ class SampleField:
     Attributes
     ----------
     name : of the field
-    meaning : meaning of its column in recordings, with ``*`` for that of the component; "": it is not recorded
+    meaning : meaning of its column in recordings, with ``{component}`` for its direction; "": it is not recorded
     column : name of the column, with ``*`` for the letter; "": the field's
     kind : type of its numbers
     parts : of a vector: the letter of each component, and its meaning
@@ -191,7 +191,7 @@ SAMPLE_FIELDS: Final = (
     SampleField("fresh", "true if the device reported a new sample.", stored=np.bool_),
     _VECTOR(
         "position_m",
-        "Exact position of the hand, *.",
+        "Exact position of the hand, {component}.",
         column="position_*_m",
         unit="m",
         stored=np.float64,
@@ -199,29 +199,31 @@ SAMPLE_FIELDS: Final = (
     ),  # device, hand frame
     _SPEED(
         "velocity_mps",
-        "Velocity in the scene from which the force was computed (resolution: 1/4096 m/s), *.",
+        "Velocity in the scene from which the force was computed, {component} (resolution: 1/4096 m/s).",
         column="velocity_*_mps",
         stream="velocity_*",
     ),  # after estimator and compression
     _SPEED(
-        "wake_mps", "Velocity of the liquid's wake in the scene (resolution: 1/4096 m/s), *.", column="wake_*_mps"
+        "wake_mps",
+        "Velocity of the liquid's wake in the scene, {component} (resolution: 1/4096 m/s).",
+        column="wake_*_mps",
     ),  # as used by this tick's drag
     _FORCE(
         "device_force_n",
-        "Force that the device applied to the hand (resolution: 1/16384 N), *.",
+        "Force that the device applied to the hand, {component} (resolution: 1/16384 N).",
         column="device_force_*_n",
         stream="force_*",
     ),
     _FORCE(
         "command_n",
-        "Force that the servo commanded but the device did not apply, *.",
+        "Force that the servo commanded but the device did not apply, {component}.",
         column="undelivered_*_n",
         beside="device_force_n",
         since=2,
     ),
     _FORCE(
         "force_n",
-        "Part of the liquid's force that was held back, *; the liquid's force is device_force + withheld.",
+        "Part of the liquid's force that was held back, {component}; the liquid's force is device_force + withheld.",
         column="withheld_*_n",
         beside="device_force_n",
     ),  # sum of the effects on the body, before slope limit and safety
@@ -255,7 +257,7 @@ SAMPLE_FIELDS: Final = (
     ),
     _VECTOR(
         "device_velocity_mps",
-        "Velocity of the hand as measured by the device (NaN if not measured), *.",
+        "Velocity of the hand as measured by the device, {component} (NaN if not measured).",
         column="device_velocity_*_mps",
         unit="m/s",
         stored=np.float64,
@@ -264,7 +266,7 @@ SAMPLE_FIELDS: Final = (
     ),
     _VECTOR(
         "orientation",
-        "Orientation of the handle in the hand frame: component * of a unit quaternion; NaN if not measured.",
+        "Orientation of the handle in the hand frame: component {component} of a unit quaternion; NaN if not measured.",
         column="orientation_*",
         parts=_QUATERNION,
         measured=MEASURED_ORIENTATION,
