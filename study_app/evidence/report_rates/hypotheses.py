@@ -62,7 +62,7 @@ def false_claims() -> Iterator[DrawnStudies]:
 def true_claims() -> Iterator[DrawnStudies]:
     """Yield studies in which the claim is true."""
     yield DrawnStudies(
-        name="thresholds of two blocks, 1.5 : 1, 3-down-1-up, 60 trials",
+        name="thresholds in two blocks, ratio 1.5 : 1, 3-down-1-up, 60 trials",
         participants=12,
         claim=_SHOWN,
         trial=_compares_thresholds(12, 1.5),
@@ -84,7 +84,7 @@ METHOD: Final = UpDown(rule="3down1up", trials=30, tracks=2)
 
 def _thresholds() -> Iterator[DrawnStudies]:
     yield DrawnStudies(
-        name="thresholds of two blocks, equal, 3-down-1-up, 60 trials",
+        name="thresholds in two blocks, equal, 3-down-1-up, 60 trials",
         participants=12,
         claim=_SHOWN,
         trial=_compares_thresholds(12, 1.0),
@@ -226,12 +226,12 @@ def _trends() -> Iterator[DrawnStudies]:
     """Yield skewed individual trends with mean 0, so that ranks fall, and with rank correlation 0."""
     for n in (12, 30):
         yield DrawnStudies(
-            name="own trends, skewed, mean 0: ranks fall",
+            name="individual trends, skewed, mean 0: ranks fall",
             participants=n,
-            claim="a rise shown",
+            claim="an increase shown",
             trial=_follows(n, 0.0, "rise"),
         )
-        name = "own trends, skewed, mean rank correlation 0"
+        name = "individual trends, skewed, mean rank correlation 0"
         yield DrawnStudies(
             name=name, participants=n, claim="a trend shown", trial=_follows(n, _shift_without_trend(), "either")
         )

@@ -249,7 +249,7 @@ def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
     limited = sum(rate.holds != "counted" for rate in rates)
     closing = "every rate is within its limit"
     if not limited:
-        closing = "no rate was counted"
+        closing = "no rate was computed"
     elif beyond:
         closing = f"{beyond} of {limited} rates exceed their limits, {undecided} undecided"
     elif undecided:
@@ -268,9 +268,9 @@ Event: TypeAlias = tuple[str, _Limit]
 _Truth: TypeAlias = tuple[Array, ...]
 """True differences of means to the first setting (settings, items), of each block."""
 
-LOST: Final[Event] = ("a part of the report is lost", "none")
-CLAIMED: Final = "the first page claims something"
-_ANYWHERE: Final = "anything in the report claims something"
+LOST: Final[Event] = ("part of the report is missing", "none")
+CLAIMED: Final = "the first page claims an effect"
+_ANYWHERE: Final = "any part of the report claims an effect"
 
 
 @dataclass(frozen=True, slots=True)
@@ -374,7 +374,7 @@ def _modelled(result: BlockResult) -> Iterator[tuple[Event, bool]]:
 def _in_liquids(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
     if cell.extent in _NO_EFFECT:
         yield (
-            ("settings differ in a statement", "at most 5 %"),
+            ("conditions differ in a statement", "at most 5 %"),
             any(test.verdict in FOUND for test in SettingsDiffer.of(result)),
         )
         yield ("liquids recognised", "at most 5 %"), _recognised(result)
@@ -489,8 +489,8 @@ def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
     for n, spread_ms, never, words in (
         (5, 0.0, 0.0, "one threshold for all"),
         (12, 0.0, 0.0, "one threshold for all"),
-        (12, 35.0, 0.0, "thresholds of people, SD 35 ms"),
-        (12, 60.0, 0.0, "thresholds of people, SD 60 ms"),
+        (12, 35.0, 0.0, "participants' thresholds, SD 35 ms"),
+        (12, 60.0, 0.0, "participants' thresholds, SD 60 ms"),
         (12, 15.0, 1 / 6, "one in six never agrees"),
     ):
         tests[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
