@@ -159,8 +159,8 @@ _HEADINGS: Final = (
     "drag laws differ by", "strokes, known velocity", "strokes, estimated velocity", "ns per tick",
 )  # fmt: skip
 _WHAT: Final = (
-    "Errors are RMS errors divided by the RMS force, with known velocities, for the reference with the largest "
-    "error: creeping flow at Re 0.01, experiments on steady drag, and a fluid solver at 1 kHz. Unsteady drag "
+    "Errors are RMS errors divided by the RMS force, with known velocities. Each is the largest over several "
+    "references: creeping flow at Re 0.01, experiments on steady drag, and a fluid solver at 1 kHz. Unsteady drag "
     "predicts each motion with constants fitted to the other motions. Motions have been solved up to Re {:.3g}, or "
     f"up to the scene's highest speed. Above Re {_NO_REFERENCE_REYNOLDS:g} there is no reference for unsteady motion, "
     "and the uncertainty of steady drag is the difference between the published laws. Strokes are compared with the "

@@ -236,8 +236,8 @@ def evidence(delays: Delayed) -> Evidence:
     """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
     width, height = delays.size_px
     head = (
-        f"{delays.seconds:g} s of reaching at each delay, the tank at {width} × {height}; error: achieved minus "
-        "requested delay, from the drawn sample to the end of painting; late: more than one frame late. "
+        f"{delays.seconds:g} s of reaching at each delay, with the tank at {width} × {height}; error: achieved "
+        "minus requested delay, from the drawn sample to the end of painting; late: more than one frame late. "
         f"{delays.machine}."
     )
     lines = [head]
