@@ -141,7 +141,7 @@ def _fitted(model: CumulativeModel, likelihood: "_Likelihood", direction: Direct
 
 _MOST_LOG_ODDS: Final = 15.0
 _SEPARATED: Final = (
-    "no cumulative model: the conditions or the participants separate the answers, so the likelihood has no maximum"
+    "no cumulative model: the conditions or the participants separate the answers, so the model cannot be fitted"
 )
 _SEVERAL: Final = "there is no single effect size, because there is one log odds ratio per condition"
 
