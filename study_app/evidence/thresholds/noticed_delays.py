@@ -149,28 +149,24 @@ def draw(comparison: Compared) -> Figure:
     thresholds.set(ylim=(0, 205), yticks=[0, 50, 100, 150, 200])
     delays, (middle, low, high) = np.linspace(1.0, 200.0, 200), comparison.detected_ms
     correct = success("weibull", np.log10(delays), np.log10(middle), LINEAR_WIDTH, GUESS, LAPSE)
-    shares.plot(delays, correct, color=style.TEXT, dashes=(4, 2), label=f"correct in {FORCED_CHOICE}")
+    shares.plot(delays, correct, color=style.TEXT, dashes=(4, 2), label=f"{FORCED_CHOICE}, correct")
     shares.plot([middle], [GUESS + (1 - GUESS - LAPSE) / 2], "s", markersize=4, color=style.TEXT)
     thresholds.axhspan(low, high, color=style.BAND, linewidth=0)
     thresholds.axhline(middle, color=style.TEXT, dashes=(4, 2), label=FORCED_CHOICE)
-    thresholds.axhline(
-        _THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="“125 ms” in the thesis"
-    )
+    thresholds.axhline(_THESIS_MS, color=style.TEXT_SOFT, linewidth=0.8, dashes=(1, 1.5), label="thesis, 125 ms")
     for rating, colour in zip(comparison.rated, (*style.STEPS[1 : 1 + len(criteria)], style.WARN), strict=True):
         test, at = rating.found, 1000 * rating.criterion_s + (5 if rating.adapted_s else 0)
         if test.effect is None or test.width is None or test.guess is None or test.lapse is None:
             continue
         if test.lower is not None and test.upper is not None:
             thresholds.plot([at, at], [test.lower, test.upper], color=colour, linewidth=1.0)
-        name = (
-            f"{LIKERT}, adapted to {1000 * rating.adapted_s:.0f} ms" if rating.adapted_s else f"{LIKERT}, by criterion"
-        )
+        name = f"adapted to {1000 * rating.adapted_s:.0f} ms" if rating.adapted_s else LIKERT
         label = name if rating.adapted_s or at == criteria[0] else None
         thresholds.plot([at], [test.effect], "D" if rating.adapted_s else "o", markersize=4, color=colour, label=label)
         if not rating.adapted_s:
             shares.plot(test.levels, np.array(test.yes) / test.asked, "o", markersize=3, color=colour)
             agree = success("logistic", delays, test.effect, test.width, test.guess, test.lapse)
-            shares.plot(delays, agree, color=colour, label=f"agree in {LIKERT}, criterion {at:.0f} ms")
+            shares.plot(delays, agree, color=colour, label=f"{LIKERT}, {at:.0f} ms")
     for axes in (shares, thresholds):
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.18), ncols=2, frameon=False, fontsize=7.2)
     return figure
