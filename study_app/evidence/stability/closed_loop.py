@@ -276,6 +276,7 @@ TRACE = np.dtype(
         ("permitted_n", np.float64),  # size of the force after slope limit, norm and fade
         ("withheld_n", np.float64),  # size of the change by passivity controller and slew limit
         ("delay", np.int64),  # of the device: how many ticks ago the acting force was sent
+        ("assumed", np.int64),  # the delay that the servo assumes [ticks]
         ("limiters", np.int64),
     ],
     align=True,
@@ -425,6 +426,7 @@ def write_row(model: Any, safety: Any, sample: Any, handle: Any, row: Any) -> No
     for axis in range(3):
         row.drift_mps[axis] = model.state[0].drift_mps[axis] / model.parameters[0].scale
     row.reserve_j = safety.passivity.reserve_j
+    row.assumed = safety.delay_ticks
     row.permitted_n = norm(safety.permitted_n)
     row.withheld_n = distance(safety.permitted_n, sample.device_force_n)
     row.limiters = sample.limiters
@@ -444,6 +446,7 @@ def play(model: Any, safety: Any, sample: Any, handle: Any, pace: Any, loop: Any
             handle.position_m[axis] = places_m[k, axis]
             handle.velocity_mps[axis] = trace[k].velocity_mps[axis]
         sample.fresh, loop.measured = trace[k].fresh, trace[k].measured
+        safety.delay_ticks = trace[k].assumed
         copy(trace[k].error_m, loop.error_m)
         _read(sample, handle, pace, loop)
         _settle_passivity(safety.passivity)
@@ -458,6 +461,7 @@ def _settle_passivity(passivity: Any) -> None:
     passivity.balance_j = passivity.late_balance_j = passivity.later_balance_j = passivity.fast.balance_j = math.inf
     passivity.gain = 1.0
     passivity.settling = passivity.reversals = 0
+    passivity.acting_s = 0.0
     clear(passivity.velocity_mps)
 
 

@@ -39,7 +39,8 @@ samples, is not: its oscillation would return with the gain.
 
 With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
 there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
-which it neither supplies nor absorbs energy.
+which it neither supplies nor absorbs energy. It also falls while the controller has recently changed the force in more
+than the ``acting_share`` of the rules: such a force is not that of the liquid, and the changes themselves can be felt.
 
 A handle that was let go may also oscillate without a debt, since buoyancy or the liquid's reserve supplies the energy.
 From six successive reversals on, each sooner than a hand can reverse, the gain falls until the oscillation ends, at
@@ -152,6 +153,7 @@ SURE_MPS = 0.04
 _BRAKE = 0.5
 _RECOVERY_PER_S = 0.5
 _INDEBTED_S = 0.1
+_ACTING_S = 0.5
 _HAND_S = 16e-3
 _FAST_MPS = 0.2
 _FAST_J = 2e-3
@@ -196,6 +198,7 @@ def reset_observer(passivity: layout.Record) -> None:
     clear(passivity.peak_mps)
     passivity.peak_m2ps2 = passivity.reversed_s = 0.0
     passivity.reversals = 0
+    passivity.acting_s = 0.0
     passivity.debt = layout.DEBT_NONE
     passivity.longest_m = 0.0
     passivity.strongest_n = 0.0
@@ -290,7 +293,8 @@ def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_
     passivity.fast_s = (passivity.fast_s + lasted_s) / (1.0 + interval_s / _PUSHED_S)
     passivity.quiet_s = 0.0 if square_m2ps2 > _QUIET_MPS * _QUIET_MPS else passivity.quiet_s + interval_s
     passivity.gap_s = 0.0 if is_gap(parameters, interval_s) else passivity.gap_s + interval_s
-    _count_reversals(parameters, passivity, min(_SWING_WEIGHT * weight, 1.0), interval_s)
+    if parameters.link.acts == 0:
+        _count_reversals(parameters, passivity, min(_SWING_WEIGHT * weight, 1.0), interval_s)
 
 
 @part
@@ -369,7 +373,7 @@ def reduce_gain(
     """Multiply the force by a gain, which a debt reduces at once and which recovers within seconds."""
     left_j = min(_left_j(passivity), INCREMENTAL_ALLOWANCE_J + passivity.fast.balance_j)
     left_j = _judge_debt(parameters, state, passivity, left_j)
-    if passivity.reversals >= _REVERSALS and parameters.link.acts == 0:
+    if passivity.reversals >= _REVERSALS:
         passivity.debt = layout.DEBT_OWN
         calmed = max(passivity.gain * (1.0 - parameters.period_s / _CALMED_S), _LEAST_GAIN)
         passivity.gain = min(passivity.gain, calmed)
@@ -377,8 +381,11 @@ def reduce_gain(
         passivity.gain = min(passivity.gain + parameters.period_s / _REGAINED_S, 1.0)
     elif parameters.link.acts == 0:
         passivity.gain = min(passivity.gain * (1.0 + _RECOVERY_PER_S * parameters.period_s), 1.0)
-    elif left_j < 0.0:
-        passivity.gain *= max(1.0 - parameters.period_s / _INDEBTED_S, 0.0)
+    else:
+        passivity.acting_s += parameters.period_s if passivity.settling else 0.0
+        passivity.acting_s /= 1.0 + parameters.period_s / _ACTING_S
+        if left_j < 0.0 or passivity.acting_s > parameters.rules.acting_share * _ACTING_S:
+            passivity.gain *= max(1.0 - parameters.period_s / _INDEBTED_S, 0.0)
     if left_j < 0.0:
         passivity.gain = min(passivity.gain, HALVING_J / (HALVING_J - left_j))
     if passivity.gain < 1.0:

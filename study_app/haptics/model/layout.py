@@ -513,6 +513,7 @@ PASSIVITY = np.dtype(
         ("peak_m2ps2", np.float64),  # the square of that
         ("reversed_s", np.float64),  # time since that reversal
         ("reversals", np.int64),  # number of successive ones, each sooner than a hand can reverse
+        ("acting_s", np.float64),  # how long the controller recently changed the force; only with a force link
         ("debt", np.int64),  # DEBT_*: why force is or was withheld
         ("longest_m", np.float64),  # the longest step so far
         ("strongest_n", np.float64),  # the strongest force so far

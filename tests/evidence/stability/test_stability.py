@@ -12,7 +12,7 @@ from study_app.errors import StudyError
 from study_app.evidence.stability import stability_report as stability
 from study_app.evidence.stability.case_groups import Group, evenly_chosen, groups, sweep
 from study_app.evidence.stability.stability_cases import Case, liquids, parse, scene_of
-from study_app.evidence.stability.verdict import Verdict, judge
+from study_app.evidence.stability.verdict import STABLE, Verdict, judge
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.slope_limits import slope_limit_table
 from study_app.workers.executors import open_executor
@@ -63,6 +63,30 @@ def test_verdicts_do_not_depend_on_the_executor(all_workers):
         found.append(repr(dataclasses.replace(judged, took_s=0.0)))
     assert len(judged.on) == 6
     assert all(verdicts == found[0] for verdicts in found)
+
+
+NOISY_SAMPLES = "quantum_um=60 noise_um=30 viscous_nspm=0.5"
+FALLBACK = (
+    f"estimator=kalman hand=light motion=stroke speed_mps=0.1 coulomb_n=0.3 missed=0.02 plant=arm {NOISY_SAMPLES}"
+)
+CHOPPED = "rate_hz=2000 hand=thrown viscous_nspm=0 quantum_um=20"
+
+
+@compiled
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"liquid=physical_tar scale=3 delay=0 slows_to=1 {FALLBACK}",
+        f"liquid=slime_shampoo scale=20 rate_hz=2000 slows_to=2 hand=thrown estimator=kalman speed_mps=1"
+        f" {NOISY_SAMPLES}",
+        f"liquid=damper scale=1 delay=2 motion=circles mass_kg=0.25 missed=0.02 force_delay_ms=50 {CHOPPED}",
+        f"liquid=physical_honey scale=10 delay=3 estimator=kalman speed_mps=1 mass_kg=0.03 noise_um=30 force_loss=0.5"
+        f" force_delay_ms=20 force_jitter_ms=50 {CHOPPED}",
+    ],
+    ids=["estimator changes with the delay", "the same in a free handle", "late force of a damper", "jitter and loss"],
+)
+def test_cases_of_earlier_sweeps_are_stable(line):
+    assert judge(parse(line), safe=True).grade == STABLE
 
 
 @compiled

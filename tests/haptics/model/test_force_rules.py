@@ -24,6 +24,7 @@ RELEASED = {
     "most_known_inertia": 7.0,
     "most_known_scale": 3.0,
     "swing_mps": math.inf,
+    "acting_share": math.inf,
 }
 
 
