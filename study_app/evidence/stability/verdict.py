@@ -15,9 +15,7 @@ A case with any reason but noise is **unstable**; one with noise alone is **nois
 neither supplies energy nor persists.
 
 Where a study delays the force, the handle works at the bounds of the controller: an encoder count and the noise count
-for the energy, the handle may swing with the energy that the controller tolerates, 1 mJ (100 mm/s with 0.2 kg), and the
-force may be a fifth more than that of the motion without feedback. Jitter and loss excite the moving handle with a step
-in every few ticks, which that motion lacks: there the force counts as sustained only once the hand rests or has let go.
+for the energy, the swing may reach 100 mm/s, and the force a fifth more than that of the motion without feedback.
 
 "The same motion without feedback" is the most restless of three: the hand's own as long as it holds the handle, the
 motors off; the handle's, without what is faster than 40 Hz; and the latter with the encoder's last count undecided, as
@@ -68,6 +66,8 @@ MISJUDGED_ALLOWANCE_J: Final = 10e-3
 _SLOW_HZ: Final = 12.0
 FAST_HZ: Final = 40.0
 SWING_MPS: Final = 0.04
+_LATE_SWING_MPS: Final = 0.1
+"""The same of a force that a study delays: 1 mJ, which the controller tolerates, moves 0.2 kg at this speed."""
 _LATE_SHARE: Final = 0.2
 """Such a force is restless beyond this share of the one without feedback: jitter and loss make steps of its size."""
 _ONCE_S: Final = 0.1
@@ -157,12 +157,11 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
     if case.misjudged:
         permitted_j = min(permitted_j, -MISJUDGED_ALLOWANCE_J)
     swing_mps = swing(trace, case)
-    most_mps = math.sqrt(2.0 * ALLOWANCE_J / case.mass_kg) if linked else SWING_MPS
     restlessness = _restlessness(case, trace, before, limits, late_share=_LATE_SHARE if linked else 0.0)
     reasons = reasons_of(
         limit=safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
         energy=balance_j < permitted_j,
-        oscillation=swing_mps > most_mps,
+        oscillation=swing_mps > (_LATE_SWING_MPS if linked else SWING_MPS),
         restlessness=restlessness,
     )
     return Verdict(
@@ -233,8 +232,6 @@ def _restlessness(
             played.append(answer)
         controls_n = [answer.sent_n[:ends] for answer in played]
         compared.append(compare_fast(trace.sent_n[:ends], controls_n, case.rate_hz, begins, late_share=late_share))
-    if case.force_jitter_ms or case.force_loss:
-        compared[0] = compared[0]._replace(sustained=False)
     return worst_of(compared)
 
 
