@@ -68,9 +68,10 @@ _SIZES: Final = (
     "by the standard deviation of the differences, and g is Hedges' g for two groups. Their 95 % confidence intervals "
     "are calculated from the noncentral t distribution. Bayes factors are two-sided JZS Bayes factors (Rouder et al., "
     "2009) that compare the hypothesis of a difference with the null hypothesis, using a Cauchy prior with scale "
-    f"{number(PRIOR_SCALE, 3)}. Cliff's delta is the probability that an answer in the first group is larger than one "
-    "in the second, minus the probability that it is smaller; within participants, it is the proportion of "
-    "participants whose answer is larger in the first condition minus the proportion whose answer is smaller."
+    f"{number(PRIOR_SCALE, 3)}. Between groups, Cliff's delta is the probability that an answer in the first group is "
+    "larger than one in the second, minus the probability that it is smaller. Within participants, it is the "
+    "proportion of participants whose answer is larger in the first condition, minus the proportion whose answer is "
+    "smaller."
 )
 _MOST_NAMED: Final = 20
 
@@ -459,8 +460,8 @@ def answer(contrast: ContrastResult) -> str:
             else "of a group belong to a minority that is not represented in the sample"
         )
         sentences.append(
-            f"The mean {kind} lies within the equivalence bounds (equivalent). However, the data do not rule out that "
-            f"up to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
+            f"The mean {kind} lies within the equivalence bounds (equivalent). However, the data do not rule out the "
+            f"possibility that up to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
         )
     elif contrast.equivalent is not None:
         sentences.append(f"The tests do not show that the mean {kind} lies within the equivalence bounds.")
@@ -599,8 +600,8 @@ def contrast_section(results: Results) -> Iterator[str]:
         "These hypotheses are stated in the study file. Each was tested on one value per participant, using a t test, "
         "a bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
         "The adjusted p value is the largest of the three, Holm-adjusted across "
-        f"{number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that there are enough "
-        "participants and that both the t tests and the bootstrap show that the mean difference (or ratio) lies "
+        f"{number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that the sample is large enough "
+        "and that both the t tests and the bootstrap show that the mean difference (or ratio) lies "
         f"within the stated bounds (Holm-adjusted across the bounds). {_WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )

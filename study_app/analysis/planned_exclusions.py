@@ -142,7 +142,7 @@ def _fast(study: Study, limit: float | None) -> _Rows:
     for session, some in times.dropna().groupby([answers[name] for name in SESSION]):
         median = float(some.median())
         if limit is not None and median < limit:
-            yield session, f"half of the {len(some)} answers were chosen within {number(median)} s"
+            yield session, f"half of the {len(some)} answers were given within {number(median)} s"
 
 
 def undecided(study: Study, results: Results | None) -> tuple[Exclusion, ...]:

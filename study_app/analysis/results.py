@@ -71,8 +71,8 @@ class Failure:
     def why(self) -> str:
         """The text that replaces the part in a report."""
         if not self.where:
-            return f"its computation failed: {self.error}"
-        return f"its computation failed ({self.error}; {self.where}); this is a fault in the program: please report it"
+            return f"the computation failed: {self.error}"
+        return f"the computation failed ({self.error}; {self.where}); this is a fault in the program: please report it"
 
     def __str__(self) -> str:
         return f"{self.what}{f' of block {self.block}' if self.block else ''}: {self.why}"
@@ -339,12 +339,13 @@ class Results:
     contrasts: tuple[ContrastResult, ...] = ()
 
 
-SEALED: Final = "computed after unblinding, because this requires knowing which condition each code stands for"
+SEALED: Final = "computed only after unblinding, because this requires knowing which condition each code stands for"
 """The reason for results that are missing because the key is sealed."""
 
 VERDICTS_MEAN: Final = (
     "Shown: the adjusted p value is at most {alpha}. Suggested: the adjusted p value is at most {alpha}, but the "
-    "statement was not declared primary before the study; this is a lead, not a finding. Not shown: the adjusted p "
+    "statement was not specified as primary before the study; this is a lead, not a finding. Not shown: the adjusted "
+    "p "
     "value is above {alpha}, which is not evidence that the answers are the same. Out of reach: no rearrangement of "
     "these answers within participants could have made the adjusted p value significant, given the other p values in "
     "the family. A statement's adjusted p value is never below the p value of the test over all statements, which is "

@@ -153,7 +153,7 @@ def test_equality_is_corrected_over_the_hypotheses_that_state_a_bound() -> None:
     assert alone[0].p_equivalent == pytest.approx((5 / 6) ** 20)
     assert both[0].p_equivalent == pytest.approx(2 * (5 / 6) ** 20)
     assert (alone[0].equivalent, both[0].equivalent, both[2].equivalent) == (True, False, None)
-    assert "the data do not rule out that up to" in answer(alone[0])
+    assert "the data do not rule out the possibility that up to" in answer(alone[0])
 
 
 def statements(contrast: Contrast, shift: float = 0.0) -> Study:

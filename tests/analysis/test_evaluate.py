@@ -121,9 +121,9 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     assert "shown" not in {one.verdict for one in SettingsDiffer.of(liquids)}
     why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
     assert "depend on the answers" in why["equivalence test"]
-    assert "does not state which statements name" in why["recognition test"]
+    assert "does not specify which statements name" in why["recognition test"]
     assert {one.outcome.method.split(", ")[1] for one in DelayTrend.of(delays)} == {"two-sided"}
-    assert "does not state a detection question" in why["detection threshold"]
+    assert "does not specify a detection question" in why["detection threshold"]
 
 
 def test_a_bound_that_was_not_decided_is_not_made_up(tmp_path: Path) -> None:

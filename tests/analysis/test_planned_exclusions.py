@@ -58,7 +58,7 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
         (second, "fast_answers", "undecided"),
     ]
     assert found[0].why == f"100 % of the {int((own & responses['counted']).sum())} answers to statements are identical"
-    assert found[1].why == f"half of the {int((hurried & answered['counted']).sum())} answers were chosen within 0.30 s"
+    assert found[1].why == f"half of the {int((hurried & answered['counted']).sum())} answers were given within 0.30 s"
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +104,9 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     assert thresholds(study) == [None, "P001"], "not in the mean without a decision"
     report(pairs, tmp_path / "open")
     page = (tmp_path / "open" / "report.html").read_text("utf-8")
-    assert "A planned rule proposes excluding P002, session 1 (below chance); no decision has been made yet" in page
+    assert (
+        "Under a planned rule, P002, session 1 (below chance) would be excluded; no decision has been made yet" in page
+    )
     assert "two participants" in table_text(page)
     assert "1 participant)" in table_text(page)
     held = json.loads((tmp_path / "open" / "report.json").read_text("utf-8"))

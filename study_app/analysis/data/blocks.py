@@ -417,15 +417,15 @@ class Decided:
 
             alpha = self.planned_alpha or self.alpha
             return (
-                f"This look at {n} participants was unplanned; looks are planned at {planned}. An adjusted p value is "
-                f"significant if it is at most {significant(self.alpha)}, as at the last planned look. If there were "
+                f"This look at {n} participants was unplanned; looks are planned at {planned}. Adjusted p values of up "
+                f"to {significant(self.alpha)} are treated as significant, as at the last planned look. If there were "
                 "no effect and the data were tested in this way after every participant, the false-positive rate "
                 f"would be {100 * error_of_every_report(self.looks, alpha, self.spending):.1f} % instead of "
                 f"{100 * alpha:g} %."
             )
         return (
-            f"This is look {self.look} of {len(self.looks)}, planned at {planned}. An adjusted p value is significant "
-            f"if it is at most {significant(self.alpha)} ({SPENDINGS[self.spending]} alpha spending)."
+            f"This is look {self.look} of {len(self.looks)}, planned at {planned}. Adjusted p values of up to "
+            f"{significant(self.alpha)} are significant ({SPENDINGS[self.spending]} alpha spending)."
         )
 
     def is_primary(self, item: str) -> bool:
@@ -487,7 +487,7 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
     except (KeyError, TypeError, ValueError) as error:
         raise AnalysisError(
             f"a receipt does not contain the decisions about the analysis ({type(error).__name__}, {error}): it has "
-            "been changed, or was written by a different version of the program; restore it from a copy"
+            "been changed, or was written by a different version of the program; restore it from a back-up"
         ) from error
 
 

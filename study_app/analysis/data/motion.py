@@ -36,7 +36,8 @@ REACH_DEFINITIONS: Final = {
     "movement_time_s": "from the moment a target lights up until the hand enters it for the last time, excluding the "
     "dwell time",
     "path_mm": "length of the hand's path during the movement time",
-    "overshoot_mm": "largest distance beyond the far edge of the target, along the line between the targets; "
+    "overshoot_mm": "largest distance that the hand travelled beyond the far edge of the target, along the line "
+    "between the targets; "
     "0 if there was no overshoot",
     "submovements": f"number of peaks in the hand's speed (low-pass filtered at {_CUTOFF_HZ:g} Hz) before the target "
     f"was reached, with a prominence of at least {100 * _PROMINENCE:g} % of the highest peak; 1 for a single smooth "
@@ -152,7 +153,7 @@ TRIAL_DEFINITIONS: Final = {
     "path_m": "length of the hand's path during the trial",
     "force_mean_n": "mean force on the hand during the trial",
     "force_peak_n": "largest force on the hand during the trial",
-    "at_limit_percent": "proportion of servo ticks in the trial at which the force was reduced to the force limit",
+    "at_limit_percent": "proportion of the trial's servo ticks at which the force was reduced to the force limit",
 }
 
 

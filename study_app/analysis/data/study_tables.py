@@ -344,7 +344,7 @@ def load_study(folder: Path, *, planned: bool = True) -> Study:
 def _load_sites(merged: Merged, *, planned: bool) -> Study:
     places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
     if missing := [place.path for place in places.values() if not place.path.is_dir()]:
-        raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a copy")
+        raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a back-up")
     opened = has_opened_keys(merged.path)
     read = partial(_load, sealed=not opened, planned=planned)
     sites = {name: read(place.path) for name, place in places.items() if place.sessions()}
@@ -502,17 +502,17 @@ def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
 def _no_sessions(path: Path) -> str:
     if not path.is_dir():
         return (
-            f"{path} is not a folder: specify a study's folder, such as results/rek2024, or a name listed by "
-            "liquid-study studies"
+            f"{path} is not a folder: specify a study folder, such as results/rek2024, or one of the names that "
+            "liquid-study studies lists"
         )
     inside = sorted(found.name for found in path.iterdir() if found.is_dir() and StudyFolder(found).sessions())
     if inside:
         return (
-            f"{path} is not a study's folder, but contains the folders of studies ({', '.join(inside)}): specify "
+            f"{path} is not a study folder, but it contains study folders ({', '.join(inside)}): specify "
             f"one, such as {path / inside[0]}"
         )
     return (
-        f"{path} does not contain any sessions (data/sub-…/ses-…): specify the folder of a study with at least one "
+        f"{path} does not contain any sessions (data/sub-…/ses-…): specify the folder of a study that has at least one "
         "session, such as results/rek2024"
     )
 

@@ -125,8 +125,7 @@ _MEASURED: Final = (
     Column(
         "presented_excluded",
         "integer",
-        "Number of other presentations that are excluded individually in exclusions.csv; their answers are excluded "
-        "too.",
+        "Number of additional presentations that exclusions.csv excludes individually; their answers are excluded too.",
         minimum=0,
     ),
     Column("n", "integer", "Number of valid answers.", minimum=0),

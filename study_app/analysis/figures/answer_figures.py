@@ -147,7 +147,7 @@ def line_words(participants: int) -> str:
     """Return the caption's description of the thin lines."""
     if participants <= MOST_LINES:
         return "participants"
-    return f"{MOST_LINES} of the {participants} participants, chosen at even intervals from the sorted IDs"
+    return f"{MOST_LINES} of the {participants} participants, selected at regular intervals from the sorted IDs"
 
 
 def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
@@ -163,10 +163,10 @@ def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float)
 
 def legend(sheet: Sheet) -> None:
     """Draw the legend of median, band and single lines at the right, below the heading."""
-    words = ("median", "middle half (IQR)", "one participant")
+    words = ("median", "middle 50 % (IQR)", "one participant")
     y, x = 30.0, sheet.width_pt - MARGIN_PT + 12 - sum(sheet.text_width(word, SMALL) + 30 for word in words)
     for word in words:
-        if word == "middle half (IQR)":
+        if word == "middle 50 % (IQR)":
             sheet.box(x, y - 6.2, 14, 7.6, style.BAND)
         else:
             colour, width = (style.ACCENT, 1.6) if word == "median" else (style.PARTICIPANT, 0.6)
@@ -533,8 +533,8 @@ def answers_picture(
             for participant, session, status, excluded in study.participants[columns].head(5).itertuples(index=False)
         )
         raise AnalysisError(
-            f"{study.folder}: no completed session has answers in {block.id!r} yet ({states}). Figures require "
-            "completed sessions; an export contains all available data"
+            f"{study.folder}: no completed session contains answers to {block.id!r} yet ({states}). Figures "
+            "require completed sessions, but an export contains all available data"
         )
     words = _caption(study, block)
     if lowest:
@@ -602,7 +602,7 @@ def draw_recognition(
             _cell(sheet, axes, row, counts[place], sum(counts), right=right[row] == place)
     for number, name in enumerate(settings):
         sheet.text(left - 6, top + height * (number + 0.5) + 2.6, name, size=7.5, ha="right")
-    foot = "Counts, with row percentages. Outlined: the correct name."
+    foot = "Cells show counts with row percentages; correct names are outlined."
     sheet.text(MARGIN_PT, sheet.height_pt - 6, foot, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 

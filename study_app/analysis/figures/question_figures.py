@@ -134,7 +134,9 @@ def draw_options(asked: PlacedQuestion, result: QuestionResult, look: Look) -> S
 
 
 _OPTIONS: Final = _QuestionFigure(
-    "counts", draw_options, "Number of participants who chose each option; grey bars show how many answered."
+    "counts",
+    draw_options,
+    "Bars show the number of participants who chose each option; grey bars show the number who answered.",
 )
 
 
@@ -190,7 +192,7 @@ def _legend(sheet: Sheet, names: list[str], inks: list[str]) -> None:
 _RATINGS: Final = _QuestionFigure(
     "rating",
     draw_ratings,
-    "Each bar shows the proportion of answers at each point of the scale, labelled with the number of answers.",
+    "Each bar shows the proportion of answers at each point of the scale; labels show the number of answers.",
 )
 
 

@@ -112,8 +112,8 @@ def by_delay(result: BlockResult) -> list[list[str]]:
 def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithControl]) -> str:
     if all(tested.verdict == "equivalent" for tested in here):
         not_excluded = _not_excluded([tested.found for tested in here])
-        return f"Mean answers to these statements stay within the bounds, but {not_excluded}."
-    claim = f"the claim that delays up to {ms(delay_ms)} do not matter"
+        return f"The mean answers to these statements stay within the bounds, but {not_excluded}."
+    claim = f"the claim that delays of up to {ms(delay_ms)} do not matter"
     if reasons := _evidence_up_to(result, delay_ms):
         return f"These data are evidence against {claim}: {'; '.join(reasons)}."
     return f"These data neither support nor refute {claim}."
@@ -127,7 +127,7 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
     """
     exploratory = {trend.item for trend in DelayTrend.of(result) if not trend.primary}
     trends = (
-        f"agreement with “{short_text(result, lowest.item)}” shows a trend over delays up to {ms(shown_ms)}"
+        f"agreement with “{short_text(result, lowest.item)}” shows a trend over delays of up to {ms(shown_ms)}"
         + (" (exploratory)" if lowest.item in exploratory else "")
         for lowest in LowestDelay.of(result)
         if (shown_ms := lowest.over_all_ms) is not None and shown_ms <= delay_ms
@@ -167,7 +167,10 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if answers.k < 2:
             return (), (NotTested(cls.what, ONE_DELAY),)
         if bound is None:
-            why = "the protocol does not state an equivalence bound, and a bound chosen now would depend on the answers"
+            why = (
+                "the protocol does not specify an equivalence bound, and a bound chosen now could be influenced by "
+                "the answers"
+            )
             return (), (NotTested(cls.what, why),)
         compared = []
         for item in answers.block.items:
@@ -306,7 +309,10 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
                 row |= rows_alone(self.found, f"stepping down within {lowest.item}") | {
                     "members": len(lowest.steps.steps)
                 }
-                row |= {"correction": "none: fixed-sequence tests that stop at the first non-significant result"}
+                row |= {
+                    "correction": "none: the tests are run in a fixed sequence that stops at the first "
+                    "non-significant result"
+                }
                 yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
 
     def section(self) -> Iterator[str]:
@@ -354,7 +360,7 @@ class DetectionThreshold(Finding[Threshold | None]):
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[Threshold | None, Absent]:
         item = answers.decided.noticed
         if item is None or item not in answers.values:
-            return None, (NotTested(cls.what, "the protocol does not state a detection question (analysis.noticed)"),)
+            return None, (NotTested(cls.what, "the protocol does not specify a detection question (analysis.noticed)"),)
         rising = [
             test.item for test in DelayTrend.of(result) if test.verdict in FOUND and (test.outcome.effect or 0.0) > 0
         ]
@@ -576,7 +582,7 @@ def _not_excluded(tested: Sequence[Equivalence]) -> str:
     most = max(
         (equivalence.beyond.interval.high for equivalence in tested if equivalence.beyond is not None), default=1.0
     )
-    return f"the data do not rule out that up to {100 * most:.0f} % of people show a larger difference"
+    return f"the data do not rule out the possibility that up to {100 * most:.0f} % of people show a larger difference"
 
 
 def _within(against: ContrastWithControl) -> str:
@@ -626,7 +632,7 @@ class Movement(Finding[None]):
             f"Reaching movements as a function of the requested delay ({drawing.simulated}n = {people} with "
             f"recordings). Thin lines: {answer_figures.line_words(people)}; thick line: median; band: interquartile "
             "range. Movement time is measured from the moment a target lights up until the hand enters it for the "
-            f"last time. The scales do not begin at zero. {_kept(block, drawing.results)}"
+            f"last time. The axes do not start at zero. {_kept(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
         draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=True)

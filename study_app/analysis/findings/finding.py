@@ -275,7 +275,8 @@ TESTS: Final = (
     Column(
         "codes",
         "text",
-        "Codes of the conditions compared, in order and separated by spaces; + joins conditions with the same delay.",
+        "Codes of the conditions compared, in order and separated by spaces; conditions with the same delay are "
+        "joined with +.",
     ),
 )
 

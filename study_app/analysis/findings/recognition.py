@@ -60,7 +60,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         labels = answers.decided.names
         right = tuple(setting.label for setting in answers.block.settings)
         if not labels or not set(labels) <= answers.values.keys() or not any(right):
-            return None, (NotTested(cls.what, "the protocol does not state which statements name these liquids"),)
+            return None, (NotTested(cls.what, "the protocol does not specify which statements name these liquids"),)
         if not 2 <= answers.k <= MOST_NAMED or len(labels) < 2:
             return None, (NotTested(cls.what, f"the test needs 2 to {MOST_NAMED} conditions and at least two names"),)
         ratings = np.stack([answers.values[label] for label in labels], axis=2)
@@ -147,7 +147,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
         if self.value is not None:
             yield (
                 "Participants were considered to have named the liquid whose statement they rated highest; ties for "
-                "the highest rating were treated as undecided and counted as incorrect. The number of correct names "
+                "the highest rating were treated as undecided and scored as incorrect. The number of correct names "
                 "was tested by permuting the liquids within participants (exact, one-sided). In addition, a liquid was "
                 "classified as recognised only if its name was used more often for it than for each of the others "
                 "(McNemar's exact test within participants, one-sided, with p values Holm-adjusted across the liquids)."

@@ -158,7 +158,7 @@ class Settings(LevelStatistic[SettingEstimate]):
             "variability of settings is not a criterion-free measure of the threshold."
         )
         if few := [str(estimate.participant) for estimate in own if estimate.hysteresis is None]:
-            words = "all settings started near the same end, so hysteresis is unknown"
+            words = "all settings started near the same end of the range, so the hysteresis is unknown"
             yield f"{title}: {words} ({listed(few[:_MOST_NAMED])})."
         yield f"{title}: {MOTORS}"
 
@@ -170,8 +170,8 @@ class Settings(LevelStatistic[SettingEstimate]):
         kind, (low, high) = KINDS[block.stimulus.level_kind], block.stimulus.levels
         yield (
             f"In “{self.found.title}”, participants set {self.found.quantity}{to} by {block.design.paper_name}; "
-            f"{kind} ranged from {low:g} to {high:g}, and settings started alternately near the lower and the upper "
-            "end of this range."
+            f"{kind} ranged from {low:g} to {high:g}, and the starting level alternated between the lower and the "
+            "upper end of this range."
         )
 
     @classmethod
@@ -181,7 +181,7 @@ class Settings(LevelStatistic[SettingEstimate]):
                 "The point of subjective equality is the mean of a participant’s settings, the just-noticeable "
                 "difference is their standard deviation, the constant error is the difference between the mean and the "
                 "standard, and the hysteresis is the mean of settings that started high minus the mean of those that "
-                "started low. All of them are computed on the logarithm of the level if levels are spaced "
+                "started low. All four are calculated from the logarithm of the level if levels are spaced "
                 "logarithmically (Gescheider 1997). Group values are means across participants with 95 % confidence "
                 "intervals (Student’s t)."
             )
@@ -340,8 +340,8 @@ class Answers(LevelStatistic[LevelAnswers]):
         if not result.adaptive:
             yield self._of_group()
             units = (
-                " To remove the effect of each participant's choice of unit, the interval is based on ln answers minus "
-                "the participant's mean."
+                " To remove the effect of each participant's choice of unit, the interval is calculated from the ln "
+                "answers after subtracting the participant's mean ln answer."
             )
             yield paragraph(
                 f"The table shows the {mean_words(result)} across participants, with a 95 % confidence interval "

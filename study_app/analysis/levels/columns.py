@@ -20,8 +20,8 @@ JUDGED: Final = (
     Column(
         "counted",
         "flag",
-        "true if the row is included in the aggregate table and the figures, that is, if it is the last attempt of a "
-        "main trial in a completed session and is not excluded. Invalid trials are included too.",
+        "true if the row is included in the aggregate table and the figures, that is, if it belongs to the last "
+        "attempt at a main trial in a completed session and is not excluded. Invalid trials are included too.",
     ),
 )
 
@@ -44,12 +44,15 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     Column(
         "analysed",
         "flag",
-        "true if the answer is analysed. It is false if the trial presents the modulus of a magnitude estimation, or "
-        "if the session's answers in the block are below chance and nobody has decided to keep the session.",
+        "true if the answer is analysed; false if the trial presents the modulus in a magnitude-estimation block, or "
+        "if the session's answers in the block are below chance and no decision has been made to keep the session.",
     ),
     Column("track", "text", "Meaning of the code: the standard and the track number (such as 8/1), or the condition."),
     Column(
-        "slot", "integer", "Position of the trial among the session's trials with the same code, from 1.", minimum=1
+        "slot",
+        "integer",
+        "Position of the trial among the session's trials with the same code, starting at 1.",
+        minimum=1,
     ),
     _INTERVALS["catch"],
     _INTERVALS["standard"],
@@ -73,13 +76,20 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     optional(
         "comparison_interval",
         "integer",
-        "Number of the interval with the comparison, from 1; n/a unless exactly one interval contains it.",
+        "Number of the interval that contains the comparison, starting at 1; n/a unless exactly one interval contains "
+        "it.",
         minimum=1,
     ),
     optional("response", "text", "The answer; n/a if there is no answer."),
     optional("value", "number", "The answer as a number; n/a if it is not a number."),
     optional("right", "flag", "true if the answer was correct; n/a if answers are neither correct nor incorrect."),
-    optional("response_s", "number", "Time from the question until an answer is first chosen.", unit="s", minimum=0),
+    optional(
+        "response_s",
+        "number",
+        "Time from the appearance of the question until an answer is first selected.",
+        unit="s",
+        minimum=0,
+    ),
     optional(
         "reversal",
         "flag",
@@ -145,14 +155,15 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "open_end",
         "text",
-        "End of the interval that the answers do not determine (the true limit lies further out); n/a if they "
-        "determine both ends.",
+        "The end of the interval that the answers do not determine, so that the true limit lies further out; n/a if "
+        "the answers determine both ends.",
         levels=(("low", "the lower end"), ("high", "the upper end"), ("both", "both ends")),
     ),
     optional(
         "beyond",
         "text",
-        "Whether the threshold lies outside the range of the stimulus's levels; n/a if it lies within it.",
+        "Shows whether the threshold lies above or below the range of the stimulus's levels; n/a if it lies within "
+        "the range.",
         levels=(("above", "above the highest level"), ("below", "below the lowest level")),
     ),
     optional(
@@ -169,11 +180,11 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
         "Slope of ln JND on ln standard across the participant's standards, with the same value in all of the "
         "participant's rows; n/a if there are fewer than two standards.",
     ),
-    optional("flat_width_threshold", "number", "The threshold under a flat prior on the width."),
+    optional("flat_width_threshold", "number", "Threshold estimated with a flat prior on the width."),
     optional(
         "reversal_mean",
         "number",
-        "Mean of the last reversals of the up–down tracks; n/a for other methods or if there are too few reversals.",
+        "Mean of the last reversals in the up–down tracks; n/a for other methods or if there are too few reversals.",
     ),
     optional(
         "target_percent",
@@ -191,7 +202,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "d_prime_model",
         "text",
-        "Model used to calculate d_prime; n/a unless there are two models for the design.",
+        "Model used to calculate d_prime; n/a unless two models exist for the design.",
         levels=(
             ("differencing", "intervals are compared with each other"),
             ("independent", "each interval is compared with known alternatives"),
@@ -256,7 +267,7 @@ def dictionary_markdown() -> str:
     """Return the columns of these tables as Markdown, with a heading and a table for each."""
     added = (
         "columns that `export` adds to the tables of responses, trials and intervals; `trials_missing` is added only "
-        "in studies whose trials consist of intervals, and the last four columns only after unblinding"
+        "in studies with interval trials, and the last four columns only after unblinding"
     )
     of_tracks = (
         "one row per trial of a block with a design; available after unblinding. It also contains the trial's IDs and "

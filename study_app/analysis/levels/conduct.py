@@ -205,11 +205,11 @@ class _Withheld(LevelStatistic[_Row]):
         for standard in dict.fromkeys(row["standard"] for row in self.rows):
             rows = [row for row in self.rows if row["standard"] == standard]
             kept = list(takewhile(lambda one: one["most_percent"] <= WITHHELD_PERCENT, rows))
-            at = "" if standard is None else f" at the standard of {standard:.4g}{of}"
+            at = "" if standard is None else f" at a standard of {standard:.4g}{of}"
             yield (
-                f"In every comparison up to {kept[-1]['high']:.3g}{of}{at}, at most {WITHHELD_PERCENT:g} % of the "
-                "force was held back."
+                f"In comparisons of up to {kept[-1]['high']:.3g}{of}{at}, the safety layer never held back more than "
+                f"{WITHHELD_PERCENT:g} % of the force."
                 if kept
-                else f"More than {WITHHELD_PERCENT:g} % of the force was held back in at least one comparison at "
-                f"the lowest level{at}."
+                else f"In at least one comparison at the lowest level{at}, the safety layer held back more than "
+                f"{WITHHELD_PERCENT:g} % of the force."
             )

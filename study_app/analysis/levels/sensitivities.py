@@ -39,9 +39,9 @@ _MODELS: Final = {
 _FROM_SHARE_CORRECT: Final = ("abx", "oddity", "3ifc", "4ifc")
 """Designs whose d′ follows from the share of correct answers alone."""
 _BIASES: Final = {
-    "2ifc": " c is above 0 if participants prefer the second interval.",
-    "yesno": " c is above 0 if participants prefer the answer “no”.",
-    "samedifferent": " k is the difference above which the answer is “different”.",
+    "2ifc": " c is positive if participants are biased towards the second interval.",
+    "yesno": " c is positive if participants are biased towards answering “no”.",
+    "samedifferent": " k is the perceived difference above which participants answer “different”.",
     **dict.fromkeys(
         _FROM_SHARE_CORRECT,
         " d′ is calculated from the proportion correct, assuming that participants do not have a response bias. A "
@@ -252,8 +252,9 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         if biased := preferences(self.own(self.found)):
             people = listed([f"{person} ({number(criterion)})" for person, criterion in biased.items()])
             yield (
-                f"{self.found.title}: {people} preferred one interval (the absolute value of the criterion c is above "
-                f"{_BIASED:g} and more than twice its standard error). Their threshold fits allow for this."
+                f"{self.found.title}: {people} showed a bias towards one interval (the absolute value of the "
+                f"criterion c is above {_BIASED:g} and more than twice its standard error). Their threshold fits allow "
+                "for this bias."
             )
 
     def explained(self) -> str:

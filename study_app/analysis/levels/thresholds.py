@@ -538,12 +538,14 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             ""
             if percent is None
             else " The mean of the reversals is the classical estimate for an up–down track; it estimates the level "
-            f"with {percent:.1f} % {result.counts}."
+            f"that yields {percent:.1f} % {result.counts}."
         )
         level = (
             ""
             if compared is None
-            else f" “At {compared:g} %” is the level with {compared:g} % {result.counts}, as for the published value."
+            else f" “At {compared:g} %” is the level that yields {compared:g} % {result.counts}, the criterion used "
+            "for "
+            "the published value."
         )
         function = FAMILIES[result.family or ""]
         return (
@@ -551,9 +553,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             f"the guess rate and one minus the lapse rate{at}. The estimate is the posterior median with an "
             "equal-tailed 95 % interval, based on all analysed answers at the levels delivered to the hand. The "
             "width, from 5 to 95 % of the rise, has a log-normal prior; the next column shows the threshold under a "
-            "flat prior. “Above” and “below” mark thresholds outside the levels of the stimulus; “<” and “>” mark "
-            "interval ends that the answers do not determine. Intervals allow a person’s threshold to differ between "
-            f"sessions by a factor of {10**SESSION_SD:.2f} (one standard deviation) and to change over the trials. The "
+            "flat prior. “Above” and “below” mark thresholds outside the range of the stimulus levels; “<” and “>” "
+            "mark "
+            "interval ends that the answers do not determine. The intervals allow for differences in a person’s "
+            f"threshold between sessions (one standard deviation is a factor of {10**SESSION_SD:.2f}) and for changes "
+            "over the trials. The "
             "group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp interval if there are at "
             "least three participants. Each variance is replaced by its geometric mean with the median "
             f"variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated data sets; for the "
@@ -599,11 +603,11 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             ),
             (
                 lambda estimate: estimate.beyond == "above",
-                "a threshold lies above the highest level of the stimulus, by an unknown amount",
+                "a threshold lies an unknown amount above the highest level of the stimulus",
             ),
             (
                 lambda estimate: estimate.beyond == "below",
-                "a threshold lies below the lowest level of the stimulus, by an unknown amount",
+                "a threshold lies an unknown amount below the lowest level of the stimulus",
             ),
             (lambda estimate: not estimate.fits, "the function does not fit the answers, so a threshold may be biased"),
             (
@@ -666,9 +670,9 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             if group.if_many_lapses is not None
         ]:
             yield (
-                f"{self.found.title}: the answers do not rule out a mean lapse rate of {100 * MANY_LAPSES:g} %; the "
-                f"group's threshold would then be {listed(thresholds)}. Catch trials far above the threshold would "
-                "determine the lapse rate."
+                f"{self.found.title}: the answers do not rule out a mean lapse rate of {100 * MANY_LAPSES:g} %, at "
+                f"which the group's threshold would be {listed(thresholds)}. Catch trials far above the threshold "
+                "would provide an estimate of the lapse rate."
             )
 
     def _limit_of_device(self) -> str:
@@ -684,7 +688,7 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         words = (
             f"{result.title}: the device's own damping of {own.damping_nspm:.2g} N·s/m, friction of "
             f"{own.friction_n:.2g} N and mass of {own.mass_kg:.2g} kg{where} add to the force delivered by the "
-            "motors. Weber fractions refer to the motors' force only"
+            "motors. Weber fractions refer only to the force delivered by the motors"
         )
         shares = [
             f"{share:.3g} instead of {row.threshold:.3g} at {row.standard:g} {result.unit}"
@@ -717,9 +721,10 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 "Thresholds are posterior medians, computed on a grid, with equal-tailed 95 % intervals, based on all "
                 "analysed answers at the levels delivered to the hand. The deviance was compared with the deviances "
                 f"of {SETS} simulated data sets, and drift is the correlation between trial number and deviance "
-                "residual (Wichmann & Hill 2001). Intervals allow a person’s threshold to differ between sessions by "
-                f"a factor of {10**SESSION_SD:.2f} (one standard deviation; from data in Jäkel & Wichmann 2006), and "
-                f"to change over the trials if the change exceeded {BEYOND_CHANCE:g} standard errors. The posterior "
+                "residual (Wichmann & Hill 2001). The intervals allow for differences in a person’s threshold between "
+                f"sessions (one standard deviation is a factor of {10**SESSION_SD:.2f}; from data in Jäkel & Wichmann "
+                f"2006), and for a change over the trials if it exceeded {BEYOND_CHANCE:g} standard errors. The "
+                "posterior "
                 f"averages over linear changes (prior: a factor of {CHANGE_PRIOR:g}), so the threshold refers to the "
                 f"middle of the trials. We assumed that {100 * ALIKE:.0f} % of the standard deviation of log widths "
                 "is due to differences between participants and that lapse rates vary around a common mean, so each "

@@ -324,12 +324,12 @@ COLUMNS: Final = (
     optional(
         "without_effect",
         "number",
-        "The same proportion if the conditions do not differ, that is, the rate of false positives (for equivalence, "
-        "the power).",
+        "The same proportion if the conditions do not differ, that is, the false-positive rate (for equivalence, the "
+        "power).",
         minimum=0,
         maximum=1,
     ),
-    optional("effect_points", "number", "The difference between the mean answers in the model, in points."),
+    optional("effect_points", "number", "Difference between the mean answers assumed in the model, in points."),
     optional(
         "detectable_points",
         "number",
@@ -440,7 +440,7 @@ def _preface(power: Powers) -> list[str]:
         if block.groups
         for line in (
             "",
-            f"{block.title}: n is the number of participants in {' and '.join(block.groups)}, because other groups do "
+            f"{block.title}: n counts only the participants in {' and '.join(block.groups)}, because other groups do "
             "not complete this block.",
         )
     ]
@@ -522,8 +522,8 @@ def form_differences(
     """
     of = "answers or scores" if contrast.within is None else "within-participant differences"
     said = (
-        f"Answers to this form are not simulated. Numbers are multiples of the standard deviation (SD) of the {of}, "
-        "which you can take from pilot sessions or published data."
+        f"Answers to this form are not simulated. Differences are expressed in standard deviations (SD) of the {of}; "
+        "you can obtain the SD from pilot sessions or published data."
     )
     rows = [(contrast.measure, "1", 1.0)]
     yield from smallest_differences(
@@ -655,16 +655,17 @@ def _explained(question: Question, found: Powers) -> list[str]:
             return [f"Trends are tested with {by}; the test is one-sided if the protocol states a direction."]
         case "lowest delay":
             return [
-                "As long as there is a trend, the longest delay is dropped and the rank correlations are tested "
-                "again; the result is an upper bound for the lowest noticeable delay."
+                "If there is a trend, the longest delay is dropped and the rank correlations are tested again, until "
+                "no trend remains; the result is an upper bound for the lowest noticeable delay."
             ]
         case "equivalence":
             bound = found.plan.decided.equivalence_bound or STEPS
             return [
                 f"Equivalence is tested with two one-sided t tests (bounds {bound_text(bound)}) and a bootstrap; both "
                 "must show equivalence. Equivalence also requires "
-                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the model's difference is near or "
-                "outside the bounds, few studies should find equivalence; outside the bounds, such a finding is wrong."
+                f"{min_sample_reason(found.plan.decided.alphas[-1], bound)}. If the difference in the model is near or "
+                "outside the bounds, few studies should find equivalence; if it is outside the bounds, such a finding "
+                "is wrong."
             ]
         case "contrast":
             return [

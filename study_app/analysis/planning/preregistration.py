@@ -84,13 +84,13 @@ def read_commitment(folder: Path) -> Commitment | None:
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError) as error:
-        raise AnalysisError(f"{path} cannot be read ({error}): restore it from a copy") from error
+        raise AnalysisError(f"{path} cannot be read ({error}): restore it from a back-up") from error
     try:
         return TypeAdapter(Commitment).validate_json(blocks[-1], strict=True)
     except (IndexError, ValueError) as error:
         raise AnalysisError(
             f"{path} does not end with the block that `liquid-study preregister` writes ({type(error).__name__}): "
-            "restore the file from a copy, or remove it"
+            "restore the file from a back-up, or remove it"
         ) from error
 
 
@@ -150,7 +150,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
     at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
     yield (
-        f"Block {block.id}: what is the {kind} for {what}{at}? We estimate it with a 95 % interval and do not test it."
+        f"Block {block.id}: what is the {kind} for {what}{at}? We report an estimate with a 95 % interval but no test."
     )
     if len(standards) > 1:
         yield (
@@ -323,7 +323,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
 def _design(protocol: Protocol) -> Iterator[str]:
     study = protocol.study
     yield (
-        "Conditions are known only by codes until the key is opened. The study is "
+        "Conditions are identified only by codes until the key is opened. The study is "
         + (
             "double-blind: the operator does not see the force."
             if study.blinding == "double"
@@ -344,11 +344,13 @@ def _design(protocol: Protocol) -> Iterator[str]:
         )
     for group, words in block_orders_by_group(protocol).items():
         yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
-    yield "Trial orders are generated for each participant from the session's seed, as described below for each block."
+    yield (
+        "The trial orders of each participant are generated from the session's seed, as described below for each block."
+    )
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
         kind = "levels" if block.stimulus is not None else "conditions"
-        yield f"Block {block.id} compares {kind}, which are described below." + (
+        yield f"Block {block.id} compares {kind} (described below)." + (
             f" Expected precision: {rows['Expected precision']}." if rows else ""
         )
 
@@ -403,7 +405,7 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
 
 
 def _exclusions(protocol: Protocol) -> Iterator[str]:
-    yield "Sessions that are not completed are not analysed."
+    yield "Incomplete sessions are not analysed."
     for block in protocol.main_blocks:
         if block.catch is not None:
             yield (
@@ -422,12 +424,13 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         )
         if (permitted := protocol.limits.missing_percent) is not None:
             yield (
-                f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of its main '
-                "interval trials remain unanswered because none of the presentations met the limits for valid trials."
+                f'Rule "missing": a session is excluded as incomplete if more than {permitted:g} % of the '
+                "interval trials in its main blocks remain unanswered because none of their presentations met the "
+                "limits for valid trials."
             )
     if any(block.design is None for block in protocol.main_blocks):
         trials = "Other trials" if has_intervals else "Trials"
-        yield f"{trials} that exceed a limit are analysed, and their number is reported."
+        yield f"{trials} that exceed a limit are included in the analysis, and their number is reported."
     for rule in () if protocol.analysis is None else protocol.analysis.exclusions:
         yield (
             f'Rule "{rule.rule}": a session is proposed for exclusion if {rule.words}. The researchers decide '
@@ -480,7 +483,8 @@ def _differences(study: Study, sites: Mapping[str, Commitment | None], committed
         more = "" if len(other) <= _SHOWN else f" and {len(other) - _SHOWN} more"
         yield (
             f"{counted(len(other), 'session')} used a protocol (version {versions}) that differs from the "
-            f"preregistered one (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): {who}{more}"
+            f"preregistered protocol (version {committed.version}, SHA-256 {committed.protocol_hash[:12]}…): "
+            f"{who}{more}"
         )
     yield from _other_participants(study, committed.participants)
     by_person = [exclusion for exclusion in study.exclusions if exclusion.rule_or_person not in committed.rules]
@@ -509,8 +513,8 @@ def deviations_section(study: Study) -> Iterator[str]:
     yield heading(2, "Preregistration")
     if (committed := compared.commitment) is None:
         yield paragraph(
-            f"The study's folder does not contain {FILE}, so only the number of participants is compared with the "
-            "protocol's plan."
+            f"The study's folder does not contain {FILE}, so only the number of participants is compared with the plan "
+            "in the protocol."
         )
     else:
         yield paragraph(
@@ -523,8 +527,7 @@ def deviations_section(study: Study) -> Iterator[str]:
         yield bullets(compared.found)
     else:
         yield paragraph(
-            "The protocol, the number of participants, the exclusions and the decisions do not differ from the "
-            "preregistration."
+            "The protocol, the number of participants, the exclusions and the decisions match the preregistration."
             if compared.commitment is not None
             else "The number of participants is as planned."
         )

@@ -98,7 +98,7 @@ def plan(protocol: Protocol, features: ConditionFeatures) -> Plan:
     asked = _compared(protocol)
     if not asked:
         raise AnalysisError(
-            f"{protocol.study.name} does not contain any comparison: a power analysis needs a main block with two or "
+            f"{protocol.study.name} does not contain any comparisons: a power analysis needs a main block with two or "
             "more conditions and a questionnaire with statements"
         )
     table = None if protocol.analysis is None else protocol.analysis.model_dump(mode="json")

@@ -426,10 +426,12 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
         return (
-            "Each study simulates one type of participant, and the types alternate. They differ in the width of the "
+            "Each study simulates one type of participant, cycling through all types in turn. The types differ in the "
+            "width of the "
             "psychometric function (0.5, 1, 1.5 or 2.5 times the median of the prior), the rate of random answers (2 "
             f"or 5 %), {'the preference for one interval or for the last answer, ' if plan.two_intervals else ''}and "
-            "the change of the threshold over the trials (a fall or a rise). The mean threshold lies in the middle "
+            "the change of the threshold over the trials (a decrease or an increase). The mean threshold lies in the "
+            "middle "
             "half of the levels. The group interval is the Hartung–Knapp interval for the mean across all standards."
         )
     group = "The group interval is a t-based confidence interval for the mean."
@@ -441,7 +443,7 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     if isinstance(plan, RatingPlan):
         return (
             f"Simulated observers have a mean d_a of {plan.value:g} between a level and the lowest level, and use all "
-            f"{plan.points} points on the scale about equally often; the SD is stated relative to d_a. {group}"
+            f"{plan.points} points of the scale about equally often; the SD is stated relative to d_a. {group}"
         )
     return (
         f"Simulated observers follow a power law with a mean exponent of {plan.value:g}, and the natural logarithms of "

@@ -114,7 +114,7 @@ def _levels(results: Results) -> Iterator[Card]:
             yield Card(
                 question=level.title,
                 verdict="sealed",
-                sentences=("Standards, levels and correct answers are shown after unblinding.",),
+                sentences=("The standards, levels and correct answers are shown after unblinding.",),
                 block=level.block,
                 figures=(),
             )

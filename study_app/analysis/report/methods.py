@@ -80,7 +80,7 @@ def _fewer_settings(study: Study) -> str:
         gone = study.excluded_trials(block)
         fewer |= {who for who, code in zip(gone["participant"], gone["code"], strict=True) if (who, code) not in left}
     if not fewer:
-        return ", but not all of them in all conditions"
+        return ", but some did not complete all conditions"
     people = counted(len(fewer), "participant")
     return f"; at least one condition is missing for {people}, because individual trials were excluded"
 
@@ -208,8 +208,8 @@ def _design(study: Study, results: Results) -> Iterator[str]:
         yield _presented(study, blocks[result.id], result)
         yield from said_of_presentations(result)
     if results.blocks:
-        opened = "Conditions were known only by codes until the key was opened."
-        yield opened if study.revealed else "Conditions are known only by codes."
+        opened = "Conditions were identified only by codes until the key was opened."
+        yield opened if study.revealed else "Conditions are identified only by codes."
     yield _block_order(study)
 
 
@@ -267,7 +267,7 @@ def _delays(study: Study, results: Results) -> Iterator[str]:
         pairs = [f"{number(delivered.achieved_ms, 1)} ms ({ms(delivered.delay_ms or 0.0)})" for delivered in known]
         yield (
             f"The mean achieved delays in “{block.title}” (requested delays in parentheses) were {listed(pairs)}, "
-            "measured by the program's clock and excluding display latency."
+            "measured with the program's clock and excluding display latency."
         )
 
 
@@ -278,7 +278,7 @@ def _missing_trials(study: Study) -> str:
     if not study.levels or not asked:
         return ""
     if not count:
-        return "All main interval trials met the limits for valid trials."
+        return "All interval trials in the main blocks met the limits for valid trials."
     lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
     return f"{lost} because no presentation met the limits for valid trials."
 
@@ -327,7 +327,7 @@ def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
     if decided.binding:
         which = listed([f"“{item}”" for item in decided.primary]) if decided.primary else "all statements"
         yield (
-            f"Alpha ({decided.alpha_words()}) and the primary statements ({which}) were stated before the first "
+            f"Alpha ({decided.alpha_words()}) and the primary statements ({which}) were specified before the first "
             "session."
         )
     elif decided.changed:

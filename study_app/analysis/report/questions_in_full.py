@@ -54,7 +54,9 @@ def appendix(contents: Sequence[RecordedContent]) -> Iterator[str]:
         yield heading(3, f"Changes in version {after.name}")
         yield bullets(sentences)
     if several:
-        yield paragraph("The changes were found in the receipts, which do not contain liquids or conditions.", "soft")
+        yield paragraph(
+            "The changes were identified from the receipts, which do not contain liquids or conditions.", "soft"
+        )
 
 
 def _texts(protocol: Mapping[str, Any]) -> Iterator[_Text]:

@@ -76,7 +76,9 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
             lines.append(f"{lead_phrase(result)}: no answers are included yet.")
             continue
         if len(result.names) == 1:
-            lines.append(f"{lead_phrase(result)}: there is only one {settings_noun(result)}, so nothing was compared.")
+            lines.append(
+                f"{lead_phrase(result)}: there is only one {settings_noun(result)}, so no comparisons were made."
+            )
             continue
         lines += [f"{lead_phrase(result)}: {sentence}" for sentence in missing_sentences(result)]
         decisive = [one for finding in all_findings() if finding.statements for one in finding.of(result)]
@@ -113,8 +115,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             yield "Until unblinding, each participant has separate codes, so conditions cannot be compared."
         if study.sites:
             yield (
-                "Each site has its own key. Until all sites are unblinded, codes begin with the site, and conditions "
-                "cannot be compared across sites."
+                "Each site has its own key. Until all sites are unblinded, each code begins with the name of the "
+                "site, and conditions cannot be compared across sites."
             )
     if study.simulated:
         yield "The participants were SIMULATED, so this report is not evidence about people."
@@ -135,8 +137,8 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         yield "No hypothesis tests an interaction between groups and blocks or conditions."
     if results.questions and not (results.blocks or results.levels):
         yield (
-            "The answers to these questions are described but not tested. Intervals are not corrected for the number "
-            "of questions, so with many questions some differences are to be expected by chance."
+            "The answers to these questions are summarised but not tested. The intervals are not corrected for the "
+            "number of questions, so if there are many questions, some differences are to be expected by chance."
         )
     if study.contents > len(study.versions):
         yield (
@@ -156,7 +158,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.n < FEW and results.blocks:
         yield (
             "Intervals for mean rank correlations and exploratory tests of means need at least "
-            f"{FEW} participants; this study has {study.n}. Effects that are not shown here may still exist."
+            f"{FEW} participants; this study has {study.n}. Effects that this report does not show may still exist."
         )
 
 
@@ -284,7 +286,7 @@ def _parts(
         yield "missing answers", lambda: [paragraph(incomplete_words(result), "soft")]
     effects, *others = all_findings()
     yield effects.what, effects(result, results, pictures).section
-    yield "figure of answers", lambda: drawn_figure(pictures, result.kind)
+    yield "figure showing the answers", lambda: drawn_figure(pictures, result.kind)
     for finding in others:
         yield finding.what or finding.figure_title, finding(result, results, pictures).section
     if result.absent:
@@ -453,7 +455,7 @@ def groups(study: Study, results: Results, by: By = "group") -> Iterator[str]:
         return
     compared = by == "group" and any(contrast.contrast.groups for contrast in results.contrasts)
     tested = (
-        f"Differences between {by}s are tested only as stated in the hypotheses."
+        f"Differences between {by}s are tested only if a hypothesis states them."
         if compared
         else (f"Differences between {by}s are not tested.")
     )
@@ -525,7 +527,7 @@ def _missing(study: Study) -> Iterator[str]:
     if permitted is not None:
         yield paragraph(
             f"The study permits up to {permitted:g} % of a session's trials to be missing. A session with more missing "
-            "trials is incomplete and is excluded, unless somebody has included it again.",
+            "trials counts as incomplete and is excluded, unless it has been included again.",
             "soft",
         )
 
@@ -580,7 +582,8 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         + (
             ""
             if study.revealed
-            else " Until unblinding, the delay error and the force held back are sealed and not checked."
+            else " Until unblinding, the delay error and the proportion of force held back are sealed and cannot be "
+            "checked."
         ),
         "soft",
     )
@@ -645,7 +648,7 @@ def motion(results: Results) -> Iterator[str]:
     yield heading(2, "Motion and force")
     measured = results.performance
     if measured is None:
-        yield paragraph("Motion and force are shown after unblinding, because they reveal liquids and delays.")
+        yield paragraph("Motion and force are shown only after unblinding, because they reveal liquids and delays.")
         return
     for result in results.blocks:
         measures = [one for one in (*OF_TRIALS, *OF_REACHES) if any(_movement_measures(measured, result, measure=one))]
@@ -656,13 +659,13 @@ def motion(results: Results) -> Iterator[str]:
             yield table(head, rows)
             if result.id not in measured.reaching:
                 yield paragraph(
-                    "This block does not contain a reaching task, so there are no movement times, overshoots "
-                    "or submovements.",
+                    "This block does not contain a reaching task, so no movement times, overshoots or submovements "
+                    "are reported.",
                     "soft",
                 )
             elif not measured.recorded_in(result.id):
                 yield paragraph(
-                    "The recordings of this block could not be read, so there are no reaching measures.", "soft"
+                    "The recordings of this block could not be read, so reaching measures are not available.", "soft"
                 )
     yield paragraph(_recordings(measured))
     yield bullets(
@@ -711,8 +714,8 @@ def _label(measure: str) -> str:
 
 def _recordings(measured: Performance) -> str:
     if not measured.trials:
-        return "The study does not contain reaching trials, so there are no reaching measures."
-    text = f"Reaching measures come from the recordings of {measured.recorded} of {measured.trials} reaching trials"
+        return "The study does not contain any reaching trials, so reaching measures are not available."
+    text = f"Reaching measures are based on the recordings of {measured.recorded} of {measured.trials} reaching trials"
     if measured.unread:
         text += f" (reasons for the others: {'; '.join(measured.unread)})"
     if not measured.judged:

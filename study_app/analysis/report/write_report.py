@@ -353,7 +353,9 @@ def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
                 for proposal in proposals
             ]
         )
-        yield f"A planned rule proposes excluding {who}; no decision has been made yet (see “Planned exclusions”)."
+        yield (
+            f"Under a planned rule, {who} would be excluded; no decision has been made yet (see “Planned exclusions”)."
+        )
 
 
 def _page(
@@ -458,7 +460,8 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     if len(hashes) <= _HASHES_SHOWN:
         yield table(("File", "SHA-256"), list(hashes.items()), words=2)
     yield paragraph(
-        f"The numbers come from {counted(len(hashes), 'file')}. The combined SHA-256 of their hashes and names is "
+        f"The numbers are based on {counted(len(hashes), 'file')}. The combined SHA-256 of the files' hashes and names "
+        "is "
         f"{together.hexdigest()}. report.json contains the hash of each file and the seed of each session."
     )
     yield paragraph(

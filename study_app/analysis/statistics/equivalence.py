@@ -160,7 +160,9 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
             p_upper=p_upper,
         )
     else:
-        equivalence = replace(equivalence, method=f"bootstrap, bounds {bound_text(bound)}; all differences are equal")
+        equivalence = replace(
+            equivalence, method=f"bootstrap, bounds {bound_text(bound)}; all observed differences are equal"
+        )
     by_tests = max(p_lower, p_upper, by_bootstrap) <= alpha
     beyond = is_beyond(equivalence, bound, alpha)
     if equivalence.interval is not None:
@@ -168,7 +170,7 @@ def _compared(differences: tuple[float, ...], bound: float, alpha: float, seed: 
         agrees = by_bootstrap <= alpha, float(further.p_bootstrap(bound)[0]) <= alpha
         equivalence = replace(equivalence, checks_agree=agrees == (max(p_lower, p_upper) <= alpha, beyond))
     verdict: Verdict = "out of reach" if unseen > alpha else "equivalent" if by_tests else "inconclusive"
-    few = f"too few participants to show equivalence: {fewest_participants(alpha, bound, largest)} are needed"
+    few = f"too few participants to show equivalence: at least {fewest_participants(alpha, bound, largest)} are needed"
     note = "" if verdict == "equivalent" else few if by_tests else "equivalence was not shown"
     return replace(
         equivalence,
@@ -195,7 +197,7 @@ def _described(kept: Array, bound: float, alpha: float, largest: float) -> Equiv
     """Return the descriptive part of a result, before any test."""
     n = len(kept)
     people = f"{counted(n, 'participant')}: no variation"
-    reason = f"all {n} differences are equal, so an interval cannot be computed" if n > 1 else people
+    reason = f"all {n} observed differences are equal, so an interval cannot be computed" if n > 1 else people
     return Equivalence(
         test="equivalence, two one-sided t tests",
         n=n,

@@ -142,10 +142,10 @@ def _impossible(levels: Array, yes: Array, asked: Array) -> str:
         return "there were answers at fewer than three levels"
     if not yes.any():
         return (
-            f"no participant noticed anything at levels up to {levels.max():g}, so the threshold is higher or does not "
-            "exist"
+            f"no participant noticed a difference at any level up to {levels.max():g}, so the threshold is higher or "
+            "does not exist"
         )
-    return "all participants noticed something at every level" if (yes == asked).all() else ""
+    return "all participants noticed a difference at every level" if (yes == asked).all() else ""
 
 
 def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, tuple[float | None, float | None]]:
@@ -223,16 +223,19 @@ def _outside(levels: Array, threshold: float, lower: float | None, upper: float 
     """Return the reason if the threshold is outside the presented levels, or ""."""
     low, high = float(levels[0]), float(levels[-1])
     if not low <= threshold <= high:
-        return f"the fitted threshold lies outside the presented levels ({low:g} to {high:g})"
+        return f"the fitted threshold lies outside the range of presented levels ({low:g} to {high:g})"
     if not any(end is not None and low <= end <= high for end in (lower, upper)):
-        return f"both ends of the threshold's interval lie outside the presented levels ({low:g} to {high:g})"
+        return f"both ends of the threshold's interval lie outside the range of presented levels ({low:g} to {high:g})"
     return ""
 
 
 def _remarks(levels: Array, lower: float | None, upper: float | None, people: int, dispersion: float) -> Iterator[str]:
     """Yield remarks that must accompany a threshold."""
     if any(end is not None and not levels[0] <= end <= levels[-1] for end in (lower, upper)):
-        yield ("the interval extends beyond the presented levels, where it depends only on the shape of the function")
+        yield (
+            "the interval extends beyond the range of presented levels, where it depends only on the shape of the "
+            "function"
+        )
     if people == 1:
         yield "the answers come from one participant, so the interval applies only to this person"
     else:

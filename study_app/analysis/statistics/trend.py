@@ -118,7 +118,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
         no_interval=reason,
         note=""
         if p_page is None
-        else f"Page's p for the hypothesis that no participant has a trend: {p_value(p_page)}",
+        else f"p of Page's test of the hypothesis that no participant shows a trend: {p_value(p_page)}",
         p_page=p_page,
     )
 

@@ -86,7 +86,10 @@ def test_of_many_participants_some_are_drawn_and_the_median_is_of_all() -> None:
     assert len(drawn) == answer_figures.MOST_LINES
     assert {"item1-participant1", "item1-participant500"} <= set(drawn)
     assert np.asarray(gids["item1-median"].get_ydata()).tolist() == [1.5, 2.5, 3.5]
-    assert answer_figures.line_words(500) == "60 of the 500 participants, chosen at even intervals from the sorted IDs"
+    assert (
+        answer_figures.line_words(500)
+        == "60 of the 500 participants, selected at regular intervals from the sorted IDs"
+    )
     assert answer_figures.line_words(60) == "participants"
 
 

@@ -51,9 +51,9 @@ def found(block: BlockResult) -> Found:
     return Found(NOTHING_DECIDED, (), (block,), (), {}, None, 1)
 
 
-UNCLEAR = "neither support nor refute the claim that delays up to 50 ms do not matter"
-BEYOND = "delays up to 50 ms do not matter: at 50 ms, mean answers to “Different” differ by more than the bound."
-WITHIN = "Mean answers to these statements stay within the bounds"
+UNCLEAR = "neither support nor refute the claim that delays of up to 50 ms do not matter"
+BEYOND = "delays of up to 50 ms do not matter: at 50 ms, mean answers to “Different” differ by more than the bound."
+WITHIN = "The mean answers to these statements stay within the bounds"
 
 
 @pytest.mark.parametrize(
@@ -99,4 +99,4 @@ def test_every_delay_has_its_own_sentence() -> None:
     steps = step_down(np.tile([1, 2, 2, 5], (12, 1)), [0, 50, 125, 300])
     rows = by_delay(delays({50: CALM, 125: SCATTERED, 300: AWAY}, (Lowest("different", steps),)))
     assert rows[0][-1].startswith(WITHIN)
-    assert "delays up to 300 ms do not matter: agreement with “Different” shows a trend" in rows[2][-1]
+    assert "delays of up to 300 ms do not matter: agreement with “Different” shows a trend" in rows[2][-1]

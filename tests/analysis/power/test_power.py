@@ -189,7 +189,7 @@ def test_a_block_of_some_groups_counts_their_participants() -> None:
     assert {block.id: block.groups for block in study_plan.blocks} == {"thin": (), "thick": ("b",)}
     studies, counts = swept(study_plan)
     found = powers(study_plan, SIZES, studies, studies, 1, counts)
-    words = "n is the number of participants in b, because other groups do not complete this block."
+    words = "n counts only the participants in b, because other groups do not complete this block."
     assert power_markdown(found).count(words) == 1
 
 

@@ -58,7 +58,7 @@ def test_a_study_that_kept_to_it_has_no_deviation(answered: Results) -> None:
     committed(answered)
     assert evaluate_block(answered) == ()
     text = " ".join(map(str, deviations_section(load_study(answered.folder))))
-    assert "do not differ from the preregistration" in text
+    assert "match the preregistration" in text
     assert HASH in text
 
 
@@ -78,7 +78,7 @@ def test_sessions_under_another_protocol_are_named(answered: Results) -> None:
     content = json.loads(first.receipt.read_text(encoding="utf-8"))
     first.receipt.write_text(json.dumps(content | {"protocol_hash": "cd" * 32}), encoding="utf-8", newline="\n")
     (line,) = evaluate_block(answered)
-    assert line.startswith("1 session used a protocol (version 2) that differs from the preregistered one")
+    assert line.startswith("1 session used a protocol (version 2) that differs from the preregistered protocol")
     assert line.endswith("P001/1")
 
 

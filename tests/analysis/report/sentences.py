@@ -668,7 +668,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"equivalent; not corrected for the number of comparisons\)\.",
      lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))),
     (rf"Up to {R} ms, mean answers to (all \w+ statements|both statements|the one statement) stay within ±{R} points? "
-     rf"of those at {R} ms, but the data do not rule out that up to {R} % of people show a larger "
+     rf"of those at {R} ms, but the data do not rule out the possibility that up to {R} % of people show a larger "
      r"difference\.", all_equivalent),
     (rf"The detection threshold is {R} ms \((.*), n = (\d+)\); at this delay, (?:> )?{R} % of answers express "
      rf"agreement with ({ITEM})\.", threshold_is_told),
@@ -700,11 +700,12 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Bayes factors are two-sided JZS Bayes factors \(Rouder et al\., 2009\) that compare the hypothesis of a "
      r"difference with the null hypothesis, using a Cauchy prior with scale 0\.707\.",
      when(lambda told: bool(told.contrasts))),
-    (r"Cliff's delta is the probability that an answer in the first group is larger than one in the second, minus the "
-     r"probability that it is smaller; within participants, it is .*\.", when(lambda told: bool(told.contrasts))),
+    (r"Between groups, Cliff's delta is the probability that an answer in the first group is larger than one in the "
+     r"second, minus the probability that it is smaller\.", when(lambda told: bool(told.contrasts))),
+    (r"Within participants, it is the proportion of .*\.", when(lambda told: bool(told.contrasts))),
     (r"The mean difference lies within the equivalence bounds \(equivalent\)\.", bound_of_a_contrast("within")),
-    (r"However, the data do not rule out that up to (\d+) % of (people show a difference larger than the bound|a "
-     r"group belong to a minority that is not represented in the sample)\.",
+    (r"However, the data do not rule out the possibility that up to (\d+) % of (people show a difference larger than "
+     r"the bound|a group belong to a minority that is not represented in the sample)\.",
      bound_of_a_contrast("within")),
     (r"(The whole confidence interval lies|All differences lie) outside the equivalence bounds \(not equivalent\)\.",
      bound_of_a_contrast("beyond")),
@@ -721,8 +722,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      look(lambda told: people(told) in told.results["decided"]["looks"])),
     (rf"This look at \d+ participants was unplanned; looks are planned at {LOOKS}\.",
      look(lambda told: people(told) not in told.results["decided"]["looks"])),
-    (rf"An adjusted p value is significant if it is at most {R}( \(.* alpha spending\)|, as at the last planned look)"
-     r"\.", alpha_here),
+    (rf"Adjusted p values of up to {R} are (significant \(.* alpha spending\)|treated as significant, as at the last "
+     r"planned look)\.", alpha_here),
     (r"If there were no effect and the data were tested in this way after every participant, the false-positive rate "
      rf"would be {R} % instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
     (r"At the planned looks, adjusted p values of up to (.*) are significant \((O'Brien–Fleming|Pocock) alpha spending "
@@ -733,7 +734,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"liquid-study validate-report\)\.", claims),
     (r"No answers are included yet\.", when(lambda told: told.block["n"] == 0)),
     (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
-    (rf"{LEAD}there is only one (?:liquid|delay|setting), so nothing was compared\.",
+    (rf"{LEAD}there is only one (?:liquid|delay|setting), so no comparisons were made\.",
      when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
@@ -747,7 +748,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"has (\d+)\.", lambda match, told: int(match[1]) == people(told) < 10),
     (r"Interactions between groups and blocks or conditions are not tested\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
-    (r"Effects that are not shown here may still exist\.", always),
+    (r"Effects that this report does not show may still exist\.", always),
     (rf"{LEAD}(the .*?) (?:was|were) not computed because (.*)\.", not_computed),
     (rf"{LEAD}the tests for (.*) could not have been significant with so few participants, because no rearrangement of "
      r"the answers within participants gives a small enough adjusted p value\.", out_of_reach),
@@ -764,7 +765,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf"difference lies within the equivalence bounds nor that it lies outside them\.", nobody_is_left),
     # Methods
     (rf"{N} participants?(?: \(SIMULATED, not people\))? took part in “Made up” \(protocol made_up, version 1\)(, "
-     r"each in all conditions|, but not all of them in all conditions)?\.",
+     r"each in all conditions|, but some did not complete all conditions)?\.",
      lambda match, told: count(match[1]) == people(told)),
     (r"Participants were randomised in permuted blocks to the groups .*, with an allocation ratio of (?P<ratio>\S+)\.",
      groups),
@@ -779,7 +780,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: told.block["presentations"][1] > 1)),
     (r"The answers from sessions (.*) are compared with each other, and are pooled in all other tests\.",
      lambda match, told: listed_in(match[1]) == {str(one) for one in told.block["sessions"]}),
-    (r"Conditions were known only by codes until the key was opened\.", when(lambda told: told.study.revealed)),
+    (r"Conditions were identified only by codes until the key was opened\.", when(lambda told: told.study.revealed)),
     (r"The achieved delays in “Block” were not measured\.",
      when(lambda told: all(one["measured"] == 0 for one in told.results["delivered"]))),
     (r"(?:Hypothesis (\d+)|The hypothesis) \((.*)\) was tested with a (one-sided|two-sided) (.*)\.", hypothesis),

@@ -48,7 +48,10 @@ def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_pa
     assert "Blinded: conditions appear as codes" in told
     assert "after unblinding" in told
     assert re.search(r" all +sealed +sealed +sealed +sealed +28 +28 of 28 ", " ".join(told.split()))
-    assert "Until unblinding, the delay error and the force held back are sealed and not checked." in told
+    assert (
+        "Until unblinding, the delay error and the proportion of force held back are sealed and cannot be checked."
+        in told
+    )
     (delivered,) = numbers(tmp_path / "report")["results"]["delivered"]
     assert (delivered["error_mean_ms"], delivered["error_worst_ms"], delivered["achieved_ms"]) == (None, None, None)
     for path in (tmp_path / "report").iterdir():

@@ -83,9 +83,9 @@ def test_agreement_from_five_on_is_noticing_and_missing_answers_do_not_count() -
 @pytest.mark.parametrize(
     ("yes", "note"),
     [
-        ([0] * 7, "no participant noticed anything at levels up to 300"),
-        ([5] * 7, "all participants noticed something at every level"),
-        ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the presented levels"),
+        ([0] * 7, "no participant noticed a difference at any level up to 300"),
+        ([5] * 7, "all participants noticed a difference at every level"),
+        ([5, 4, 3, 2, 1, 0, 0], "the fitted threshold lies outside the range of presented levels"),
     ],
 )
 def test_answers_without_a_threshold_are_told(yes: list[int], note: str) -> None:
@@ -111,7 +111,7 @@ def test_an_open_interval_says_which_end_is_open() -> None:
     far = noticed(pooled([0, 0, 0, 0, 1, 2, 8], 20), DELAYS)
     assert far.upper is not None
     assert far.upper > 300
-    assert "the interval extends beyond the presented levels" in far.note
+    assert "the interval extends beyond the range of presented levels" in far.note
 
 
 PSI = np.array([0.55, 0.7, 0.85, 0.95])
