@@ -126,7 +126,7 @@ def withdraw(
     by, reason = check_name_and_reason(by, reason, "a withdrawal requires initials and a reason")
     study = StudyFolder(folder)
     if not folder.is_dir():
-        raise StoreError(f"{folder} is not a folder: specify a study's folder, such as results/rek2024")
+        raise StoreError(f"{folder} is not a folder: specify a study folder, such as results/rek2024")
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="seconds")
     copies, shared = _find_copies(study, also)
     nearby, exports = _find_copies(study, filter(Path.is_dir, [workspace().results]))

@@ -345,7 +345,7 @@ def _design(protocol: Protocol) -> Iterator[str]:
     for group, words in block_orders_by_group(protocol).items():
         yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
     yield (
-        "The trial orders of each participant are generated from the session's seed, as described below for each block."
+        "Each participant's trial orders are generated from the session's seed, as described below for each block."
     )
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))

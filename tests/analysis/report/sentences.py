@@ -818,7 +818,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"equal answers were dropped\), with p values Holm-adjusted across all pairs for all such statements; the effect "
      r"size is the matched-pairs rank-biserial correlation\.", when(lambda told: bool(told.block["pairs"]))),
     (r"Participants were considered to have named the liquid whose statement they rated highest; ties for the highest "
-     r"rating were treated as undecided and counted as "
+     r"rating were treated as undecided and scored as "
      r"incorrect\.", when(lambda told: told.block["named"] is not None)),
     (r"The number of correct names was tested by permuting the liquids within participants \(exact, one-sided\)\.",
      when(lambda told: told.block["named"] is not None)),
@@ -853,9 +853,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"A statement's adjusted p value is never smaller than the p value of the test over all statements in its block"
      r"\.",
      when(lambda told: all(float(row["p_adjusted"] or 1) >= told.p_over_all - 1e-9 for row in told.of_statements))),
-    (r"Alpha \(([\d.]+)(?: across all looks, [\d.]+ at this look)?\) and the primary statements \((.*)\) were stated "
-     r"before "
-     r"the first session\.", decided_beforehand),
+    (r"Alpha \(([\d.]+)(?: across all looks, [\d.]+ at this look)?\) and the primary statements \((.*)\) were "
+     r"specified before the first session\.", decided_beforehand),
     (r"The analysis was not specified beforehand, so all results are exploratory \(alpha = ([\d.]+)\)\.",
      lambda match, told: not told.results["decided"]["made"] and float(match[1]) == told.alpha),
     (r"In an exploratory analysis, the answers were treated as numbers: (?:differences between the conditions were "

@@ -67,12 +67,12 @@ def test_the_page_lists_the_forgeries_and_what_tells_them() -> None:
     ]
     assert {kept for _, _, kept in verdicts} == {"not sound"}
     assert f"We tested {len(tried)} forgeries" in page
-    assert f"reveal all {len(tried)}." in page
+    assert f"reveal all {len(tried)} forgeries." in page
     alone = {name for name, found, _ in verdicts if found == "not sound"}
     assert len(alone) == 6
-    assert "`verify` alone finds six, such as a changed answer or a deleted session folder" in page
+    assert "On its own, `verify` detects six, such as a changed answer or a deleted session folder" in page
     assert alone > {"an answer changed in the journal", "an answer changed in a table", "a session's folder deleted"}
-    (others,) = re.findall(r"does not find, for example, ([^.]*)\.", page)
+    (others,) = re.findall(r"does not detect, for example, ([^.]*)\.", page)
     untold = {
         "exchanged answers": {"all answers of a participant inverted", "answers of two participants exchanged"},
         "shifted times": {"all times moved"},

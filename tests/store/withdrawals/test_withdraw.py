@@ -200,7 +200,7 @@ def test_a_link_and_a_pipe_are_named_before_anything_is_written(study: Path, tmp
     for act in (lambda: erase(study), lambda: merge_sites({"A": study}, tmp_path / "pooled")):
         with pytest.raises(StoreError, match=f"^{pipe} is neither a file nor a folder: remove it$"):
             act()
-    with pytest.raises(StoreError, match=f"^{pipe} is not a folder: specify a study's folder"):
+    with pytest.raises(StoreError, match=f"^{pipe} is not a folder: specify a study folder"):
         erase(pipe)
     pipe.unlink()
     pipe.symlink_to(tmp_path)

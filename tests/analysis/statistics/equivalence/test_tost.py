@@ -39,7 +39,10 @@ def test_the_min_sample_depend_on_the_bound(bound: float, n: int) -> None:
     calm = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, bound / 4] * 6
     assert tost(calm[:n], bound).verdict == "equivalent"
     fewer = tost(calm[: n - 1], bound)
-    assert (fewer.verdict, fewer.note) == ("out of reach", f"too few participants to show equivalence: {n} are needed")
+    assert (fewer.verdict, fewer.note) == (
+        "out of reach",
+        f"too few participants to show equivalence: at least {n} are needed",
+    )
 
 
 @pytest.mark.slow
