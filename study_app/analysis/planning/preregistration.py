@@ -344,9 +344,7 @@ def _design(protocol: Protocol) -> Iterator[str]:
         )
     for group, words in block_orders_by_group(protocol).items():
         yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
-    yield (
-        "Each participant's trial orders are generated from the session's seed, as described below for each block."
-    )
+    yield ("Each participant's trial orders are generated from the session's seed, as described below for each block.")
     for block in protocol.main_blocks:
         rows = dict(precision_rows(protocol, block))
         kind = "levels" if block.stimulus is not None else "conditions"
