@@ -235,7 +235,10 @@ class Distinguished(Finding[None]):
                 f"Participants named {number(named.found.statistic, 0)} of {sum(rate.n for rate in named.found.rates)} "
                 f"liquids correctly ({number(named.found.expected, 1)} expected by chance, {p_equals(named.found.p)})."
             )
-            text = f"{f'Recognised above chance: {names}.' if names else _NONE_RECOGNISED} {hits} {text}"
+            if known or not verdicts:
+                text = f"{f'Recognised above chance: {names}.' if names else _NONE_RECOGNISED} {hits} {text}"
+            else:  # what was shown comes first
+                text = f"{text} {_NONE_RECOGNISED} {hits}"
         if not verdicts:
             return self.answered("not shown", f"{text} {NO_EVIDENCE}")
         return self.answered(verdict, text, claims=True)
