@@ -46,7 +46,7 @@ class CumulativeModels(StatementTests):
     def section(self) -> Iterator[str]:
         if not (fitted := [test for test in self.value if test.outcome.p is not None]):
             return
-        first, delays = fitted[0].outcome, bool(self.found.delays_ms)
+        delays = bool(self.found.delays_ms)
         effects = ["per 100 ms"] if delays else [f"{name} − {self.found.names[0]}" for name in self.found.names[1:]]
         yield heading(3, self.title)
         yield table_of(
@@ -63,12 +63,14 @@ class CumulativeModels(StatementTests):
             ("Verdict", lambda test: test.verdict),
             last=1,
         )
+        methods = "; ".join(dict.fromkeys(test.outcome.method for test in fitted))
         yield paragraph(
-            "Cumulative logit mixed model of all individual answers, including those of incomplete participants. "
-            f"Effects are log odds ratios{' per 100 ms of delay' if delays else ''} with 95 % confidence intervals "
-            "(Wald): above 0 if answers are higher. SD: between participants, of their intercepts"
-            f"{' and of their delay effects' if delays else ''}. Test: {first.method}; p adjusted "
-            f"({fitted[0].correction}) across {number_text.counted(fitted[0].members, 'test')}.",
+            "A cumulative logit mixed model was fitted to all individual answers to each primary statement, including "
+            "the answers of incomplete participants. Effects are log odds ratios"
+            f"{' per 100 ms of delay' if delays else ''} with 95 % Wald intervals; they are positive if answers rise. The SDs describe the participants' "
+            f"intercepts{' and delay effects' if delays else ''}. Effects were tested with likelihood ratios (LR; "
+            f"{methods}), and p values were adjusted ({fitted[0].correction}) across "
+            f"{number_text.counted(fitted[0].members, 'test')}.",
             "soft",
         )
 
@@ -86,7 +88,7 @@ class CumulativeModels(StatementTests):
             slopes = " and delay effects" if self.found.delays_ms else ""
             yield (
                 f"In an exploratory analysis, a cumulative logit mixed model with random intercepts{slopes} was fitted "
-                f"to all individual answers to {counted(fitted, 'primary statement')}, including those of "
+                f"to all individual answers to {counted(fitted, 'primary statement')}, including the answers of "
                 "incomplete participants; effects were tested with likelihood ratios, and the false discovery rate was "
                 "controlled (Benjamini–Hochberg)."
             )

@@ -127,7 +127,7 @@ def _fitted(model: CumulativeModel, likelihood: "_Likelihood", direction: Direct
         model,
         statistic=statistic,
         p=p,
-        method=f"likelihood ratio, {reference}",
+        method=reference,
         effect=float(betas[0]) if several == 1 else None,
         interval=intervals[0] if several == 1 else None,
         no_interval="" if several == 1 else _SEVERAL,
