@@ -43,6 +43,8 @@ from study_app.workers.client import WorkerClient
 from study_app.workspace import workspace
 
 _MAX_PARTICIPANTS = 200
+_REHEARSED = 5
+"""The simulated participants that are suggested if the study states no planned number."""
 _LISTEN_MS = 40
 
 
@@ -77,7 +79,9 @@ class RehearsalDialog(Work):
             width=520,
         )
         self._facts = facts
-        for name, value in (("participants", 5), ("seed", 1)):
+        plan = facts.protocol.analysis
+        planned = plan.participants if plan is not None else None
+        for name, value in (("participants", min(planned or _REHEARSED, _MAX_PARTICIPANTS)), ("seed", 1)):
             self.editors[name].show_value(value)
         self.worker: RehearsalClient | None = None
         self._done = 0
@@ -331,11 +335,17 @@ class NewSessionDialog(QDialog):
         QTimer.singleShot(0, self, self._fit_height)  # once the parts have their style
 
     def _fit_height(self) -> None:
-        """Make the dialog as high as its questions, at most the screen's height, beyond which they scroll."""
+        """Make the dialog as high as its questions, at most the screen's height, beyond which they scroll.
+
+        It is wide enough for the questions beside their scroll bar.
+        """
         inside, whole = self._inside.layout(), self.layout()
         assert inside is not None and whole is not None  # noqa: S101, PT018 - laid out above
-        wide = self.minimumWidth() - whole.contentsMargins().left() - whole.contentsMargins().right()
         inside.activate()
+        beside = whole.contentsMargins().left() + whole.contentsMargins().right()
+        least = inside.totalMinimumSize().width() + self._area.verticalScrollBar().sizeHint().width() + beside
+        self.setMinimumWidth(max(self.minimumWidth(), least))
+        wide = self.minimumWidth() - beside
         needed = inside.totalHeightForWidth(wide)
         self._area.setMinimumHeight(0)
         around = whole.totalMinimumSize().height() - self._area.minimumSizeHint().height()

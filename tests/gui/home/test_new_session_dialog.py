@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QScrollBar, QWidget
 
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import dialogs
@@ -228,6 +228,16 @@ def test_a_preexisting_group_is_chosen_before_a_session_begins_and_kept_in_the_n
     made.editors["participant"].control.setText("P003")
     assert (group.value, group.isEnabled()) == (None, True)
     assert not made.begin.isEnabled()
+
+
+def test_questions_that_scroll_are_not_cut_off_at_the_right(qtbot, tmp_path, opened, monkeypatch):
+    monkeypatch.setattr(dialogs, "_FRAME", 400)  # as on a lower screen
+    made = opened(study_facts(str(grouped(tmp_path, "pre-existing"))))
+    settle(qtbot, made)
+    bars = [bar for bar in made.findChildren(QScrollBar) if bar.orientation() == Qt.Orientation.Vertical]
+    qtbot.waitUntil(lambda: any(bar.isVisible() for bar in bars))
+    seen = [part for part in parts_cut_off(made) if not part.visibleRegion().isEmpty()]
+    assert not seen, "wider than the room beside the scroll bar"
 
 
 def test_a_randomised_group_is_not_asked_for(qtbot, tmp_path, opened):

@@ -120,3 +120,10 @@ def test_a_rehearsal_that_does_not_listen_is_killed(qtbot: Any, opened: Any, mon
     with qtbot.waitSignal(dialog.rejected):
         dialog.close()
     assert dialog.worker.ended
+
+
+@pytest.mark.parametrize(("study", "suggested"), [("viscosityjnd", 20), ("demo", 5)])
+def test_the_planned_number_of_participants_is_suggested(qtbot: Any, tmp_path: Any, study: str, suggested: int) -> None:
+    dialog = RehearsalDialog(study_facts(study), tmp_path)
+    qtbot.addWidget(dialog)
+    assert dialog.value("participants") == suggested
