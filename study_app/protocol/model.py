@@ -5,6 +5,7 @@ can decide by itself is checked by its class; what needs two tables is in ``chec
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
@@ -490,8 +491,23 @@ RULES: Final[Mapping[_Rule, str]] = {
     "fast_answers": "the median response time is below {limit:g} s",
 }
 """When each planned rule proposes a session for exclusion."""
-_LIMITS: Final[Mapping[_Rule, tuple[float, float]]] = {"constant_answers": (1, 100), "fast_answers": (0.05, 600)}
-"""The range of the limit of each rule that has one, in percent or seconds."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RuleLimit:
+    """The range of an exclusion rule's limit, a usual value, and the unit of all three."""
+
+    least: float
+    most: float
+    usual: float
+    unit: str
+
+
+RULE_LIMITS: Final[Mapping[str, RuleLimit]] = {
+    "constant_answers": RuleLimit(least=1, most=100, usual=95, unit="%"),
+    "fast_answers": RuleLimit(least=0.05, most=600, usual=0.3, unit="s"),
+}
+"""The limits of the exclusion rules that have one."""
 
 
 class ExclusionRule(Table):
@@ -510,11 +526,11 @@ class ExclusionRule(Table):
 
     @model_validator(mode="after")
     def _limit_belongs_to_rule(self) -> Self:
-        bounds = _LIMITS.get(self.rule)
-        if bounds is None and self.limit is not None:
+        known = RULE_LIMITS.get(self.rule)
+        if known is None and self.limit is not None:
             raise invalid(f"is not used by the rule {self.rule}", "limit", kind="surplus")
-        if bounds is not None and not (self.limit is not None and bounds[0] <= self.limit <= bounds[1]):
-            raise invalid(f"specify a number from {bounds[0]:g} to {bounds[1]:g}", "limit")
+        if known is not None and not (self.limit is not None and known.least <= self.limit <= known.most):
+            raise invalid(f"specify a number from {known.least:g} to {known.most:g} {known.unit}", "limit")
         return self
 
     @property

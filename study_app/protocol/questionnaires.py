@@ -167,6 +167,11 @@ def instrument_tables(of: str, languages: tuple[str, ...]) -> tuple[dict[str, An
     return table, {name: scale for name, scale in scales.items() if scale}
 
 
+def published_name(of: str) -> str:
+    """Return the name under which an instrument is published, which is its heading where it has no title."""
+    return of.upper().removesuffix("-WEIGHTED")
+
+
 def scale_name(of: str, scale: str) -> str:
     """Return the study's name for a scale of a standard questionnaire."""
     return f"{of.replace('-', '_')}_{scale}"
@@ -202,7 +207,7 @@ def _fill_in(
 
     made = _merged({key: source[key] for key in ("title", "intro") if key in source}, table, languages)
     if "title" not in table and set(made.get("title", ())) != set(languages):
-        made.pop("title", None)
+        made["title"] = dict.fromkeys(languages, published_name(of))
     ask(() if "intro" in table else None, of, made, "intro")
     items = []
     for name, item in known.items():

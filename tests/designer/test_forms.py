@@ -158,3 +158,14 @@ def test_each_trial_design_has_its_own_picture(designer: Any) -> None:
                 for at in range(shown.count()) if not shown.itemIcon(at).isNull()}  # fmt: skip
     assert {"abx", "2ifc", "3ifc", "4ifc", "oddity", "samedifferent"} <= pictures.keys()
     assert len({bytes(picture.constBits()) for picture in pictures.values()}) == len(pictures)
+
+
+def test_help_of_two_lines_does_not_move_the_form(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    form, heights = designer.place.form, set()
+    for words in ("One line.", "Two lines. " * 12):
+        form.foot.show_help("Field", "study.field", words)
+        for _ in range(3):  # the label, its foot and the form are laid out one after the other
+            QApplication.processEvents()
+        heights.add(form.area.height())
+    assert len(heights) == 1

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from study_app.designer.document.fields import (
+    EXCLUSIONS,
     LETTER,
     Row,
     check_id,
@@ -29,6 +30,7 @@ from study_app.ids import MAX_ID, free_id
 from study_app.number_text import MINUS, exact_text, number_of
 from study_app.protocol.checks.cross_references import TEXTS
 from study_app.protocol.checks.force_limits import check_paced
+from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import Fault, rule_of, shown_value
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
@@ -59,11 +61,13 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
 
 
 def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
-    """Return edits of a block's design or conditions and the further edits that the design requires.
+    """Return edits of a block's design or conditions, or of an exclusion rule, and the further edits that it requires.
 
-    Keys that no longer belong to the block are removed; a questionnaire comes after the block, once; the first
-    condition becomes the standard unless the standard is among the conditions.
+    A rule gets its usual limit. Keys that no longer belong to the block are removed; a questionnaire comes after the
+    block, once; the first condition becomes the standard unless the standard is among the conditions.
     """
+    if path[:2] == EXCLUSIONS and path[-1] == "rule":
+        return (*edits, *_limit_edits(study, path, edits))
     if path[:1] != ("blocks",) or path[2:3] not in (("design",), ("conditions",)):
         return edits
     after = study.with_edits(*edits)[0].document
@@ -79,6 +83,15 @@ def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...
             others.append(Insert(("sequence", sequence.index(path[1]) + 1), form))
         others += _standard_edits(block, path[:2])
     return (*edits, *others)
+
+
+def _limit_edits(study: Study, path: Path, edits: Sequence[Edit]) -> tuple[Edit, ...]:
+    """Return the edits that give an exclusion rule its usual limit, or remove the limit of a rule without one."""
+    rule = value_at(study.with_edits(*edits)[0].document, path)
+    place = (*path[:-1], "limit")
+    if (limit := RULE_LIMITS.get(str(rule))) is not None:
+        return (Set(place, limit.usual),)
+    return () if value_at(study.document, place) is None else (Unset(place),)
 
 
 def _standard_edits(block: Mapping[str, Any], path: Path) -> tuple[Edit, ...]:

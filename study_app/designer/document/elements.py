@@ -7,6 +7,8 @@ from functools import lru_cache
 from typing import Any, Final
 
 from study_app.designer.document.fields import (
+    CONTRASTS,
+    EXCLUSIONS,
     ITEMS,
     Row,
     all_references,
@@ -22,6 +24,7 @@ from study_app.designer.document.fields import (
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
 from study_app.protocol.groups import sequences_in
+from study_app.protocol.questionnaires import published_name
 from study_app.protocol.source.document import Path, entries, has, value_at
 from study_app.protocol.wording.languages import languages_of
 
@@ -89,6 +92,10 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
         return label_of(path[-1])
     if called := _title_text(document, value):
         return called
+    if path[0] == "questionnaires" and isinstance(of := value.get("instrument"), str):
+        return published_name(of)
+    if path[:2] == EXCLUSIONS and isinstance(rule := value.get("rule"), str):
+        return label_of(rule)
     if isinstance(path[-1], int) and "id" not in value:
         texts = [text for held in value.values() for text in (held if isinstance(held, tuple | list) else (held,))]
         return ", ".join([text for text in texts if isinstance(text, str)][:_NAMED]) or str(path[-1] + 1)
@@ -141,7 +148,7 @@ def rows_of_blocks(document: Mapping[str, Any]) -> tuple[Row, ...]:
     """Return the form rows that concern all main blocks: their order, if there are several, and the hypotheses."""
     blocks = [block for _, block in entries(document, "blocks.*") if isinstance(block, Mapping)]
     several = sum(block.get("phase", "main") == "main" for block in blocks) > 1
-    places = [("study", "block_order")] * several + [("analysis", "contrasts")]
+    places = [("study", "block_order")] * several + [CONTRASTS]
     return tuple(row for place in places if (row := row_at(document, place)) is not None)
 
 

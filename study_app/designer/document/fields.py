@@ -17,6 +17,7 @@ from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
 from study_app.number_text import counted
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
 from study_app.protocol.json_schema import schema
+from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import rule_of, shown_value
@@ -28,6 +29,8 @@ from study_app.protocol.wording.languages import LANGUAGES, languages_of
 
 Document = Mapping[str, Any]
 ITEMS = "items"
+CONTRASTS: Final[Path] = ("analysis", "contrasts")
+EXCLUSIONS: Final[Path] = ("analysis", "exclusions")
 _MAY_LEAVE_OUT = (("blocks", "task"), ("stimuli", "condition"))
 """Sections whose tables may leave a key out, which then stands for the only table that it may name."""
 
@@ -555,6 +558,8 @@ def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
     node = table_of(node_at(document, path), table) or {}
     if not isinstance(table, Mapping):
         return frozenset()
+    if path[:2] == EXCLUSIONS:
+        return frozenset() if table.get("rule") in RULE_LIMITS else frozenset({"limit"})
     applies = (keys for given, keys in node.get(NOT_WITH, ()) if all(key in table for key in given))
     return frozenset(next(applies, ()))
 

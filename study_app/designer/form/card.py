@@ -539,6 +539,8 @@ _ADD_PX = 235
 """The greatest width of a button in a column of `_AddKeys` [px]."""
 _FOOT_FROM = 460
 """The height of the form from which it has a foot [px]."""
+_HELP_LINES = 2
+"""The lines of help that always have room, so that another field's help does not move the form under the pointer."""
 
 
 class _FormFoot(Themed, QWidget):
@@ -550,6 +552,7 @@ class _FormFoot(Themed, QWidget):
         self.place = cut_text("", "small", "text2", right=True)
         self.words = label("", "small", "text2", wraps=True)
         self.words.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.words.setMinimumHeight(_HELP_LINES * self.words.fontMetrics().lineSpacing())
         self.glossary = small_button("info", "Glossary", role="plain", height=26)
         above = hbox(self.title, (self.place, 1), self.glossary, spacing=8)
         vbox(above, self.words, spacing=3, margins=(12, 4, 4, 8), parent=self)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
+from itertools import compress
 from typing import Any, Final
 
 from study_app.designer.document.additions import number_rows
@@ -17,6 +18,8 @@ from study_app.designer.document.elements import (
     usage_text,
 )
 from study_app.designer.document.fields import (
+    CONTRASTS,
+    EXCLUSIONS,
     Choice,
     Row,
     kind_note,
@@ -40,10 +43,12 @@ from study_app.designer.form.rows import (
     question_lines,
     values_of,
 )
-from study_app.designer.measures.study_facts import copied_texts, texts_by_language
+from study_app.designer.measures.study_facts import copied_texts, texts_by_language, valid_part
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
+from study_app.protocol.checks.designs import missing_for_rule
 from study_app.protocol.groups import ASSIGNMENT, sequences_in
+from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
 from study_app.protocol.warnings.untranslated import untranslated_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
@@ -198,7 +203,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
             continue
         elif (
             row.value is None
-            and not (row.required or faulty)
+            and not (row.required or faulty or row.path == CONTRASTS)
             and (row.kind == "table" or (row.default in (None, [], {}) and row.kind not in {"kind", "switch"}))
         ):
             absent.append(row)
@@ -233,6 +238,8 @@ def _is_given(row: Row) -> bool:
 
 def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     document, path = study.document, row.path
+    if path[:2] == EXCLUSIONS:
+        row = _exclusion_row(study, row)
     faults = tuple(
         _sentence(fault.message, fault.hint)
         for fault in study.faults
@@ -256,6 +263,18 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         number=number,
         facts=facts(study, row) if (facts := _facts_of(row)) is not None else None,
     )  # fmt: skip
+
+
+def _exclusion_row(study: Study, row: Row) -> Row:
+    """Return a row of an exclusion rule with the rules that can apply to the study, or with the limit's unit."""
+    limit = RULE_LIMITS.get(str(value_at(study.document, (*row.path[:-1], "rule"))))
+    if row.path[-1] == "limit" and limit is not None:
+        return replace(row, unit=limit.unit, bounds=(f"{limit.least:g} to {limit.most:g}",))
+    protocol = valid_part(study).protocol
+    if row.path[-1] != "rule" or protocol is None:
+        return row
+    fits = (choice.value == row.value or not missing_for_rule(protocol, str(choice.value)) for choice in row.choices)
+    return replace(row, choices=tuple(compress(row.choices, fits)))
 
 
 def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:

@@ -13,7 +13,7 @@ from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
 from study_app.protocol.groups import follows
-from study_app.protocol.model import Contrast, ExclusionRule, Protocol, Published
+from study_app.protocol.model import Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.quantities import can_vary
@@ -76,20 +76,20 @@ def check_designs(protocol: Protocol) -> Iterator[Fault]:
     for number, contrast in enumerate(protocol.analysis.contrasts if protocol.analysis is not None else ()):
         yield from _check_contrast(protocol, contrast, ("analysis", "contrasts", number))
     for number, rule in enumerate(protocol.analysis.exclusions if protocol.analysis is not None else ()):
-        if (lacks := _missing_for(protocol, rule)) is not None:
+        if (lacks := missing_for_rule(protocol, rule.rule)) is not None:
             yield Fault(("analysis", "exclusions", number, "rule"), f'"{rule.rule}" never applies: {lacks}')
 
 
-def _missing_for(protocol: Protocol, rule: ExclusionRule) -> str | None:
+def missing_for_rule(protocol: Protocol, rule: str) -> str | None:
     """Return the part that the study lacks for a rule to apply."""
     blocks = [block for block in protocol.main_blocks if block.design is not None]
-    if rule.rule == "constant_answers":
+    if rule == "constant_answers":
         asked = filter(None, (protocol.questionnaire_of(block.id) for block in protocol.main_blocks))
         return None if any(questionnaire.statements for questionnaire in asked) else "no main block has statements"
-    if rule.rule == "threshold_beyond_levels":
+    if rule == "threshold_beyond_levels":
         return None if any(block.stimulus is not None for block in blocks) else "no main block has levels"
     stimuli = {block.id: None if block.stimulus is None else protocol.stimuli[block.stimulus] for block in blocks}
-    if rule.rule == "below_chance" and not any(
+    if rule == "below_chance" and not any(
         has_correct_answer(design_of(protocol, block), stimuli[block.id]) for block in blocks
     ):
         return "no main block has correct answers"

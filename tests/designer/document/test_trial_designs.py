@@ -2,15 +2,18 @@
 
 import pytest
 
-from study_app.designer.document.additions import edits_to_duplicate
+from study_app.designer.document.additions import edits_to_duplicate, edits_to_fill_in
 from study_app.designer.document.document import template
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import kind_note, refused_at, row_at
 from study_app.designer.document.steps import (
     AddEntry,
+    AddInstrument,
     AddKey,
     AddLiquid,
     ChangeLanguage,
     RemoveKey,
+    Request,
     SetValue,
     Situation,
     shipped_liquids,
@@ -59,7 +62,7 @@ questionnaire = "after"
 DESIGN = ("blocks", "feel", "design")
 
 
-def after(study: Study, *requests: AddEntry | AddKey | SetValue | RemoveKey | AddLiquid) -> Study:
+def after(study: Study, *requests: Request) -> Study:
     for request in requests:
         study, _ = study.with_edits(*request.step(Situation(study)).edits)
     return study
@@ -142,7 +145,12 @@ def test_another_liquid_and_another_delay_are_warned_of_and_a_drawn_order_is_not
 
 def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study) -> None:
     entries = {entry.words: entry for entry in addable_elements(study, ())}
-    slime = entries["Slime liquid (slime)"]
+    slime = entries["Slime liquid, 1020 kg/m³, maxwell"]
+    told_apart = {words for words in entries if words.startswith(("Water liquid", "Damper liquid"))}
+    assert told_apart == {
+        "Water liquid, 1000 kg/m³, drag, wake", "Water liquid, 998.2 kg/m³, 0.001002 Pa·s",
+        "Damper liquid, 4 N·s/m", "Damper liquid, 8 N·s/m",
+    }  # fmt: skip
     assert isinstance(slime.asks, AddLiquid)
     assert slime.help.endswith("The scene's scale changes to 3 for all liquids, as in that study.")
     other = after(study, SetValue(("scene", "scale"), 10))
@@ -199,3 +207,38 @@ def test_the_trial_strip_has_the_duration_of_each_phase(
     (strip,) = (row.facts for row in rows if row.path[-1] == "design")
     assert tuple(phase.duration_s for phase in strip.phases) == durations_s
     assert strip.duration_s == pytest.approx(sum(durations_s))
+
+
+EXCLUSION = ("analysis", "exclusions", 0)
+
+
+def test_an_exclusion_rule_is_one_that_can_apply_and_has_its_usual_limit(study: Study) -> None:
+    two = after(study, SetValue(DESIGN, "abx"), AddKey(EXCLUSION[:2]))
+    (rule,) = (row for section in form_of(two, EXCLUSION).sections for row in section.rows if row.path[-1] == "rule")
+    assert [choice.value for choice in rule.choices] == ["below_chance", "fast_answers"]
+    assert "limit" in refused_at(two.document, EXCLUSION)
+    fast = after(two, SetValue((*EXCLUSION, "rule"), "fast_answers"))
+    assert fast.faults == ()
+    assert dict(fast.document["analysis"]["exclusions"][0]) == {"rule": "fast_answers", "limit": 0.3}
+    limit = next(row for row in form_of(fast, EXCLUSION).sections[0].rows if row.path[-1] == "limit")
+    assert (limit.unit, limit.permitted) == ("s", "0.05 to 600")
+    assert title_of(fast.document, EXCLUSION) == "Fast answers"
+    back = after(fast, SetValue((*EXCLUSION, "rule"), "below_chance"))
+    assert back.faults == ()
+    assert "limit" not in back.document["analysis"]["exclusions"][0]
+
+
+def test_the_form_of_the_analysis_begins_a_hypothesis_with_what_it_compares(study: Study) -> None:
+    two = after(study, SetValue(DESIGN, "abx"), SetValue(("analysis", "participants"), 16))
+    two, _ = two.with_edits(*edits_to_duplicate(two, DESIGN[:2])[0])
+    rows = [row for section in form_of(two, ("analysis",)).sections for row in section.rows]
+    assert len(next(row.facts for row in rows if row.path == ("analysis", "contrasts"))) == 2
+
+
+def test_a_published_form_without_a_title_in_a_language_has_its_name_as_heading(study: Study) -> None:
+    french = after(study, ChangeLanguage("add", "fr"), AddInstrument("nasa-tlx"))
+    form = ("questionnaires", "nasa_tlx")
+    assert title_of(french.document, form) == "NASA-TLX"
+    whole, _ = french.with_edits(*edits_to_fill_in(french, "fr"))
+    assert whole.protocol is not None
+    assert whole.protocol.questionnaires["nasa_tlx"].title == {"en": "NASA-TLX", "fr": "NASA-TLX"}
