@@ -2,6 +2,8 @@
 
 import logging
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
@@ -20,9 +22,13 @@ from study_app.designer.measures.simulation import (
     start_measure_worker,
 )
 from study_app.designer.measures.study_facts import facts, valid_part
+from study_app.designer.prompts import ConfirmCard
 from study_app.designer.window import DesignerPlace
+from study_app.errors import StudyError
 from study_app.gui.widgets.background import delayed_call
 from study_app.number_text import capitalised
+from study_app.store.folders import study_folder
+from study_app.store.output_files import write_files
 from study_app.workers.server import Crashed
 
 log = logging.getLogger(__name__)
@@ -30,6 +36,7 @@ log = logging.getLogger(__name__)
 _IDLE_MS: Final = 20
 _REST_MS: Final = 800
 _LOOK_MS: Final = 100
+_NOT_WRITTEN: Final = "The preregistration was not written"
 _FAILED: Final = "the simulation process could not be started"
 
 
@@ -59,6 +66,7 @@ class MeasuresController(QObject):
         place.pane.tab_shown.connect(self._idle.start)
         place.entered.connect(self._idle.start)
         place.left.connect(self.leave)
+        place.measures.power.preregister.clicked.connect(self.write_preregistration)
         for part in (place.measures, place.pane.facts):
             part.open_asked.connect(editing.select)
             part.appeared.connect(self._idle.start)
@@ -93,6 +101,45 @@ class MeasuresController(QObject):
     def _forget_study(self) -> None:
         self._sound, self._answers, self._latest = None, {}, Simulated()
         self._idle.start()
+
+    def write_preregistration(self) -> None:
+        """Write the saved study's preregistration into its results; ask before another text is replaced."""
+        opened = self._editing.opened
+        if opened is None:
+            return
+        self._place.flush()
+        if opened.edited or not opened.base:
+            self._place.message.emit(_NOT_WRITTEN, "It describes the saved study. Save the study first.")
+            return
+        from study_app.analysis.planning import preregistration  # noqa: PLC0415 - loads scipy
+
+        known = self._answers.get(self._wanted) if self._wanted is not None else None
+        try:
+            text = preregistration.preregistration_of(str(opened.file), None if known is None else known.table)
+            folder = study_folder(self._editing.results, str(opened.study.document["study"]["name"])).path
+            file = folder / preregistration.FILE
+            differs = file.exists() and file.read_text(encoding="utf-8") != text
+        except (StudyError, OSError) as error:
+            self._place.message.emit(_NOT_WRITTEN, f"{error}.")
+            return
+        without = "The text does not include the power, because it is still being simulated. " if known is None else ""
+        write = partial(self._write_text, file, text, without)
+        if not differs:
+            write()
+            return
+        why = f"{file} differs from the text for this study. If you have registered it, keep it. {without}"
+        card = ConfirmCard("Replace the preregistration?", why, "Replace it")
+        card.answered.connect(lambda _answer: write())
+        self._place.show_prompt(card, card.first)
+
+    def _write_text(self, file: Path, text: str, note: str) -> None:
+        try:
+            write_files(file.parent, {file.name: text.encode()})
+        except StudyError as error:
+            self._place.message.emit(_NOT_WRITTEN, f"{error}.")
+            return
+        said = f"{note}Register it before the first session. The report lists deviations from it."
+        self._place.message.emit("Preregistration written", f"{file}\n\n{said}")
 
     # simulations
 

@@ -624,6 +624,10 @@ class DesignerPlace(Place):
         if not self.stack.currentIndex():
             self.finish("new")
 
+    def leave_for_home(self) -> None:
+        self.flush()
+        self.go_asked.emit("home")
+
     def ask_to_add(self) -> None:
         if self.view.form is not None and self.outline.add.isEnabled() and not self.stack.currentIndex():
             self.finish("add")

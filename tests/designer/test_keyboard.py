@@ -27,6 +27,12 @@ def test_a_tab_that_is_asked_for_comes_to_the_front_in_a_narrow_window(designer:
     assert designer.place.pane.isAncestorOf(designer.keyboard)
 
 
+def test_a_key_leads_from_the_designer_to_the_home_page(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    designer.hit("alt+Home")
+    assert designer.window.here == "home"
+
+
 MOST = 250
 
 

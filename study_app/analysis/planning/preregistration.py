@@ -24,6 +24,7 @@ from study_app.analysis.wording import bound_text, counted, listed, percent, sig
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block
 from study_app.protocol.describe import describe, limit_rows
+from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Analysis, Contrast, Protocol
 from study_app.protocol.orders.balance import block_orders_by_group
 from study_app.protocol.quantities import quantity, quantity_words
@@ -271,6 +272,12 @@ def _equivalence_words(decided: Decided) -> str:
         "We test equivalence to the shortest delay with two one-sided t tests and with a bootstrap; both must show "
         f"equivalence, which requires {min_sample(decided.alphas[-1], bound)}. "
     )
+
+
+def preregistration_of(source: str, power: str | None = None) -> str:
+    """Return the preregistration of a protocol file, or of a study by name."""
+    content = source_bytes(source)
+    return preregistration(parse(content, source), protocol_hash(content), power)
 
 
 def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = None) -> str:

@@ -8,6 +8,8 @@ from PySide6.QtWidgets import QScrollArea, QWidget
 
 from study_app.designer.measures.cards import CardGrid
 from study_app.designer.measures.measures_view import MeasuresView
+from study_app.designer.measures.simulation import Simulated
+from study_app.designer.parts import small_button
 from study_app.gui.widgets.boxes import add_parts, vbox
 from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.labels import label
@@ -60,18 +62,24 @@ class _MeasureCards(QScrollArea):
 
 
 class PowerCard(Card):
-    """The output of ``liquid-study power``, with the progress of its simulation."""
+    """The output of ``liquid-study power``, with the progress of its simulation and the trials that would be lost."""
 
     def __init__(self) -> None:
-        super().__init__("Power", padding=16, gap=8)
+        self.preregister = small_button("file", "Write preregistration")
+        self.preregister.setToolTip("Write the saved study's hypotheses, design, sample size and analysis as a text")
+        super().__init__("Power", self.preregister, padding=16, gap=8)
         self.setAccessibleName("Power")
+        self.lost = label("", "small", "warn", wraps=True)
         self.progress = label("", "small", "text2", wraps=True)
         self.table = label("", "small", wraps=True)
         self.table.setTextFormat(Qt.TextFormat.MarkdownText)
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        add_parts(self.column, self.progress, self.table)
+        add_parts(self.column, self.lost, self.progress, self.table)
 
-    def show_power(self, table: str, progress: str) -> None:
+    def show_power(self, simulated: Simulated) -> None:
+        table, progress = simulated.table, simulated.failed or simulated.waiting
+        self.lost.setText("\n".join(f"{sentence}." for sentence in simulated.lost))
+        self.lost.setVisible(bool(simulated.lost))
         self.progress.setText(progress)
         self.progress.setVisible(bool(progress))
         self.table.setText(re.sub("^#+ (.*)$", r"**\1**", table, flags=re.MULTILINE))
@@ -91,8 +99,7 @@ class MeasuresPage(_MeasureCards):
 
     def show_parts(self, shown: MeasuresView) -> None:
         super().show_parts(shown)
-        simulated = shown.simulated
-        self.power.show_power(simulated.table, simulated.failed or simulated.waiting)
+        self.power.show_power(shown.simulated)
 
 
 class FactsRow(_MeasureCards):

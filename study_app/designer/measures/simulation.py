@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import Any, Final, TypeAlias
 
 from study_app.designer.measures.study_facts import text_keys
+from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.protocol.model import Protocol
 from study_app.protocol.warnings.expected_precision import imprecise, threshold_plan
 from study_app.workers.client import WorkerClient
@@ -22,11 +23,13 @@ WAITING: Final = "simulating …"
 class Simulated:
     """What was simulated of a study.
 
-    ``warnings`` are those of ``check`` that need simulations, ``table`` is the output of ``power``. ``waiting``
-    describes the progress, ``failed`` why the simulation cannot continue; both are "" otherwise.
+    ``warnings`` are those of ``check`` that need simulations, ``lost`` says which trials would not be delivered, and
+    ``table`` is the output of ``power``. ``waiting`` describes the progress, ``failed`` why the simulation cannot
+    continue; both are "" otherwise.
     """
 
     warnings: tuple[str, ...] = ()
+    lost: tuple[str, ...] = ()
     table: str = ""
     waiting: str = ""
     failed: str = ""
@@ -95,14 +98,21 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
         simulated = replace(simulated, warnings=_precision_warnings(replace(order, power=False)))
     if order.power:
         from study_app.analysis.planning.power_estimates import estimate_markdown, estimate_power, planned_sizes  # noqa: PLC0415 - loads scipy: only in this process
+        from study_app.session.simulated.predicted_delivery import predicted_delivery  # noqa: PLC0415 - the compiler: only here
         from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
+        simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)
         send(simulated)
+
+        def show_rehearsal(words: str) -> None:
+            check()
+            send(replace(simulated, waiting=f"{words} …"))
+
         for estimate in estimate_power(
             protocol,
             _OneProcess(check),
             sizes=planned_sizes(protocol),
-            rehearse=lambda: condition_features(protocol, seed=1, progress=check),
+            rehearse=lambda: condition_features(protocol, seed=1, progress=show_rehearsal),
             progress=check,
         ):
             progress = f"{estimate.studies} of {estimate.asked} studies per sample size"

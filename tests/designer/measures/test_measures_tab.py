@@ -5,8 +5,10 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QWidget
 
+from study_app.analysis.planning.preregistration import preregistration_of
 from study_app.designer.document.steps import RetypeFile
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.measures.simulation import Simulated
 from study_app.workers.server import Crashed
 from tests.designer.measures.conftest import Worker, open_viscosity_block
 
@@ -107,3 +109,35 @@ def test_a_screen_reader_hears_each_count_of_the_balance(qtbot: Any, designer: A
         return any("1, position 1: " in name and name.endswith(" times") for name in names)
 
     qtbot.waitUntil(has_counts)
+
+
+def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
+    qtbot: Any, designer: Any, worker: Worker
+) -> None:
+    open_viscosity_block(designer)
+    write = designer.place.measures.power.preregister
+    write.click()
+    assert designer.messages.pop()[1] == "It describes the saved study. Save the study first."
+    designer.saving.save()
+    write.click()
+    assert "does not include the power" in designer.messages.pop()[1]
+    file = designer.results / "thicker" / "preregistration.md"
+    before = file.read_text(encoding="utf-8")
+    assert before == preregistration_of(str(designer.editing.opened.file))
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    worker.answer()
+    qtbot.waitUntil(lambda: not designer.place.measures.power.progress.isVisible())
+    write.click()
+    assert file.read_text(encoding="utf-8") == before, "another text is replaced only after a question"
+    designer.place.prompt.go_on.click()
+    assert "| 12 | 80% |" in file.read_text(encoding="utf-8")
+
+
+def test_trials_that_would_be_lost_are_shown_above_the_power(qtbot: Any, designer: Any, worker: Worker) -> None:
+    open_viscosity_block(designer)
+    lost = designer.place.measures.power.lost
+    qtbot.waitUntil(lambda: bool(worker.orders))
+    assert not lost.isVisible()
+    worker.given.append((1, Simulated(lost=("4 of 4 trials would not be delivered",), waiting=WAITING)))
+    qtbot.waitUntil(lost.isVisible)
+    assert lost.text() == "4 of 4 trials would not be delivered."

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export_study import export
 from study_app.cli import commands
+from study_app.designer.measures.simulation import run_simulation, simulation_of
 from study_app.gui.sessions.session_facts import sessions, status_chip
 from study_app.gui.sessions.session_page import read_record
 from study_app.protocol.load import load
@@ -19,6 +20,7 @@ from study_app.store.exclusions import MISSING_RULE, exclusions, include
 from study_app.store.folders import StudyFolder
 from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify_study
+from study_app.workers.server import Stopped
 from tests.compiled import needs_servo
 
 pytestmark = [pytest.mark.slow, needs_servo]
@@ -93,6 +95,10 @@ def test_every_surface_says_that_no_trial_was_delivered(
 ) -> None:
     would = SENTENCE.replace("were", "would").replace("not delivered", "not be delivered")
     assert predicted_delivery(load(str(thick)), 1).sentences == (would,)
+    ordered, sent = simulation_of(load(str(thick)), power=True), []
+    with pytest.raises(Stopped):
+        run_simulation(ordered, sent.append, lambda: bool(sent))
+    assert sent[0].lost == (would,)
     checked = CliRunner().invoke(commands, ["check", str(thick)]).output
     assert f"Note: {would}, predicted for a delay of 1 tick." in checked
     assert told[0].startswith("P001: 0 responses")
