@@ -45,8 +45,8 @@ from study_app.designer.document.elements import (
     short_note,
     title_of,
 )
-from study_app.designer.document.fields import distinguishing_key, element_noun, label_of, node_at, rows, unit_of
-from study_app.designer.document.steps import AddElement, AddInstrument, AddLiquid, shipped_liquids
+from study_app.designer.document.fields import distinguishing_key, element_noun, label_of, node_at, rows
+from study_app.designer.document.steps import AddElement, AddInstrument, AddLiquid, shipped_liquids_to_add
 from study_app.designer.document.study import Study
 from study_app.designer.parts import make_dense
 from study_app.gui.kit.commands import command_tip, key_cap, keys_of, with_key
@@ -234,23 +234,9 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
 
 
 def _addable_liquids(study: Study) -> tuple[Addable, ...]:
-    """Return the liquids of the shipped studies, equal ones of one name once, told apart by what they consist of."""
-    first: dict[tuple[str, str], Addable] = {}
-    for (source, name), table in shipped_liquids().items():
-        asked = AddLiquid(source, name)
-        words = f"{label_of(name)} liquid, {_liquid_facts(table)}"
-        entry = Addable(words=words, icon=icon_of(("liquids", name), {}), asks=asked, help=asked.help(study))
-        first.setdefault((words, entry.help.replace(source, "")), entry)
-    return tuple(first.values())
-
-
-def _liquid_facts(table: Mapping[str, Any]) -> str:
-    """Return what tells liquids of one name apart: "998.2 kg/m³, 0.001 Pa·s", its effects or its kind."""
-    numbers = {**table, **table.get("drag", {})}.items()
-    facts = [f"{value:.4g} {unit_of(key)}" for key, value in numbers if isinstance(value, int | float)]
-    kind, effects = table.get("non_newtonian", {}).get("kind"), table.get("effects")
-    named = (kind,) if kind else effects if isinstance(effects, tuple) else ()
-    return ", ".join((*facts, *named))
+    """Return the liquids of the shipped studies."""
+    sign, every = icon_of(("liquids", ""), {}), shipped_liquids_to_add(study)
+    return tuple(Addable(words=asked.words, icon=sign, asks=asked, help=asked.help(study)) for asked in every)
 
 
 def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:

@@ -102,7 +102,7 @@ class Block(Table):
     )
     code_prefix: str | None = Field(default=None, pattern=r"^[A-Z]$", description="First letter of the block's codes.")
     conditions: tuple[Id, ...] = Field(
-        default=(), description="The conditions to present; omit this key if the block has a stimulus."
+        default=(), description="The conditions to present, unless the block has a stimulus."
     )
     standard: Id | None = later(
         default=None, description="The reference condition; the design compares the block's other conditions with it."

@@ -61,13 +61,15 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
 
 
 def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
-    """Return edits of a block's design or conditions, or of an exclusion rule, and the further edits that it requires.
+    """Return edits of a block's design, conditions, phase or order, or of an exclusion rule, and those they require.
 
     A rule gets its usual limit. Keys that no longer belong to the block are removed; a questionnaire comes after the
     block, once; the first condition becomes the standard unless the standard is among the conditions.
     """
     if path[:2] == EXCLUSIONS and path[-1] == "rule":
         return (*edits, *_limit_edits(study, path, edits))
+    if path[:1] == ("blocks",) and path[2:] in (("phase",), ("order",)):
+        return (*edits, *_surplus_edits(study, path[:2], edits))
     if path[:1] != ("blocks",) or path[2:3] not in (("design",), ("conditions",)):
         return edits
     after = study.with_edits(*edits)[0].document
@@ -83,6 +85,18 @@ def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...
             others.append(Insert(("sequence", sequence.index(path[1]) + 1), form))
         others += _standard_edits(block, path[:2])
     return (*edits, *others)
+
+
+def _surplus_edits(study: Study, block: Path, edits: Sequence[Edit]) -> tuple[Edit, ...]:
+    """Return the edits that remove a block's keys which do not belong to it after some edits."""
+    gone: tuple[Edit, ...] = ()
+    while surplus := [
+        Unset(fault.path)
+        for fault in study.with_edits(*edits, *gone)[0].faults
+        if fault.kind == "surplus" and fault.path[:2] == block and Unset(fault.path) not in gone
+    ]:
+        gone = (*gone, *surplus)
+    return gone
 
 
 def _limit_edits(study: Study, path: Path, edits: Sequence[Edit]) -> tuple[Edit, ...]:

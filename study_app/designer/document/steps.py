@@ -34,6 +34,7 @@ from study_app.designer.document.fields import (
     references_to,
     row_at,
     rows,
+    unit_of,
     with_references,
 )
 from study_app.designer.document.study import Study
@@ -267,7 +268,7 @@ def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
 
 @dataclass(frozen=True, slots=True)
 class AddLiquid(Request):
-    """Add a shipped study's liquid, with a condition for it if the study has conditions.
+    """Add a shipped study's liquid, and name it in the reference at ``path``, or in a new condition if there are any.
 
     A study without a scale of its own gets that of the shipped study: at another scale the device may not be able to
     present the liquid.
@@ -275,6 +276,17 @@ class AddLiquid(Request):
 
     source: str
     name: str
+    path: Path = ()
+
+    @property
+    def words(self) -> str:
+        """What tells the shipped liquids apart: "Water liquid, 998.2 kg/m³, 0.001 Pa·s", or effects or kind."""
+        table = shipped_liquids()[self.source, self.name]
+        numbers = {**table, **table.get("drag", {})}.items()
+        facts = [f"{value:.4g} {unit_of(key)}" for key, value in numbers if isinstance(value, int | float)]
+        kind, effects = table.get("non_newtonian", {}).get("kind"), table.get("effects")
+        named = (kind,) if kind else effects if isinstance(effects, tuple) else ()
+        return ", ".join((f"{label_of(self.name)} liquid", *facts, *named))
 
     def help(self, study: Study) -> str:
         """Return where the liquid comes from, and whether the scale of the scene changes or its forces differ."""
@@ -299,12 +311,23 @@ class AddLiquid(Request):
         document = at.study.document
         name = free_id((*names(document, "liquids"), *names(document, "conditions")), self.name)
         edits: tuple[Edit, ...] = (Set(("liquids", name), _as_written(shipped_liquids()[self.source, self.name])),)
-        if names(document, "conditions"):
+        if self.path:
+            edits = (*edits, Set(self.path, name))
+        elif names(document, "conditions"):
             edits = (*edits, Set(("conditions", name), {"liquid": name}))
         theirs, own = self._scales(at.study)
         if theirs != own and value_at(document, _SCALE) is None:
             edits = (*edits, Set(_SCALE, theirs))
         return Step(f"Add {label_of(self.name).lower()}", edits, ("liquids", name))
+
+
+def shipped_liquids_to_add(study: Study, path: Path = ()) -> tuple[AddLiquid, ...]:
+    """Return the requests for the shipped liquids, equal ones of one name once."""
+    first: dict[tuple[str, str], AddLiquid] = {}
+    for source, name in shipped_liquids():
+        asked = AddLiquid(source, name, path)
+        first.setdefault((asked.words, asked.help(study).replace(source, "")), asked)
+    return tuple(first.values())
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,10 +17,10 @@ from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
 from PySide6.QtWidgets import QApplication, QBoxLayout, QLabel, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.fields import Row
-from study_app.designer.document.steps import AddNamed, Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
+from study_app.designer.document.steps import Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.document.study import Study
 from study_app.designer.form.design_list import DesignList
-from study_app.designer.form.rows import STATEMENT, FormRow, choice_label, is_right_to_left, new_element_label
+from study_app.designer.form.rows import STATEMENT, FormRow, choice_label, is_right_to_left
 from study_app.designer.parts import FIELD_PX, Segments, cut_text, make_dense, small_button
 from study_app.gui.kit.commands import keys_of, with_key
 from study_app.gui.theme.theme import font
@@ -503,7 +503,7 @@ class ChoiceField(Field):
             values = [(name, f"{name} ({note})" if note else name) for name, note in row.notes]
         if shown is not None and shown not in [value for value, _ in values]:
             values.append((shown, str(shown)))
-        values += [(section, new_element_label(section)) for section in row.sections]
+        values += [(label, label) for label, _ in row.additions]
         if [text for _, text in values] != [self.list.itemText(at) for at in range(self.list.count())]:
             self.list.clear()
             self.list.addItems([text for _, text in values])
@@ -512,7 +512,7 @@ class ChoiceField(Field):
         self._values = [value for value, _ in values]
         if isinstance(self.list, DesignList):
             self.list.show_pictures(self._values)
-        known = self._values[: len(values) - len(row.sections)]
+        known = self._values[: len(values) - len(row.additions)]
         self.list.setCurrentIndex(known.index(shown) if shown in known else -1)
         self.list.setPlaceholderText("" if known else "There is nothing to choose from yet")
         self.arrow.setEnabled(row.target is not None)
@@ -544,13 +544,13 @@ class ChoiceField(Field):
 
     def _choose_at(self, at: int) -> None:
         """Choose a value; the last entries add an element and refer to it."""
-        sections = self.row.sections
-        new = at - (len(self._values) - len(sections))
+        added = self.row.additions
+        new = at - (len(self._values) - len(added))
         if new < 0:
             self._choose_value(self._values[at])
             return
         self.show_value()
-        self.asked.emit(AddNamed(self.row.path, sections[new]))
+        self.asked.emit(added[new][1])
 
     def _choose_value(self, value: Any) -> None:
         row = self.row

@@ -30,7 +30,14 @@ from study_app.designer.document.fields import (
     rows,
     sections_of,
 )
-from study_app.designer.document.steps import AddToSession, Request, SetValue, index_of
+from study_app.designer.document.steps import (
+    AddNamed,
+    AddToSession,
+    Request,
+    SetValue,
+    index_of,
+    shipped_liquids_to_add,
+)
 from study_app.designer.document.study import Study
 from study_app.designer.form.card import EDITORS
 from study_app.designer.form.rows import (
@@ -40,6 +47,7 @@ from study_app.designer.form.rows import (
     Form,
     FormRow,
     Section,
+    new_element_label,
     question_lines,
     values_of,
 )
@@ -260,6 +268,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         entries=tuple(_entries(study, row)),
         target=named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         notes=tuple(_notes(document, row)),
+        additions=tuple(_additions(study, row)) if row.kind in {"reference", "references"} else (),
         number=number,
         facts=facts(study, row) if (facts := _facts_of(row)) is not None else None,
     )  # fmt: skip
@@ -282,6 +291,14 @@ def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
         for choice in row.choices:
             facts = (short_note(document, (section, str(choice.value))) for section in row.sections)
             yield str(choice.value), next(filter(None, facts), "") or kind_note(row.path, str(choice.value))
+
+
+def _additions(study: Study, row: Row) -> Iterator[tuple[str, Request]]:
+    """Yield the labels and requests that add an element to which a reference then refers."""
+    for section in row.sections:
+        yield new_element_label(section), AddNamed(row.path, section)
+    if row.kind == "reference" and row.sections == ("liquids",):
+        yield from ((asked.words, asked) for asked in shipped_liquids_to_add(study, row.path))
 
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:

@@ -13,7 +13,6 @@ from study_app.designer.document.elements import title_of
 from study_app.designer.document.steps import (
     AddElement,
     AddEntry,
-    AddNamed,
     ChangeLanguage,
     Do,
     DuplicateElement,
@@ -24,7 +23,7 @@ from study_app.designer.document.steps import (
 )
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_button, kept_value_sentence, typed_value
-from study_app.designer.form.rows import FormRow, new_element_label
+from study_app.designer.form.rows import FormRow
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.parts import FIELD_PX, cut_text, make_dense
@@ -293,8 +292,7 @@ class EntriesField(EntryList):
             row = self.row
             items: list[tuple[str, Request]]
             items = [(str(choice.value), AddEntry(row.path, str(choice.value))) for choice in row.choices]
-            items += [(new_element_label(section), AddNamed(row.path, section)) for section in row.sections]
-            self.names.show_items(items)
+            self.names.show_items([*items, *row.additions])
 
     def fill_rows(self) -> None:
         label, count = self.row.label, len(self.row.entries)

@@ -172,6 +172,11 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     table = added.document["liquids"]["slime_2"]
     assert dict(table) == dict(shipped_liquids()["slime", "slime"])
     assert added.document["conditions"]["slime_2"] == {"liquid": "slime_2"}
+    conditions = form_of(study, ("conditions", "water")).sections[0].rows
+    chosen = next(dict(row.additions) for row in conditions if row.path[-1] == "liquid")
+    named = after(study, chosen["Slime liquid, 1020 kg/m³, maxwell"])
+    assert (named.faults, named.document["conditions"]["water"]) == ((), {"liquid": "slime_2"})
+    assert "New liquid …" in chosen
     for source, name in shipped_liquids():
         assert after(study, AddLiquid(source, name)).faults == ()
 
@@ -242,3 +247,10 @@ def test_a_published_form_without_a_title_in_a_language_has_its_name_as_heading(
     whole, _ = french.with_edits(*edits_to_fill_in(french, "fr"))
     assert whole.protocol is not None
     assert whole.protocol.questionnaires["nasa_tlx"].title == {"en": "NASA-TLX", "fr": "NASA-TLX"}
+
+
+def test_a_block_that_becomes_practice_loses_the_keys_of_a_main_block() -> None:
+    study = template("viscosity-jnd")
+    practised = after(study, SetValue(("blocks", "viscosity", "phase"), "practice"))
+    assert [fault.message for fault in practised.faults] == ["there is no main block"]
+    assert "code_prefix" not in practised.document["blocks"]["viscosity"]
