@@ -169,3 +169,12 @@ def test_help_of_two_lines_does_not_move_the_form(designer: Any) -> None:
             QApplication.processEvents()
         heights.add(form.area.height())
     assert len(heights) == 1
+
+
+def test_the_help_says_which_key_removes_a_field(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    form = designer.place.form
+    for key, removable in (("version", True), ("name", False)):
+        designer.field("study", key).take_keyboard()
+        form.show_help_of(designer.field("study", key))
+        assert form.foot.place.whole.startswith("remove (Ctrl+Del) · ") is removable

@@ -853,4 +853,5 @@ class FormCard(Card):
         if row is None:
             self.foot.show_help("", "", "")
         else:
-            self.foot.show_help(row.row.label, row.row.place, row.help)
+            removes = with_key("remove", "remove") if row.row.is_removable and not self.read_only else ""
+            self.foot.show_help(row.row.label, " · ".join(filter(None, (removes, row.row.place))), row.help)
