@@ -69,7 +69,7 @@ def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...
     if path[:2] == EXCLUSIONS and path[-1] == "rule":
         return (*edits, *_limit_edits(study, path, edits))
     if path[:1] == ("blocks",) and path[2:] in (("phase",), ("order",)):
-        return (*edits, *_surplus_edits(study, path[:2], edits))
+        return (*edits, *_surplus_edits(study, path, edits))
     if path[:1] != ("blocks",) or path[2:3] not in (("design",), ("conditions",)):
         return edits
     after = study.with_edits(*edits)[0].document
@@ -87,13 +87,16 @@ def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...
     return (*edits, *others)
 
 
-def _surplus_edits(study: Study, block: Path, edits: Sequence[Edit]) -> tuple[Edit, ...]:
-    """Return the edits that remove a block's keys which do not belong to it after some edits."""
+def _surplus_edits(study: Study, path: Path, edits: Sequence[Edit]) -> tuple[Edit, ...]:
+    """Return the edits that remove a block's other keys which do not belong to it after an edit at ``path``."""
     gone: tuple[Edit, ...] = ()
     while surplus := [
         Unset(fault.path)
         for fault in study.with_edits(*edits, *gone)[0].faults
-        if fault.kind == "surplus" and fault.path[:2] == block and Unset(fault.path) not in gone
+        if fault.kind == "surplus"
+        and fault.path[:2] == path[:2]
+        and fault.path != path
+        and Unset(fault.path) not in gone
     ]:
         gone = (*gone, *surplus)
     return gone
