@@ -73,7 +73,7 @@ def test_a_simulation_ends_between_two_batches() -> None:
     with pytest.raises(Stopped):
         run_simulation(order(short_study()), sent.append, lambda: len(sent) > 1)
     assert [bool(answer.table) for answer in sent] == [False, True]
-    assert sent[-1].waiting == "10 of 200 studies of each size"
+    assert sent[-1].waiting == "10 of 200 studies per sample size"
 
 
 def test_a_simulation_depends_on_forces_and_tasks_and_on_no_text() -> None:
