@@ -63,14 +63,14 @@ class CumulativeModels(StatementTests):
             ("Verdict", lambda test: test.verdict),
             last=1,
         )
+        per_delay, and_slopes = (" per 100 ms of delay", " and delay effects") if delays else ("", "")
         methods = "; ".join(dict.fromkeys(test.outcome.method for test in fitted))
         yield paragraph(
             "A cumulative logit mixed model was fitted to all individual answers to each primary statement, including "
-            "the answers of incomplete participants. Effects are log odds ratios"
-            f"{' per 100 ms of delay' if delays else ''} with 95 % Wald intervals; they are positive if answers rise. The SDs describe the participants' "
-            f"intercepts{' and delay effects' if delays else ''}. Effects were tested with likelihood ratios (LR; "
-            f"{methods}), and p values were adjusted ({fitted[0].correction}) across "
-            f"{number_text.counted(fitted[0].members, 'test')}.",
+            f"the answers of incomplete participants. Effects are log odds ratios{per_delay} with 95 % Wald intervals; "
+            f"they are positive if answers rise. The SDs describe the participants' intercepts{and_slopes}. Effects "
+            f"were tested with likelihood ratios (LR; {methods}), and p values were adjusted "
+            f"({fitted[0].correction}) across {number_text.counted(fitted[0].members, 'test')}.",
             "soft",
         )
 
