@@ -127,7 +127,8 @@ class MeasuresController(QObject):
         if not differs:
             write()
             return
-        why = f"{file} differs from the text for this study. If you have registered it, keep it. {without}"
+        differs = f"{file} differs from the text generated for this study. If you have registered the file, keep it."
+        why = f"{differs} {without}"
         card = ConfirmCard("Replace the preregistration?", why, "Replace it")
         card.answered.connect(lambda _answer: write())
         self._place.show_prompt(card, card.first)

@@ -36,7 +36,7 @@ class Scale(Table):
     """The points of an answer, lowest first: seven for statements, 2 to 11 for other ratings."""
 
     labels: dict[str, Annotated[tuple[Printable, ...], Field(min_length=FEWEST_POINTS, max_length=MOST_POINTS)]] = (
-        Field(description=("Labels for the scale's 2 to 11 points in each language, lowest first."))
+        Field(description=("Labels for the scale points (2 to 11) in each language, lowest first."))
     )
     cannot_judge: Localised | None = Field(
         default=None, description="Label for an answer that is not on the scale, such as “cannot judge”; default: none."

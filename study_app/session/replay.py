@@ -207,7 +207,7 @@ def replay(session_folder: Path) -> Replayed:
     kept = receipt.read(session.receipt)
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
-        raise StoreError(f"{study.key} is not the key of session {session.path}: restore it from a back-up")
+        raise StoreError(f"{study.key} is not the key for session {session.path}: restore it from a back-up")
     lines = open_events(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _recorded_setup(session.receipt, kept, key, lines)
     _recompute_forces(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code before the timing

@@ -154,7 +154,7 @@ def test_the_preregistration_quotes_the_rules(tmp_path: Path) -> None:
         ('rule = "constant_answers"', "specify a number from 1 to 100"),
         ('rule = "fast_answers"\nlimit = 0', "specify a number from 0.05 to 600"),
         ('rule = "below_chance"\nlimit = 3', "is not used by the rule below_chance"),
-        ('rule = "below_chance"', "no main block has correct answers"),
+        ('rule = "below_chance"', "no main block has questions with a correct answer"),
         ('rule = "threshold_beyond_levels"', "no main block has levels"),
     ],
 )

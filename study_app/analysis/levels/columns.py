@@ -142,7 +142,7 @@ _EXPONENTS: Final[tuple[Column, ...]] = (
 _THRESHOLDS: Final[tuple[Column, ...]] = (
     _BLOCK,
     _STANDARD,
-    optional("condition", "text", "The comparison condition; n/a in a block that varies a level."),
+    optional("condition", "text", "The comparison condition; n/a in a block in which the level is varied."),
     Column("n", "integer", "Number of answers included in the analysis.", minimum=0),
     optional(
         "threshold",

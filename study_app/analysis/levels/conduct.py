@@ -101,7 +101,7 @@ class Delivery(LevelStatistic[_Row]):
 
     key = "conduct"
     place = 6
-    title = "Delivery of levels"
+    title = "Delivered levels"
 
     compute = staticmethod(lambda block, opened, study, _found: _level_conduct(block, opened, study.intervals))
 

@@ -425,14 +425,12 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     """Return sentences on the simulated participants of a block and on the group's interval."""
     plan = next(iter(plans_of_block.values()))
     if isinstance(plan, ThresholdPlan):
+        preference = "the preference for one interval or for the last answer, " if plan.two_intervals else ""
         return (
-            "Each study simulates one type of participant, cycling through all types in turn. The types differ in the "
-            "width of the "
-            "psychometric function (0.5, 1, 1.5 or 2.5 times the median of the prior), the rate of random answers (2 "
-            f"or 5 %), {'the preference for one interval or for the last answer, ' if plan.two_intervals else ''}and "
-            "the change of the threshold over the trials (a decrease or an increase). The mean threshold lies in the "
-            "middle "
-            "half of the levels. The group interval is the Hartung–Knapp interval for the mean across all standards."
+            "Each simulated study uses one type of participant, and the studies cycle through all types. The types "
+            "differ in the width of the psychometric function (0.5, 1, 1.5 or 2.5 times the median of the prior), "
+            f"the rate of random answers (2 or 5 %), {preference}and the change in the threshold over the trials (a "
+            "decrease or an increase). The mean threshold lies in the middle half of the levels. The group interval is the Hartung–Knapp interval for the mean across all standards."
         )
     group = "The group interval is a t-based confidence interval for the mean."
     if isinstance(plan, SensitivityPlan):

@@ -119,7 +119,7 @@ _MOTION: Final = (
     optional("q1", "number", "Lower quartile across participants."),
     optional("q3", "number", "Upper quartile across participants."),
     Column("trials", "integer", "Number of analysed trials in the condition.", minimum=0),
-    Column("judged", "integer", "Number of these trials whose limits were checked.", minimum=0),
+    Column("judged", "integer", "Number of these trials in which the limits were checked.", minimum=0),
     Column("valid", "integer", "Number of these trials that met the protocol's timing limits.", minimum=0),
 )
 

@@ -92,7 +92,7 @@ def missing_for_rule(protocol: Protocol, rule: str) -> str | None:
     if rule == "below_chance" and not any(
         has_correct_answer(design_of(protocol, block), stimuli[block.id]) for block in blocks
     ):
-        return "no main block has correct answers"
+        return "no main block has questions with a correct answer"
     return None
 
 

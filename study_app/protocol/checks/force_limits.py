@@ -45,7 +45,7 @@ LIMIT_J: Final = 0.5e-3
 """A force that returns no more is delivered; measured in docs/late-force.md."""
 _MOST_NAMED: Final = 4
 """Of more clipped levels the first and the last of each row are named."""
-PACED: Final = 'choose a task of kind "follow"'
+PACED: Final = 'choose a task of type "follow"'
 _GIVES: Final = ("gives", "give")
 _REACHES: Final = ("reaches", "reach")
 
@@ -59,7 +59,7 @@ def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterato
         for name in protocol.conditions_in(block.id) if isinstance(protocol.tasks[block.task], Reach) else ():
             if protocol.conditions[name].ball == "hidden":
                 message = f'is hidden, but participants must see it for the reaching task of block "{block.id}"'
-                yield Fault(("conditions", name, "ball"), message, 'choose a task of kind "follow" or "explore"')
+                yield Fault(("conditions", name, "ball"), message, 'choose a task of type "follow" or "explore"')
     yield from _check_estimator_lag(protocol)
     for blocks in blocks_by_stimulus(protocol):
         yield from check_clipping(protocol, blocks, delay_ticks)

@@ -278,7 +278,7 @@ def verified_key(study: StudyFolder) -> Key:
     for session in study.sessions():
         if _published_hash(session) not in {None, key.hash}:
             raise StoreError(
-                f"{study.key} is not the key of session {session.path} (its SHA-256 differs from the published one): "
+                f"{study.key} is not the key for session {session.path} (its SHA-256 differs from the published one): "
                 "restore it from a back-up"
             )
     return key

@@ -79,7 +79,7 @@ def test_sample_without_a_believable_velocity_is_refused_and_the_force_ends(meas
     samples = reader.read()
     assert (samples.limiters & LIMITER_GLITCH).all()
     assert not probe.forces_n[-1].any()
-    assert "sent nothing usable" in servo.fault
+    assert "sent no usable data" in servo.fault
 
 
 def test_what_is_not_measured_is_zero_whatever_the_record_holds():

@@ -128,7 +128,7 @@ def test_a_delay_beyond_any_stable_loop_fades_the_force_out():
     samples = reader.read()
     assert not samples.fresh.any()
     assert not samples.device_force_n[-1].any()
-    assert "sent nothing usable" in servo.fault
+    assert "sent no usable data" in servo.fault
 
 
 @pytest.mark.parametrize(("lost", "reads"), [("lost_at_read", 500), ("lost_at_write", 500)])

@@ -166,7 +166,7 @@ def test_a_replacement_needs_a_participant_of_the_same_group(tmp_path: Path) -> 
     ):
         begun(folder, source, "P002", group="novices", row_of="P009")
     begun(folder, source, "P002", group="experts", row_of="P001").close()
-    with pytest.raises(StudyError, match="cannot be replaced: P002 has replaced P001 since the first session"):
+    with pytest.raises(StudyError, match="cannot be replaced: P002 is recorded as replacing P001"):
         begun(folder, source, "P002", session=2, row_of="P009")
     with begun(folder, source, "P002", session=2) as store:
         assert (start_of(store.lines).row_of, start_of(store.lines).entry) == ("P001", 1)
