@@ -430,7 +430,8 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
             "Each simulated study uses one type of participant, and the studies cycle through all types. The types "
             "differ in the width of the psychometric function (0.5, 1, 1.5 or 2.5 times the median of the prior), "
             f"the rate of random answers (2 or 5 %), {preference}and the change in the threshold over the trials (a "
-            "decrease or an increase). The mean threshold lies in the middle half of the levels. The group interval is the Hartung–Knapp interval for the mean across all standards."
+            "decrease or an increase). The mean threshold lies in the middle half of the levels. The group "
+            "interval is the Hartung–Knapp interval for the mean across all standards."
         )
     group = "The group interval is a t-based confidence interval for the mean."
     if isinstance(plan, SensitivityPlan):
