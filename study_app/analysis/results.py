@@ -345,8 +345,7 @@ SEALED: Final = "computed only after unblinding, because this requires knowing w
 VERDICTS_MEAN: Final = (
     "Shown: the adjusted p value is at most {alpha}. Suggested: the adjusted p value is at most {alpha}, but the "
     "statement was not specified as primary before the study; this is a lead, not a finding. Not shown: the adjusted "
-    "p "
-    "value is above {alpha}, which is not evidence that the answers are the same. Out of reach: no rearrangement of "
+    "p value is above {alpha}, which is not evidence that the answers are the same. Out of reach: no rearrangement of "
     "these answers within participants could have made the adjusted p value significant, given the other p values in "
     "the family. A statement's adjusted p value is never below the p value of the test over all statements, which is "
     "Holm-adjusted across the blocks of the study."

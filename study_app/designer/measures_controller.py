@@ -26,7 +26,7 @@ from study_app.designer.prompts import ConfirmCard
 from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.gui.widgets.background import delayed_call
-from study_app.number_text import capitalised
+from study_app.number_text import capitalised, counted
 from study_app.store.folders import study_folder
 from study_app.store.output_files import write_files
 from study_app.workers.server import Crashed
@@ -37,6 +37,7 @@ _IDLE_MS: Final = 20
 _REST_MS: Final = 800
 _LOOK_MS: Final = 100
 _NOT_WRITTEN: Final = "The preregistration was not written"
+_LATE: Final = "The study already has {count}, for which the text is not a preregistration."
 _FAILED: Final = "the simulation process could not be started"
 
 
@@ -114,32 +115,44 @@ class MeasuresController(QObject):
         from study_app.analysis.planning import preregistration  # noqa: PLC0415 - loads scipy
 
         known = self._answers.get(self._wanted) if self._wanted is not None else None
+        power = known.table or None if known is not None else None
         try:
-            text = preregistration.preregistration_of(str(opened.file), None if known is None else known.table)
-            folder = study_folder(self._editing.results, str(opened.study.document["study"]["name"])).path
-            file = folder / preregistration.FILE
-            differs = file.exists() and file.read_text(encoding="utf-8") != text
+            text = preregistration.preregistration_of(str(opened.file), power).encode()
+            study = study_folder(self._editing.results, str(opened.study.document["study"]["name"]))
+            file = study.path / preregistration.FILE
+            differs, sessions = file.exists() and file.read_bytes() != text, len(study.sessions())
         except (StudyError, OSError) as error:
             self._place.message.emit(_NOT_WRITTEN, f"{error}.")
             return
-        without = "The text does not include the power, because it is still being simulated. " if known is None else ""
-        write = partial(self._write_text, file, text, without)
-        if not differs:
+        note = "" if power else self._without_power()
+        why = [f"{file} differs from the text generated for this study. If you have registered the file, keep it."]
+        why = [
+            *(why if differs else ()),
+            *([_LATE.format(count=counted(sessions, "session"))] if sessions else ()),
+            note,
+        ]
+        write = partial(self._write_text, file, text, note)
+        if not differs and not sessions:
             write()
             return
-        differs = f"{file} differs from the text generated for this study. If you have registered the file, keep it."
-        why = f"{differs} {without}"
-        card = ConfirmCard("Replace the preregistration?", why, "Replace it")
+        question = "Replace the preregistration?" if differs else "Write the preregistration now?"
+        card = ConfirmCard(question, " ".join(why).rstrip(), "Replace it" if differs else "Write it")
         card.answered.connect(lambda _answer: write())
         self._place.show_prompt(card, card.first)
 
-    def _write_text(self, file: Path, text: str, note: str) -> None:
+    def _without_power(self) -> str:
+        """Return why the text has no power."""
+        if failed := self._latest.failed:
+            return f"The text does not include the power: {failed}"
+        return "The text does not include the power, because its simulation has not finished."
+
+    def _write_text(self, file: Path, text: bytes, note: str) -> None:
         try:
-            write_files(file.parent, {file.name: text.encode()})
+            write_files(file.parent, {file.name: text})
         except StudyError as error:
             self._place.message.emit(_NOT_WRITTEN, f"{error}.")
             return
-        said = f"{note}Register it before the first session. The report lists deviations from it."
+        said = f"{note} Register it before the first session. The report lists deviations from it.".lstrip()
         self._place.message.emit("Preregistration written", f"{file}\n\n{said}")
 
     # simulations

@@ -33,18 +33,21 @@ class CumulativeModels(StatementTests):
         over_delay = answers.block.kind == "delays"
         columns = np.array(answers.block.delays_ms)[:, None] / 100 if over_delay else None
         outcomes = {
-            item: cumulative_model(values, columns, answers.decided.direction(item) if over_delay else None)
-            for item, values in answers.single.items()
+            item: cumulative_model(answers.single[item], columns, answers.decided.direction(item))
+            if over_delay
+            else cumulative_model(medians[..., None])
+            for item, medians in answers.values.items()
             if answers.decided.is_primary(item)
         }
         family = f"{answers.block.id}: cumulative mixed models"
         tested = in_family(outcomes, answers, family, false_discovery, FDR, primary=False)
         if tested and all(test.outcome.p is None for test in tested):
-            return (), (NotTested(cls.what, tested[0].outcome.note),)
+            return (), (NotTested(cls.what, "; ".join(dict.fromkeys(test.outcome.note for test in tested))),)
         return tested, ()
 
     def section(self) -> Iterator[str]:
-        if not (fitted := [test for test in self.value if test.outcome.p is not None]):
+        fitted = [test for test in self.value if test.outcome.p is not None]
+        if not fitted:
             return
         delays = bool(self.found.delays_ms)
         effects = ["per 100 ms"] if delays else [f"{name} − {self.found.names[0]}" for name in self.found.names[1:]]
@@ -63,16 +66,24 @@ class CumulativeModels(StatementTests):
             ("Verdict", lambda test: test.verdict),
             last=1,
         )
-        per_delay, and_slopes = (" per 100 ms of delay", " and delay effects") if delays else ("", "")
         methods = "; ".join(dict.fromkeys(test.outcome.method for test in fitted))
+        unit, sign = ("per 100 ms of delay", "answers rise") if delays else ("", "the first of the two is rated higher")
         yield paragraph(
-            "A cumulative logit mixed model was fitted to all individual answers to each primary statement, including "
-            f"the answers of incomplete participants. Effects are log odds ratios{per_delay} with 95 % Wald intervals; "
-            f"they are positive if answers rise. The SDs describe the participants' intercepts{and_slopes}. Effects "
-            f"were tested with likelihood ratios (LR; {methods}), and p values were adjusted "
-            f"({fitted[0].correction}) across {number_text.counted(fitted[0].members, 'test')}.",
+            f"A cumulative logit mixed model was fitted to {self._answers()} to each primary statement, including the "
+            f"answers of incomplete participants. Effects are log odds ratios {unit}".rstrip()
+            + f" with 95 % Wald intervals; they are positive if {sign}. The SDs describe the participants' intercepts"
+            f"{' and delay effects' if delays else ''}. Effects were tested with likelihood ratios (LR; {methods}), "
+            f"and p values were adjusted ({fitted[0].correction}) across "
+            f"{number_text.counted(fitted[0].members, 'test')}.",
             "soft",
         )
+
+        for test in self.value:
+            if test.outcome.p is None:
+                yield paragraph(f"{short_text(self.found, test.item)}: {test.outcome.note}.", "soft")
+
+    def _answers(self) -> str:
+        return "all individual answers" if self.found.delays_ms else "the participants' median answers"
 
     @staticmethod
     def _model(test: Tested) -> CumulativeModel:
@@ -88,7 +99,7 @@ class CumulativeModels(StatementTests):
             slopes = " and delay effects" if self.found.delays_ms else ""
             yield (
                 f"In an exploratory analysis, a cumulative logit mixed model with random intercepts{slopes} was fitted "
-                f"to all individual answers to {counted(fitted, 'primary statement')}, including the answers of "
+                f"to {self._answers()} to {counted(fitted, 'primary statement')}, including the answers of "
                 "incomplete participants; effects were tested with likelihood ratios, and the false discovery rate was "
                 "controlled (Benjamini–Hochberg)."
             )

@@ -461,8 +461,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
         yield table(("File", "SHA-256"), list(hashes.items()), words=2)
     yield paragraph(
         f"The numbers are based on {counted(len(hashes), 'file')}. The combined SHA-256 of the files' hashes and names "
-        "is "
-        f"{together.hexdigest()}. report.json contains the hash of each file and the seed of each session."
+        f"is {together.hexdigest()}. report.json contains the hash of each file and the seed of each session."
     )
     yield paragraph(
         "The files next to this page are report.json (all numbers), tests.csv (one row per test), motion.csv, the "

@@ -2,7 +2,7 @@
 
 The log odds of an answer of at most k are θ_k - x·β - u: thresholds θ, effects β of the conditions x, and a normal
 deviation u for each participant (McCullagh 1980, J. R. Stat. Soc. B 42, 109-142; Tutz & Hennevogl 1996, Comput. Stat.
-Data Anal. 22, 537-557). With one column x, such as a delay, participants also have effects of their own.
+Data Anal. 22, 537-557). With one predictor x, such as a delay, participants also have effects of their own.
 
 The likelihood is integrated on a grid. The likelihood ratio is compared with t(n - 1) or F(k, k (n - 1)), not with χ²,
 which with few participants rejects too often. R's ``ordinal::clmm`` fits the same model, with Laplace's approximation
@@ -41,7 +41,7 @@ class CumulativeModel(Outcome):
 
     ``log_odds_ratios`` and ``intervals`` (95 %, Wald) have one entry per column: above 0 if answers rise. ``answers``
     counts them; ``incomplete`` participants, who did not answer in all conditions, are included in ``n``. ``sds`` are
-    the standard deviations of the participants' deviations and, with one column, of their own effects.
+    the standard deviations of the participants' deviations and, with one predictor, of their own effects.
     """
 
     log_odds_ratios: tuple[float, ...] = ()
@@ -64,7 +64,8 @@ def cumulative_model(
         Answers on an ordinal scale, NaN if one is missing.
     columns : (conditions, predictors) array, optional
         The values of the predictors. With a single one, such as a delay in units of 100 ms, participants also differ
-        in its effect. By default each condition is compared with the first.
+        in its effect. By default each condition is compared with the first, and participants do not differ in these
+        effects: give one answer per condition, such as a median, because the test rejects too often otherwise.
     direction : "increasing" | "decreasing", optional
         Direction of a single effect that was stated in advance; the test is then one-sided.
 
@@ -99,7 +100,7 @@ def cumulative_model(
         few = f"no cumulative model for fewer than {_FEWEST} participants, because its test would reject too often"
         note = few if n < _FEWEST else NO_VARIATION
         return replace(model, no_interval=note, note=note)
-    return _fitted(model, _Likelihood(answered, design), direction)
+    return _fitted(model, _Likelihood(answered, design, slopes=columns is not None and several == 1), direction)
 
 
 def _fitted(model: CumulativeModel, likelihood: "_Likelihood", direction: Direction | None) -> CumulativeModel:
@@ -152,7 +153,7 @@ class _Likelihood:
     Answers enter as counts by participant, condition and category, so that the time hardly depends on their number.
     """
 
-    def __init__(self, values: Array, design: Array) -> None:
+    def __init__(self, values: Array, design: Array, *, slopes: bool) -> None:
         people, conditions, _ = values.shape
         categories, codes = np.unique(values[~np.isnan(values)], return_inverse=True)
         self.design, self.categories, self.effects = design, len(categories), design.shape[1]
@@ -162,7 +163,7 @@ class _Likelihood:
         np.add.at(counts, (person, condition, codes), 1.0)
         self._totals = counts.sum(axis=(0, 1))
         self._counts = counts.reshape(people, -1)
-        self._x = design if self.effects == 1 else None
+        self._x = design if slopes else None
 
     def _integrate(self, nodes: int) -> None:
         """Use a grid with so many ``nodes`` for each standard normal deviation of a participant."""

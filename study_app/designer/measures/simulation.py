@@ -48,7 +48,9 @@ def simulation_of(protocol: Protocol, *, power: bool) -> Simulation | None:
     """Return the simulation that a study needs; None if it needs none."""
     if not power and not needs_precision_check(protocol):
         return None
-    depends = json.dumps(_without_texts(protocol.model_dump(mode="json", exclude={"pages"})), sort_keys=True)
+    described = _without_texts(protocol.model_dump(mode="json", exclude={"pages"}))
+    titles = [protocol.study.title, *(block.title for block in protocol.main_blocks)] if power else []  # in the table
+    depends = json.dumps([described, titles], sort_keys=True)
     return Simulation(depends, power, protocol)
 
 
@@ -101,7 +103,9 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
         from study_app.session.simulated.predicted_delivery import predicted_delivery  # noqa: PLC0415 - the compiler: only here
         from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
+        send(simulated)
         simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)
+        check()
         send(simulated)
 
         def show_rehearsal(words: str) -> None:

@@ -15,9 +15,9 @@ NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(9)
 class Model:
     """Answers of each participant with the predictors; deviations are integrated about their most probable values."""
 
-    def __init__(self, rows: pd.DataFrame, design: Floats) -> None:
+    def __init__(self, rows: pd.DataFrame, design: Floats, *, slopes: bool) -> None:
         categories = np.unique(rows["response"])
-        self.k, self.effects, self.sds = len(categories), design.shape[1], 2 if design.shape[1] == 1 else 1
+        self.k, self.effects, self.sds = len(categories), design.shape[1], 1 + slopes
         own = [group for _, group in rows.groupby("participant")]
         most = max(map(len, own))
         self.answers, self.x = np.zeros((len(own), most), int), np.zeros((len(own), most, self.effects))
@@ -97,9 +97,9 @@ def counts(rows: pd.DataFrame, conditions: int) -> Numbers:
     return own | {"p": math.nan}
 
 
-def fitted(rows: pd.DataFrame, design: Floats, direction: str | None) -> Numbers:
+def fitted(rows: pd.DataFrame, design: Floats, direction: str | None, *, slopes: bool) -> Numbers:
     """Return the numbers of a model that is compared with the one without effects."""
-    model = Model(rows, design)
+    model = Model(rows, design, slopes=slopes)
     values, most = model.maximum()
     cuts, effects, sds = np.split(values, [model.k - 1, model.k - 1 + model.effects])
     reach = stats.t.ppf(0.975, len(model.answers) - 1) * model.standard_errors(values)

@@ -153,9 +153,11 @@ def _cumulative_models(block: Block) -> None:
     outcomes = {}
     for item, model in ((one["item"], one["outcome"]) for one in block.found["cumulative"]):
         own = rows[rows["item"] == item]
+        if not delays:
+            own = own.groupby(["participant", "place"], as_index=False)["response"].median()
         outcomes[item] = counts(own, len(place))
         if model["p"] is not None:
-            outcomes[item] |= fitted(own, design, block.sides.get(item) if delays else None)
+            outcomes[item] |= fitted(own, design, block.sides.get(item) if delays else None, slopes=delays)
     ps = adjusted([outcome["p"] for outcome in outcomes.values()], "fdr_bh")
     for number, ((item, outcome), p) in enumerate(zip(outcomes.items(), ps, strict=True)):
         own = named("outcome", outcome) | {"p_adjusted": np.maximum(p, block.gate), "members": len(outcomes)}

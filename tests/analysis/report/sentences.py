@@ -862,7 +862,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"who answered in all conditions; the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
      when(lambda told: any(one["outcome"]["p"] is not None for one in told.block["mixed"]))),
     (rf"In an exploratory analysis, a cumulative logit mixed model with random intercepts( and delay effects)? was "
-     rf"fitted to all individual answers to {N} primary statements?, including the answers of incomplete participants; "
+     rf"fitted to (?:all individual|the participants' median) answers to {N} primary statements?, including the "
+     r"answers of incomplete participants; "
      r"effects were tested with likelihood ratios, and "
      r"the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
      cumulative_models),

@@ -54,7 +54,7 @@ def test_the_model_is_the_maximum_of_an_independent_likelihood(seed: int, over_d
     values[2, 1:], values[5] = np.nan, np.nan
     design = DELAYS if over_delay else np.eye(3)[:, 1:]
     model = cumulative_model(values, DELAYS if over_delay else None, "increasing" if over_delay else None)
-    own = fitted(rows_of(values), design, "greater" if over_delay else None)
+    own = fitted(rows_of(values), design, "greater" if over_delay else None, slopes=over_delay)
     for place, value in enumerate(model.log_odds_ratios):
         assert value == pytest.approx(own[f"log_odds_ratios.{place}"], abs=2e-3)
     assert (model.statistic, model.p) == pytest.approx((own["statistic"], own["p"]), abs=5e-3)
@@ -68,6 +68,14 @@ def test_sides_are_those_of_the_signed_root() -> None:
     assert rising.p + falling.p == pytest.approx(1.0)
     assert two.p == pytest.approx(2 * rising.p)
     assert two.effect == two.log_odds_ratios[0] > 0
+
+
+def test_the_order_of_two_conditions_does_not_matter() -> None:
+    values = drawn(17, effect=1.5, slope_sd=2.0, k=3)[:, [0, 2], :1]
+    first, swapped = cumulative_model(values), cumulative_model(values[:, ::-1])
+    assert first.p == pytest.approx(swapped.p, rel=1e-3)
+    assert first.effect == pytest.approx(-swapped.log_odds_ratios[0], abs=1e-3)
+    assert len(first.sds) == 1
 
 
 def test_what_has_no_model_says_why() -> None:
@@ -90,4 +98,16 @@ def test_what_has_no_model_says_why() -> None:
 @pytest.mark.parametrize("slope_sd", [0.0, 0.8])
 def test_studies_without_an_effect_are_seldom_significant(people: int, slope_sd: float) -> None:
     ps = [cumulative_model(drawn(seed, people=people, slope_sd=slope_sd), DELAYS).p for seed in range(9_000, 9_300)]
+    assert sum(p is not None and p <= 0.05 for p in ps) <= stats.binom.isf(1e-3, 300, 0.06)
+
+
+@pytest.mark.nightly
+def test_medians_of_people_with_effects_of_their_own_are_seldom_significant() -> None:
+    """Three conditions whose effects differ between participants (SD 1.2) but not on average."""
+    ps = []
+    for seed in range(500, 800):
+        rng = np.random.default_rng(seed)
+        at = 1.2 * (rng.normal(size=(16, 1)) + rng.normal(size=(16, 3)))
+        answers = (at[..., None, None] + rng.logistic(size=(16, 3, 3, 1)) > np.linspace(-3, 3, 6)).sum(axis=-1)
+        ps.append(cumulative_model(np.median(answers, axis=2)[..., None]).p)
     assert sum(p is not None and p <= 0.05 for p in ps) <= stats.binom.isf(1e-3, 300, 0.06)

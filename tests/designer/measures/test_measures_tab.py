@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QWidget
+from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.analysis.planning.preregistration import preregistration_of
 from study_app.designer.document.steps import RetypeFile
@@ -131,6 +131,12 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     assert file.read_text(encoding="utf-8") == before, "another text is replaced only after a question"
     designer.place.prompt.go_on.click()
     assert "| 12 | 80% |" in file.read_text(encoding="utf-8")
+    (file.parent / "data" / "sub-P001" / "ses-01").mkdir(parents=True)
+    file.write_bytes(b"\xff another program's text")
+    write.click()
+    said = " ".join(one.text() for one in designer.place.prompt.findChildren(QLabel))
+    assert f"{file} differs from the text generated" in said
+    assert "already has 1 session, for which the text is not a preregistration" in said
 
 
 def test_trials_that_would_be_lost_are_shown_above_the_power(qtbot: Any, designer: Any, worker: Worker) -> None:

@@ -31,6 +31,8 @@ RELEASED = {
 def test_released_versions_keep_their_numbers():
     for version in (1, 2):
         assert VERSIONS[version]._asdict() == {"version": version, **RELEASED}
+    assert VERSIONS[5]._asdict() == {**VERSIONS[4]._asdict(), "version": 5, "swing_mps": 0.01}
+    assert VERSIONS[6]._asdict() == {**VERSIONS[5]._asdict(), "version": 6, "acting_share": 0.25}
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():
