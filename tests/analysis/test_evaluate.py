@@ -120,7 +120,7 @@ def test_nothing_decided_makes_everything_exploratory(tmp_path: Path) -> None:
     assert {one.correction for one in SettingsDiffer.of(liquids)} == {"Benjamini-Hochberg"}
     assert "shown" not in {one.verdict for one in SettingsDiffer.of(liquids)}
     why = {one.what: one.why for one in (*liquids.absent, *delays.absent)}
-    assert "depend on the answers" in why["equivalence test"]
+    assert "be influenced by the answers" in why["equivalence test"]
     assert "does not specify which statements name" in why["recognition test"]
     assert {one.outcome.method.split(", ")[1] for one in DelayTrend.of(delays)} == {"two-sided"}
     assert "does not specify a detection question" in why["detection threshold"]

@@ -177,7 +177,9 @@ def test_names_of_people_and_codes_do_not_matter(tmp_path: Path) -> None:
     assert first.keys() == second.keys()
     assert len(first) > 1500
     differing = {
-        place: (one, second[place]) for place, one in first.items() if one != pytest.approx(second[place], rel=1e-9)
+        place: (one, second[place])
+        for place, one in first.items()
+        if one != pytest.approx(second[place], rel=1e-9, abs=1e-4 if ".cumulative." in place else None)  # an optimum
     }
     assert differing == {}
 

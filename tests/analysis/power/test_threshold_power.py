@@ -115,7 +115,7 @@ def test_ratings_have_the_spread_that_check_expects() -> None:
         assert of.half(0) > 1.5 * of.half(1)
     said = threshold_markdown(found)
     assert "mean d_a of 1" in said
-    assert "all 5 points on the scale" in said
+    assert "5 points of the scale about equally often" in said
     assert "| trials per level | participants |" in said
 
 
