@@ -103,9 +103,7 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
         from study_app.session.simulated.predicted_delivery import predicted_delivery  # noqa: PLC0415 - the compiler: only here
         from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
-        send(simulated)
         simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)
-        check()
         send(simulated)
 
         def show_rehearsal(words: str) -> None:
