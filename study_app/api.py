@@ -290,7 +290,7 @@ def fit(
         raise AnalysisError(f"trials are a {type(trials).__name__}: specify a DataFrame")
     if missing := {"level", "success"} - set(trials.columns):
         raise AnalysisError(
-            f"the column {', '.join(sorted(missing))} is missing from trials: each row needs level and success"
+            f"trials do not contain {' and '.join(sorted(missing))}: specify level and success in each row"
         )
     kinds = [name for name, kind in KINDS.items() if kind.adaptive]
     if design not in kinds:

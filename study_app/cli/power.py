@@ -162,11 +162,12 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
     every deviation.
     """
     from study_app.analysis.planning.preregistration import FILE as NAME
-    from study_app.analysis.planning.preregistration import preregistration_of
-    from study_app.protocol.load import load
+    from study_app.analysis.planning.preregistration import preregistration
+    from study_app.protocol.load import parse, protocol_hash, source_bytes
     from study_app.store.output_files import write_files
 
-    study = load(protocol)
+    source = source_bytes(protocol)
+    study = parse(source, protocol)
     power_md = None
     if computed is not None:
         try:
@@ -180,7 +181,7 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
             raise click.UsageError(
                 f"--power {computed}: power.md was not written for {study.study.name} {study.study.version}"
             )
-    text = preregistration_of(protocol, power_md)
+    text = preregistration(study, protocol_hash(source), power_md)
     if to is None:
         click.echo(text, nl=False)
         return

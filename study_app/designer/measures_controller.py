@@ -115,7 +115,7 @@ class MeasuresController(QObject):
         from study_app.analysis.planning import preregistration  # noqa: PLC0415 - loads scipy
 
         known = self._answers.get(self._wanted) if self._wanted is not None else None
-        power = known.table or None if known is not None else None
+        power = (known and known.table) or None
         try:
             text = preregistration.preregistration_of(str(opened.file), power).encode()
             study = study_folder(self._editing.results, str(opened.study.document["study"]["name"]))

@@ -17,7 +17,11 @@ from study_app.analysis.wording import counted, interval, number, p_value
 
 
 class CumulativeModels(StatementTests):
-    """An exploratory cumulative mixed model of each primary statement, fitted to all individual answers."""
+    """An exploratory cumulative mixed model of each primary statement.
+
+    Over delays it is fitted to all individual answers, with effects of the delay that differ between participants; over
+    liquids and views to the participants' medians, since its test rejected too often with repeated answers.
+    """
 
     key = "cumulative"
     place = 14
@@ -77,10 +81,10 @@ class CumulativeModels(StatementTests):
             f"{number_text.counted(fitted[0].members, 'test')}.",
             "soft",
         )
-
         for test in self.value:
             if test.outcome.p is None:
-                yield paragraph(f"{short_text(self.found, test.item)}: {test.outcome.note}.", "soft")
+                what = f"{short_text(self.found, test.item)}: the model could not be fitted"
+                yield paragraph(f"{what} because {test.outcome.note}.", "soft")
 
     def _answers(self) -> str:
         return "all individual answers" if self.found.delays_ms else "the participants' median answers"

@@ -20,7 +20,8 @@ from scipy.special import expit, logsumexp
 from scipy.stats import f as variance_ratio
 from scipy.stats import t as student
 
-from study_app.analysis.statistics.outcome import NO_VARIATION, Array, Interval, Outcome, checked_values
+from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked_values
+from study_app.analysis.statistics.slope_tests import student_test
 from study_app.analysis.statistics.trend import Direction
 from study_app.errors import AnalysisError
 
@@ -97,8 +98,8 @@ def cumulative_model(
         incomplete=int((given[takes_part].any(axis=2).sum(axis=1) < conditions).sum()),
     )
     if n < _FEWEST or len(np.unique(answered[~np.isnan(answered)])) < 2:
-        few = f"no cumulative model for fewer than {_FEWEST} participants, because its test would reject too often"
-        note = few if n < _FEWEST else NO_VARIATION
+        few = f"there are fewer than {_FEWEST} participants, for whom its error rate was not measured"
+        note = few if n < _FEWEST else "all participants gave the same answer in all conditions"
         return replace(model, no_interval=note, note=note)
     return _fitted(model, _Likelihood(answered, design, slopes=columns is not None and several == 1), direction)
 
@@ -113,10 +114,7 @@ def _fitted(model: CumulativeModel, likelihood: "_Likelihood", direction: Direct
     statistic = max(0.0, 2.0 * (null.fun - whole.fun))
     betas = whole.x[likelihood.where]
     if several == 1:
-        root, freedom = math.copysign(math.sqrt(statistic), betas[0]), model.n - 1
-        upper, lower = float(student.sf(root, freedom)), float(student.cdf(root, freedom))
-        p = {"increasing": upper, "decreasing": lower, None: 2 * min(upper, lower)}[direction]
-        reference = f"t({freedom}), one-sided ({direction})" if direction else f"t({freedom}), two-sided"
+        p, reference = student_test(math.copysign(math.sqrt(statistic), betas[0]), model.n - 1, direction)
     else:
         freedom = several * (model.n - 1)
         p = float(variance_ratio.sf(statistic / several, several, freedom))
@@ -134,16 +132,14 @@ def _fitted(model: CumulativeModel, likelihood: "_Likelihood", direction: Direct
         no_interval="" if several == 1 else _SEVERAL,
         log_odds_ratios=tuple(betas.tolist()),
         intervals=intervals,
-        sds=tuple(np.abs(whole.x[likelihood.where.stop :]).tolist()),
+        sds=tuple(whole.x[likelihood.where.stop :].tolist()),
         thresholds=tuple(likelihood.thresholds(whole.x).tolist()),
         log_likelihood=float(-whole.fun),
     )
 
 
 _MOST_LOG_ODDS: Final = 15.0
-_SEPARATED: Final = (
-    "no cumulative model: the conditions or the participants separate the answers, so the model cannot be fitted"
-)
+_SEPARATED: Final = "the conditions or the participants separate the answers completely"
 _SEVERAL: Final = "there is no single effect size, because there is one log odds ratio per condition"
 
 

@@ -74,21 +74,18 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
     means, errors = own.mean(axis=0), np.sqrt(np.diag(covariance) / n)
     if several == 1:
         statistic = float(means[0] / errors[0])
-        upper, lower = float(student.sf(statistic, n - 1)), float(student.cdf(statistic, n - 1))
-        p = {"increasing": upper, "decreasing": lower, None: 2 * min(upper, lower)}[direction]
+        p, method = student_test(statistic, n - 1, direction)
     else:
         statistic = float(means @ np.linalg.solve(covariance, means)) * n * (n - several) / (several * (n - 1))
-        p = float(variance_ratio.sf(statistic, several, n - several))
+        p, method = float(variance_ratio.sf(statistic, several, n - several)), f"F({several}, {n - several})"
     reach = float(student.ppf((1 + _SURE) / 2, n - 1)) * errors
     ends = zip((means - reach).tolist(), (means + reach).tolist(), strict=True)
     intervals = tuple(Interval(low=low, high=high, level=_SURE, method="Student's t") for low, high in ends)
-    sides = f"one-sided ({direction})" if direction else "two-sided"
-    freedom = f"t({n - 1}), {sides}" if several == 1 else f"F({several}, {n - several})"
     return replace(
         test,
         statistic=statistic,
         p=p,
-        method=freedom,
+        method=method,
         effect=float(means[0]) if several == 1 else None,
         interval=intervals[0] if several == 1 else None,
         no_interval=""
@@ -99,6 +96,13 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         sds=tuple(np.sqrt(np.diag(covariance)).tolist()),
         intercept_sd=float(np.std(intercepts, ddof=1)),
     )
+
+
+def student_test(t: float, freedom: int, direction: Direction | None) -> tuple[float, str]:
+    """Return p of a ``t`` with ``freedom`` degrees of freedom, and the name of the test with its sides."""
+    upper, lower = float(student.sf(t, freedom)), float(student.cdf(t, freedom))
+    p = {"increasing": upper, "decreasing": lower, None: 2 * min(upper, lower)}[direction]
+    return p, f"t({freedom}), " + (f"one-sided ({direction})" if direction else "two-sided")
 
 
 _NO_SPREAD: Final = "no spread: some differences between conditions are the same for all participants"
