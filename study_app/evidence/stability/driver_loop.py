@@ -7,7 +7,8 @@ of the case. Samples, encoders and delay are those of the Falcon. What is judged
   stop, 2 mJ more than a scripted device does that acts as late. Where a light handle swings until the passivity
   controller calms it, that hangs on micrometres and milliseconds (1 to 11 mJ in honey): the worst of three encoder
   counts counts and, before it is called unstable, of releases up to 2 ms earlier and later;
-- *sustained force*, *noise*: compared with the scripted device in place of the motion without feedback.
+- *sustained force*, *noise*: compared with the scripted device, and with the grip's motion without feedback with each
+  encoder count undecided. A grip without friction can rest between two counts, where the scripted one may not.
 """
 
 import dataclasses
@@ -27,10 +28,12 @@ from study_app.evidence.stability.verdict import (
     SWING_MPS,
     Verdict,
     acted,
+    calm_motion,
     compare_fast,
     not_finite,
     reasons_of,
     swing,
+    undecided,
     windows,
     worst_of,
 )
@@ -108,9 +111,10 @@ def judge_driven(case: Case) -> Verdict:
                 given_j = max(_given_out(near, other) for other in _scripted_traces(near, dynamics))
                 permitted_j = min(permitted_j, -_BEYOND_SCRIPTED_J - given_j)
     swing_mps = swing(trace, case)
+    controls = [*others, *_undecided_traces(case, trace, dynamics)]
     restlessness = worst_of(
         [
-            compare_fast(trace.sent_n[:ends], [other.sent_n[:ends] for other in others], case.rate_hz, begins)
+            compare_fast(trace.sent_n[:ends], [control.sent_n[:ends] for control in controls], case.rate_hz, begins)
             for begins, ends in (np.searchsorted(trace.t_s, window_s) for window_s in windows(case))
         ]
     )
@@ -137,6 +141,19 @@ def _scripted_traces(case: Case, dynamics: Dynamics) -> list[Any]:
     """Return the traces of a case on scripted devices, one per encoder count."""
     devices = [_Scripted(count_m) for count_m in _COUNTS_M]
     return [_trace(case, device, device, dynamics) for device in devices]
+
+
+def _undecided_traces(case: Case, trace: Any, dynamics: Dynamics) -> list[Any]:
+    """Return the traces of the same motion without feedback, one per encoder count, with that count undecided."""
+    calm, traces = calm_motion(trace), []
+    calm.fresh[:] = calm.measured[:] = 1
+    for count_m in _COUNTS_M:
+        count_um = count_m * 1e6
+        answer, bench = calm.copy(), Bench(dataclasses.replace(case, quantum_um=count_um), dynamics=dynamics)
+        bench.begin()
+        bench.play(answer, undecided(calm.position_m, count_um))
+        traces.append(answer)
+    return traces
 
 
 def _opened_falcon() -> _Falcon:

@@ -214,25 +214,33 @@ def _restlessness(
     case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None, *, late_share: float
 ) -> Restlessness:
     """Compare the force's fast part with that of the same motion without feedback, where they differ most."""
-    calm_m, calm_n = np.zeros((len(trace), 3)), np.zeros((len(trace), 3))
-    smooth(trace, _SPREAD_S, calm_m, calm_n)
-    calm_mps = np.gradient(calm_m, trace.t_s, axis=0)
-    undecided_m = case.quantum_um * 1e-6 * (np.random.default_rng(1).random(calm_m.shape) - 0.5)
+    calm = calm_motion(trace)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
     compared = []
     for window_s, (first, bench) in zip(windows(case), before, strict=True):
         begins, ends = np.searchsorted(trace.t_s, window_s)
         played = [passive] if passive is not None and len(passive) >= ends else []
-        for places_m in (calm_m, calm_m + undecided_m):
-            again, answer = bench.copy(), trace.copy()
+        for places_m in (calm.position_m, undecided(calm.position_m, case.quantum_um)):
+            again, answer = bench.copy(), calm.copy()
             answer.sent_n[:first] = 0.0
-            answer.sent_n[first:] = calm_n[first:]
-            answer.velocity_mps[:] = calm_mps
             again.play(answer[first:ends], places_m[first:ends])
             played.append(answer)
         controls_n = [answer.sent_n[:ends] for answer in played]
         compared.append(compare_fast(trace.sent_n[:ends], controls_n, case.rate_hz, begins, late_share=late_share))
     return worst_of(compared)
+
+
+def calm_motion(trace: Any) -> Any:
+    """Return a copy of a trace whose motion and sent forces have no part above 40 Hz."""
+    calm = trace.copy()
+    smooth(trace, _SPREAD_S, calm.position_m, calm.sent_n)
+    calm.velocity_mps[:] = np.gradient(calm.position_m, trace.t_s, axis=0)
+    return calm
+
+
+def undecided(position_m: Any, count_um: float) -> Any:
+    """Return positions (rows, 3) [m] with an error of up to half an encoder count, as between two counts."""
+    return position_m + count_um * 1e-6 * (np.random.default_rng(1).random(position_m.shape) - 0.5)
 
 
 def compare_fast(

@@ -37,6 +37,9 @@ fast motion, of 15 ms or more, or within two seconds of a surprise (`known_force
 quiet for ``quiet_s``, and the gain returns within 0.3 s. One that begins otherwise, or after a gap in the
 samples, is not: its oscillation would return with the gain.
 
+A step over a gap in the samples counts only if it costs energy, and is not the longest step: the position may have
+jumped.
+
 With a force link, no debt is forgiven, the gain does not recover before the next scene, and it falls further as long as
 there is a debt: with a delayed force a handle would continue to oscillate at the forgiven power, or at the gain at
 which it neither supplies nor absorbs energy. It also falls while the controller has recently changed the force in more
@@ -163,6 +166,7 @@ _LEAST_PUSH_S = 0.015
 _REGAINED_S = 0.3
 _SWING_WEIGHT = 4.0
 _REVERSAL_S = 0.05
+_SHAKEN_MPS = 0.04
 _REVERSALS = 6
 _SLOW_RATIO = 6.0
 _CALMED_S = 0.04
@@ -216,6 +220,7 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
     Several forces sent between two samples count by their mean over time.
     """
     parameters, state, passivity = model.parameters[0], model.state[0], safety.passivity
+    rules = parameters.rules
     delay_ticks = max(safety.delay_ticks, 1)
     sent_n = _least_favourable(passivity, state, passivity.row, interval_s)
     late_n = _least_favourable(passivity, state, _row_before(passivity, delay_ticks), interval_s)
@@ -251,7 +256,9 @@ def update_observer(model: Any, safety: layout.Record, interval_s: float) -> Non
         observe_incremental(passivity.fast, axis, mean_n, step_m * per_s, interval_s)
     _watch_motion(parameters, passivity, interval_s)
     close_incremental(passivity.fast, interval_s if parameters.link.acts == 0 else 0.0)
-    if square_m2 > passivity.longest_m * passivity.longest_m:
+    if is_gap(parameters, interval_s) and rules.trusts_gaps == 0.0:
+        work_j, late_work_j, later_work_j = min(work_j, 0.0), min(late_work_j, 0.0), min(later_work_j, 0.0)
+    elif square_m2 > passivity.longest_m * passivity.longest_m:
         passivity.longest_m = math.sqrt(square_m2)
     stored_j = filter_storage(model, passivity)
     forgiven_j = _FORGIVEN_W * interval_s if parameters.link.acts == 0 else 0.0
@@ -308,16 +315,17 @@ def _count_reversals(parameters: layout.Record, passivity: layout.Record, weight
     for axis in range(3):
         fast_mps = passivity.velocity_mps[axis] - passivity.slow_mps[axis]
         swing_mps[axis] += weight * (fast_mps - swing_mps[axis])
-    square_m2ps2 = square(swing_mps)
+    square_m2ps2, peak_m2ps2 = square(swing_mps), passivity.peak_m2ps2
+    is_shaken = peak_m2ps2 > _SHAKEN_MPS * _SHAKEN_MPS
     passivity.reversed_s += interval_s
-    is_late = passivity.reversed_s > _REVERSAL_S
+    is_late = passivity.reversed_s > (parameters.rules.shaken_reversal_s if is_shaken else _REVERSAL_S)
     if is_late:
         passivity.reversals = 0
     if square_m2ps2 <= parameters.rules.swing_mps * parameters.rules.swing_mps:
         if square_m2ps2 < _NOTHING_M2PS2:
             clear(swing_mps)
         return
-    along_m2ps2, peak_m2ps2 = dot(swing_mps, peak_mps), passivity.peak_m2ps2
+    along_m2ps2 = dot(swing_mps, peak_mps)
     has_reversed = along_m2ps2 < 0.0 and along_m2ps2 * along_m2ps2 > 0.5 * square_m2ps2 * peak_m2ps2
     if has_reversed or is_late:
         is_ripple = square(passivity.slow_mps) > _SLOW_RATIO * _SLOW_RATIO * peak_m2ps2
@@ -420,9 +428,10 @@ def apply_controller(parameters: layout.Record, safety: layout.Record, sample: l
     passivity = safety.passivity
     left_j = _left_j(passivity)
     given = _limit_power(parameters, safety, left_j, sample.device_force_n)
-    kept = left_j < 0.0 and _limit_norm(
-        max(passivity.strongest_n + left_j / passivity.longest_m, 0.0), passivity, sample.device_force_n
-    )
+    kept = False
+    if left_j < 0.0:
+        most_n = passivity.strongest_n + left_j / passivity.longest_m if passivity.longest_m > 0.0 else 0.0
+        kept = _limit_norm(max(most_n, 0.0), passivity, sample.device_force_n)
     changed = given or kept
     if changed or passivity.settling:  # also the tick after, in which the force returns
         sample.limiters |= layout.LIMITER_ENERGY

@@ -34,6 +34,10 @@ class ForceRules(NamedTuple):
     of smoothing and limiting them (`kernels.known_force`), up to an inertia of ``most_known_inertia`` times the least
     mass of the device and a scale of ``most_known_scale``: beyond, the force was noisy. ``swing_mps`` is the
     least speed at which reversals count as an oscillation of the handle, which lowers the gain (`passivity`).
+    After a peak of more than 40 mm/s, faster than any tremor, a reversal may take ``shaken_reversal_s``: a released
+    handle of 50 g oscillated at 10 Hz.
+    ``trusts_gaps`` is 1 if the energy balance counts a step over a gap in full, 0 if only the energy that it cost: the
+    position may have jumped.
     ``acting_share`` is the share of the time in which the passivity controller may change a force that a study delays,
     before the gain falls: with 0.3, a handle stirred at 9 Hz with 50 ms of delay oscillated above 40 Hz.
     """
@@ -58,6 +62,8 @@ class ForceRules(NamedTuple):
     most_known_inertia: float = 7.0
     most_known_scale: float = 3.0
     swing_mps: float = math.inf
+    shaken_reversal_s: float = 0.05
+    trusts_gaps: float = 1.0
     acting_share: float = math.inf
 
 
@@ -88,8 +94,9 @@ VERSIONS: Final = {
 VERSIONS[4] = VERSIONS[3]._replace(version=4, known_force_ticks=1)
 VERSIONS[5] = VERSIONS[4]._replace(version=5, swing_mps=0.01)
 VERSIONS[6] = VERSIONS[5]._replace(version=6, acting_share=0.25)
+VERSIONS[7] = VERSIONS[6]._replace(version=7, shaken_reversal_s=0.06, trusts_gaps=0.0)
 
-FORCE_RULES: Final = 6
+FORCE_RULES: Final = 7
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are
 a new version."""
 CURRENT: Final = VERSIONS[FORCE_RULES]

@@ -393,6 +393,29 @@ def test_the_gain_falls_while_the_handle_oscillates_faster_than_a_hand_can(hz, s
 
 
 @pytest.mark.compiled
+def test_the_gain_falls_at_9_5_hz_if_the_handle_is_faster_than_a_tremor():
+    gains = oscillating_gains(9.5, 0.12)
+    assert (gains[: int(2.5e3 / 9.5)] == 1.0).all()
+    assert gains[-1] < 0.1
+    assert (oscillating_gains(9.5, 0.12, rules=VERSIONS[6]) == 1.0).all()
+    assert (oscillating_gains(9.5, 0.03) == 1.0).all()
+
+
+@pytest.mark.compiled
+def test_a_position_that_jumps_in_a_gap_neither_pays_a_debt_nor_counts_as_a_step():
+    """A step of 3 mm was the longest one for the rest of a scene, and the limit of the force in debt useless."""
+    for rules, counts in ((VERSIONS[6], True), (CURRENT, False)):
+        hand = Hand(HONEY, rules=rules)
+        hand.sweep(0.2, 100)
+        longest_m, balance_j = passivity(hand).longest_m, passivity(hand).balance_j = 2e-4, -0.5e-3
+        for _ in range(6):
+            hand.tick(None)
+        hand.tick((0.02 + 3e-3, 0.0, 0.0))
+        assert bool(passivity(hand).longest_m > longest_m) == counts
+        assert bool(passivity(hand).balance_j > balance_j) == counts
+
+
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     "motion",
     [

@@ -24,6 +24,8 @@ RELEASED = {
     "most_known_inertia": 7.0,
     "most_known_scale": 3.0,
     "swing_mps": math.inf,
+    "shaken_reversal_s": 0.05,
+    "trusts_gaps": 1.0,
     "acting_share": math.inf,
 }
 
@@ -33,6 +35,12 @@ def test_released_versions_keep_their_numbers():
         assert VERSIONS[version]._asdict() == {"version": version, **RELEASED}
     assert VERSIONS[5]._asdict() == {**VERSIONS[4]._asdict(), "version": 5, "swing_mps": 0.01}
     assert VERSIONS[6]._asdict() == {**VERSIONS[5]._asdict(), "version": 6, "acting_share": 0.25}
+    assert VERSIONS[7]._asdict() == {
+        **VERSIONS[6]._asdict(),
+        "version": 7,
+        "shaken_reversal_s": 0.06,
+        "trusts_gaps": 0.0,
+    }
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():
