@@ -58,7 +58,7 @@ def quick_pdfs() -> Iterator[None]:
         yield
 
 
-def made_up(name: str) -> ConditionFeatures:
+def made_up(name: str | Path) -> ConditionFeatures:
     """What every condition of a study feels like: conditions differ in force and delay alone."""
     study = load(name)
     return {

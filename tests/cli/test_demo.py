@@ -135,13 +135,13 @@ def is_opened(workspace: Path) -> bool:
 
 @needs_servo
 @pytest.mark.slow
-@pytest.mark.variants(2)
+@pytest.mark.variants(1)
 @pytest.mark.skipif(os.name != "posix", reason="needs signals")
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("moment", "sent"),
-    [(begun("P001"), SIGKILL), (begun("P001"), signal.SIGINT), (begun("P002"), SIGKILL), (is_opened, SIGKILL)],
-    ids=["first session killed", "first session interrupted", "second session killed", "unblinding killed"],
+    [(begun("P002"), SIGKILL), (begun("P001"), SIGKILL), (begun("P001"), signal.SIGINT), (is_opened, SIGKILL)],
+    ids=["second session killed", "first session killed", "first session interrupted", "unblinding killed"],
 )
 def test_an_interrupted_demo_is_finished_by_the_next_call(
     workspace: Path, moment: Callable[[Path], bool], sent: signal.Signals

@@ -4,12 +4,13 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -69,11 +70,18 @@ class Program:
         self.folder = folder
         self.environment = os.environ | {"DISPLAY": display, "QT_QPA_PLATFORM": "xcb"}
         self.process = subprocess.Popen(
-            [sys.executable, *program, *arguments], cwd=folder, env=self.environment, stderr=subprocess.PIPE, text=True
+            [sys.executable, *program, *arguments],
+            cwd=folder,
+            env=self.environment,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         )
 
     def close(self) -> None:
-        self.process.kill()
+        """Kill the program and its worker processes, which would otherwise finish what they compute."""
+        with suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
         self.process.communicate()
 
     def xdotool(self, *arguments: str) -> str:

@@ -2,6 +2,7 @@
 
 import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -15,23 +16,41 @@ from tests.end_to_end.real_windows import needs_display, wait_for
 pytestmark = [pytest.mark.slow, needs_servo, pytest.mark.xvfb, pytest.mark.timeout(300), needs_display]
 
 
-@pytest.mark.parametrize("made", [SessionBench, LabBench])
-def test_escape_held_for_600_ms_stops_the_force_also_where_repeats_begin_before(tmp_path: Path, made: type) -> None:
-    with opened_bench(made, tmp_path) as bench:
-        assert count_stops(bench, 500, 2) == 2
-        assert count_stops(bench, None, 1) == 1
-
-
-def test_a_held_p_pauses_and_the_next_one_resumes(tmp_path: Path) -> None:
-    with opened_bench(SessionBench, tmp_path) as bench:
+@pytest.fixture(scope="module")
+def session(tmp_path_factory: pytest.TempPathFactory) -> Iterator[SessionBench]:
+    with opened_bench(SessionBench, tmp_path_factory.mktemp("session")) as bench:
         assert isinstance(bench, SessionBench)
-        subprocess.run(["xset", "r", "rate", "200", "25"], env=bench.program.environment, check=True)
-        bench.xdotool("windowfocus", "--sync", bench.operated, "keydown", "p")
-        time.sleep(1.5)
-        bench.xdotool("keyup", "p")
-        bench.program.wait_for_event("paused")
-        time.sleep(0.3)
-        assert [len(bench.program.events(kind)) for kind in ("paused", "resumed")] == [1, 0]
-        bench.xdotool("key", "p")
-        wait_for(lambda: bench.program.events("resumed"), "the session to go on")
-        assert len(bench.program.events("paused")) == 1
+        yield bench
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Iterator[SessionBench | LabBench]:
+    with opened_bench(LabBench, tmp_path) as bench:
+        yield bench
+
+
+@pytest.mark.parametrize("made", ["session", "lab"])
+def test_escape_held_for_600_ms_stops_the_force_also_where_repeats_begin_before(
+    request: pytest.FixtureRequest, made: str
+) -> None:
+    bench = request.getfixturevalue(made)
+    assert count_stops(bench, 500, 2) == 2
+    assert count_stops(bench, None, 1) == 1
+
+
+def test_a_held_p_pauses_and_the_next_one_resumes(session: SessionBench) -> None:
+    def counts() -> list[int]:
+        return [len(session.program.events(kind)) for kind in ("paused", "resumed")]
+
+    paused, resumed = counts()
+    for setting in (("r", "on"), ("r", "rate", "200", "25")):
+        subprocess.run(["xset", *setting], env=session.program.environment, check=True)
+    session.xdotool("windowfocus", "--sync", session.operated, "keydown", "p")
+    time.sleep(1.5)
+    session.xdotool("keyup", "p")
+    wait_for(lambda: counts()[0] > paused, "the pause")
+    time.sleep(0.3)
+    assert counts() == [paused + 1, resumed]
+    session.xdotool("key", "p")
+    wait_for(lambda: counts()[1] > resumed, "the session to go on")
+    assert counts() == [paused + 1, resumed + 1]

@@ -10,14 +10,13 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide_table
 from study_app.analysis.report.write_report import report
-from study_app.protocol.load import load
-from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduce_session
 from study_app.store.verification.verify_study import verify_study
 from tests.protocol.forms.mixed import mixed_file
+from tests.studies import made_up
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
@@ -28,21 +27,9 @@ PEOPLE = 6
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("mixed")
     protocol = mixed_file(place)
-    study = load(protocol)
-    felt = {
-        ("stir", name): (
-            TrialFeatures(
-                force_mean_n=0.5 + n,
-                force_peak_n=4.0,
-                speed_rms_mps=0.1,
-                push_share=0.02,
-                roughness_n=0.03,
-                delay_s=0.0,
-            ),
-        )
-        for n, name in enumerate(study.conditions)
-    }
-    return rehearse_answers(protocol, participants=PEOPLE, seed=1, results=place / "results", features=felt)
+    return rehearse_answers(
+        protocol, participants=PEOPLE, seed=1, results=place / "results", features=made_up(protocol)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -53,20 +40,9 @@ def study(folder: Path) -> Study:
 def test_order_is_reproduced_where_answers_hid_questions(tmp_path: Path) -> None:
     condition = 'id = "pleasant"\nshow_if = { item = "thickness", at_least = 3 }'
     protocol = mixed_file(tmp_path, ('id = "pleasant"', condition))
-    felt = {
-        ("stir", name): (
-            TrialFeatures(
-                force_mean_n=0.5 + n,
-                force_peak_n=4.0,
-                speed_rms_mps=0.1,
-                push_share=0.02,
-                roughness_n=0.03,
-                delay_s=0.0,
-            ),
-        )
-        for n, name in enumerate(("thin", "thick"))
-    }
-    folder = rehearse_answers(protocol, participants=8, seed=1, results=tmp_path / "results", features=felt)
+    folder = rehearse_answers(
+        protocol, participants=8, seed=1, results=tmp_path / "results", features=made_up(protocol)
+    )
     sessions = StudyFolder(folder).sessions()
     asked = len(load_study(folder).answered.query("item == 'pleasant'"))
     assert 0 < asked < 2 * len(sessions)  # hidden from some
@@ -83,6 +59,7 @@ def test_excluded_session_counts_in_no_form(folder: Path, tmp_path: Path) -> Non
     assert len(left.answers_to(asked)) == PEOPLE - 1
 
 
+@pytest.mark.usefixtures("figures_of_the_page")
 @pytest.mark.parametrize("order", ["fixed", "balanced", "random", "groups"])
 def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, order: str) -> None:
     grouped = order == "groups"
@@ -92,19 +69,12 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     last = 'conditions = ["thin", "thick"]'
     old = 'sequence = ["start", "stir", "load", "usability", "end"]'
     sequence = (old, "" if grouped else f"sequence = {orders[0]}"), (last, f"{last}\n{again}{groups}")
-    felt = {
-        (block, name): (
-            TrialFeatures(
-                force_mean_n=1.0, force_peak_n=4.0, speed_rms_mps=0.1, push_share=0.02, roughness_n=0.03, delay_s=0.0
-            ),
-        )
-        for block in ("stir", "again")
-        for name in ("thin", "thick")
-    }
     name = 'name = "mixed"'
     named = (name, name if grouped else f'{name}\nblock_order = "{order}"')
     protocol = mixed_file(tmp_path, *sequence, named)
-    folder = rehearse_answers(protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=felt)
+    folder = rehearse_answers(
+        protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=made_up(protocol)
+    )
     assert verify_study(folder).errors == ()
     assert [reproduce_session(session.path).differences for session in StudyFolder(folder).sessions()] == [[]] * PEOPLE
     study = load_study(folder)
@@ -135,15 +105,6 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
 @pytest.mark.parametrize("order", ["balanced", "random"])
 def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path: Path, order: str) -> None:
     """It comes after either block, though the file writes it after one of them."""
-    felt = {
-        (block, name): (
-            TrialFeatures(
-                force_mean_n=1.0, force_peak_n=4.0, speed_rms_mps=0.1, push_share=0.02, roughness_n=0.03, delay_s=0.0
-            ),
-        )
-        for block in ("stir", "again")
-        for name in ("thin", "thick")
-    }
     last = 'conditions = ["thin", "thick"]'
     sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'
     protocol = mixed_file(
@@ -152,7 +113,9 @@ def test_a_form_after_the_last_of_exchanged_blocks_has_all_its_answers(tmp_path:
         (last, f"{last}\n[blocks.again]\n{last}"),
         ('name = "mixed"', f'name = "mixed"\nblock_order = "{order}"'),
     )
-    folder = rehearse_answers(protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=felt)
+    folder = rehearse_answers(
+        protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=made_up(protocol)
+    )
     assert verify_study(folder).errors == ()
     study = load_study(folder)
     rows = study.answered.query("form == 'load' and item == 'effort'")

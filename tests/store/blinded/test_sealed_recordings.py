@@ -128,19 +128,21 @@ def test_a_changed_recording_is_named_and_not_opened(study: Path) -> None:
 
 @needs_fork
 @pytest.mark.slow
-def test_an_unblinding_that_is_killed_anywhere_is_finished_by_the_next(study: Path, tmp_path: Path) -> None:
-    """Killed with SIGKILL before each file is opened or renamed, one after the other."""
+@pytest.mark.variants(1)
+@pytest.mark.parametrize("first", range(4))
+def test_an_unblinding_that_is_killed_anywhere_is_finished_by_the_next(study: Path, tmp_path: Path, first: int) -> None:
+    """Killed with SIGKILL before every fourth file that is opened or renamed."""
     whole = tmp_path / "whole"
     shutil.copytree(study, whole)
     unblind(whole, "AB", "done")
     sealed, opened = contents(study), contents(whole)
-    kills, code = 0, -signal.SIGKILL
+    at, code = first, -signal.SIGKILL
     while code == -signal.SIGKILL:
         copy = tmp_path / "killed"
         shutil.rmtree(copy, ignore_errors=True)
         shutil.copytree(study, copy)
         if (child := os.fork()) == 0:
-            dies_at(kills, copy)
+            dies_at(at, copy)
             unblind(copy, "AB", "done")
             os._exit(0)
         code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -149,8 +151,8 @@ def test_an_unblinding_that_is_killed_anywhere_is_finished_by_the_next(study: Pa
         assert not [error for error in verify_study(copy).errors if ".parquet" in str(error)]
         assert unblind(copy, "AB", "again").left == ()
         assert contents(copy) == opened
-        kills += 1
-    assert kills > 20
+        at += 4
+    assert at > 20
 
 
 def dies_at(number: int, folder: Path) -> None:
