@@ -211,8 +211,11 @@ def log_likelihood(
     successes: ArrayLike, failures: ArrayLike, log_success: NDArray[np.float64], log_failure: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the log likelihood of each cell from counts of answers (k,) and log ψ and log(1 − ψ) (k, …)."""
-    logarithms = np.einsum("k,kabcd->abcd", np.asarray(successes, float), log_success)
-    return np.asarray(logarithms + np.einsum("k,kabcd->abcd", np.asarray(failures, float), log_failure), float)
+    total = np.zeros(log_success.shape[1:])
+    for counts, logarithms in ((successes, log_success), (failures, log_failure)):
+        answered = np.flatnonzero(counts)  # few of the levels
+        total += np.einsum("k,kabcd->abcd", np.asarray(counts, float)[answered], logarithms[answered])
+    return total
 
 
 def posterior(grid: Grid, log_likelihood: NDArray[np.float64]) -> Posterior:
