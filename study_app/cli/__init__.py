@@ -23,6 +23,7 @@ from study_app.cli.devices import devices, outlets, plugins
 from study_app.cli.options import EXIT_USER_ERROR, GroupedCommands, example_of, printable
 from study_app.discovery import explain_error
 from study_app.errors import PlugInError, StudyError, naming_the_extra
+from study_app.workers.one_thread import compute_in_one_thread
 
 BY_SIGNAL = 128  # added to a signal's number
 SHOWN = 200  # letters of a bad value that a message repeats
@@ -77,6 +78,7 @@ def main() -> None:
     """
     ended: list[int] = []
     atexit.register(_exit_at_once, ended)  # registered first, so it is called last
+    compute_in_one_thread()
     os.environ.setdefault(
         "PYDANTIC_DISABLE_PLUGINS", "__all__"
     )  # they are not used, and searching for them reads every package

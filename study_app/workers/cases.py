@@ -25,7 +25,8 @@ from typing import Any, Final, ParamSpec, TypeVar
 import study_app
 from study_app.discovery import explain_error
 from study_app.errors import WorkerError
-from study_app.workers.server import CONTEXT, compute_in_one_thread, ignore_interrupts
+from study_app.workers.one_thread import compute_in_one_thread
+from study_app.workers.server import CONTEXT, ignore_interrupts
 
 LIBRARIES: Final = ("numpy", "scipy", "numba", "pandas", "ngsolve")
 _ADDRESS: Final = re.compile(r"(?:tcp|tls)://(?:\[(?P<ipv6>[0-9a-fA-F:]+)\]|(?P<host>[^\s:/\[\]]+)):(?P<port>\d{1,5})")

@@ -4,7 +4,6 @@ Processes are started by spawn and ignore Ctrl+C, which the terminal sends to al
 `Crashed` and `Stopped` answer any order, besides the values of its task.
 """
 
-import os
 import signal
 import sys
 import threading
@@ -22,6 +21,7 @@ import psutil
 
 from study_app.discovery import explain_error
 from study_app.errors import MissingExtra, StudyError, naming_the_extra
+from study_app.workers.one_thread import compute_in_one_thread
 
 Send: TypeAlias = Callable[[Any], object]
 """Sends an answer before the last one."""
@@ -92,12 +92,6 @@ CONTEXT: Final = _WorkerContext()
 def ignore_interrupts() -> None:
     """Ignore Ctrl+C: the program that started this process ends its workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def compute_in_one_thread() -> None:
-    """Limit the linear algebra of this process to one thread; numpy must not be imported yet."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ.setdefault(name, "1")
 
 
 def serve_orders(orders: Connection, answers: Connection, task: str, *, background: bool) -> None:

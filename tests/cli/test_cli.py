@@ -53,6 +53,15 @@ def test_help_loads_neither_qt_nor_the_compiler_nor_multiprocessing(tmp_path: Pa
     assert finished.stdout.splitlines()[-1] == "[]"
 
 
+def test_a_command_computes_in_one_thread_unless_the_user_says_otherwise(
+    liquid_study: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    liquid_study("--version")
+    assert [os.environ[name] for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")] == ["1", "3"]
+
+
 @pytest.mark.parametrize(("device", "warned"), [("mouse", 1), ("falcon", 0), ("", 0)])
 def test_check_warns_of_what_the_device_of_this_computer_cannot_give(
     liquid_study: Run, device: str, warned: int
