@@ -19,6 +19,7 @@ import pytest
 
 from study_app.evidence.outlets.localhost import localhost_only
 from study_app.workers.executors import Workers
+from study_app.workers.one_thread import compute_in_one_thread
 from tests import golden
 
 # An example may compile on a fresh machine: how long one takes is no failure.
@@ -35,6 +36,7 @@ os.environ["LIQUID_STUDY_DATA"] = str(Path(tempfile.gettempdir(), f"liquid-study
 os.environ["LIQUID_STUDY_WORKSPACE"] = "."
 # The library reads its settings once in a process: those of the first test that uses it hold for all after it.
 localhost_only()
+compute_in_one_thread()
 
 NEED_QT = ("app", "designer", "gui")
 """Folders of tests that all need Qt."""
@@ -131,7 +133,15 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark the tests that `circles.txt` lists, and as nightly all but n variants, evenly spread, of `variants(n)`."""
+    """Mark the tests that `circles.txt` lists, and as nightly all but n variants, evenly spread, of `variants(n)`.
+
+    Modules with a longer time limit come first, so that at the end no worker is alone with one.
+    """
+    limits_s: dict[Path, float] = {}
+    for item in items:
+        marker = item.get_closest_marker("timeout")
+        limits_s[item.path] = max(limits_s.get(item.path, 0.0), marker.args[0] if marker else 0.0)
+    items.sort(key=lambda item: -limits_s[item.path])
     listed = listed_circles(config)
     for item in items:
         names = item.nodeid.partition("::")[0], item.nodeid.partition("[")[0], item.nodeid

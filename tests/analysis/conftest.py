@@ -223,6 +223,7 @@ HIDDEN = ("zembla", "quorn", "1013.7", "877.3")
 @pytest.fixture
 def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
-    from study_app.analysis.report.study_figures import pictures
+    from study_app.analysis.report import write_report
 
-    monkeypatch.setattr("study_app.analysis.report.write_report.pictures", partial(pictures, forms=("png",)))
+    for pictures in ("pictures", "summary_pictures", "level_pictures", "question_pictures"):
+        monkeypatch.setattr(write_report, pictures, partial(getattr(write_report, pictures), forms=("png",)))

@@ -92,6 +92,7 @@ def table_text(page: str) -> str:
 
 @pytest.mark.slow
 @needs_servo
+@pytest.mark.usefixtures("figures_of_the_page")
 def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Path, tmp_path: Path) -> None:
     def thresholds(study: Study) -> list[str | None]:
         return [one.participant for one in evaluate(study, recordings=False).levels[0].statistics["thresholds"]]

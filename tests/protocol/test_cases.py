@@ -13,7 +13,7 @@ from tests.protocol.edited_studies import FILES, STUDIES, Case, cases_of, regene
 from tests.protocol.sound import SOUND
 
 DESCRIBED = Path(__file__).parent / "described"
-SLOW = {"compared", "methods", "precision", "rated"}
+SLOW = {"compared", "late", "methods", "pace", "precision", "rated"}
 """Files whose studies are described with simulated observers."""
 SHIPPED = ("demo", "physical2", "rek2024", "slime", "thickness", "viscosityjnd")
 STUDY_NAMES = sorted({*SHIPPED, *(path.stem for path in STUDIES.glob("*.toml"))})

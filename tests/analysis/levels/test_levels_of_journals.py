@@ -135,6 +135,7 @@ def test_a_sealed_study_exports_its_intervals_without_what_tells_a_level(sealed_
     assert "vary" not in codebook["levels"][0]
 
 
+@pytest.mark.usefixtures("figures_of_the_page")
 def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_level(
     sealed_levels: Path, tmp_path: Path
 ) -> None:

@@ -77,6 +77,7 @@ def test_r_computes_the_same_settings(reported: Path) -> None:
     assert "matching, P002 at 6.0: hysteresis" in done.stdout
 
 
+@pytest.mark.usefixtures("figures_of_the_page")
 def test_before_unblinding_there_are_steps_and_no_level(sealed: Path, tmp_path: Path) -> None:
     report(sealed, tmp_path, failed=pytest.fail)
     assert not list(tmp_path.glob("settings-*"))

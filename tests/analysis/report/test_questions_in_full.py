@@ -56,6 +56,7 @@ def test_versions_are_listed_where_all_texts_are_in_one_language(results: Path) 
     assert (">versions<" in page, ">language<" in page) == (True, False)
 
 
+@pytest.mark.usefixtures("figures_of_the_page")
 def test_the_report_has_every_wording_in_every_language_and_says_what_changed(rek: Results, tmp_path: Path) -> None:
     rek.add("P001", lambda _condition, _item: 4)
     later = rek.add("P002", lambda _condition, _item: 4)
