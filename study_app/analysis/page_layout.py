@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
+import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -17,10 +18,11 @@ from numpy.typing import NDArray
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
-from study_app.analysis.data.study_tables import Study
+from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.results import BlockResult, Failure, Failures, Results
 from study_app.analysis.wording import counted
 from study_app.number_text import capitalised
+from study_app.protocol.groups import EACH_GROUP
 
 MARGIN_PT = 4.0
 SMALL = 7.2
@@ -194,6 +196,10 @@ def study_marks(study: Study) -> list[Mark]:
             not study.revealed,
             Mark(words="Blinded: conditions appear as codes", ink=style.SEALED, ground=style.SEALED_GROUND),
         ),
+        (
+            study.split not in ("", EACH_GROUP),
+            Mark(words=f"Only {study.split}", ink=style.SEALED, ground=style.SEALED_GROUND),
+        ),
     )
     return [mark for applies, mark in marks if applies]
 
@@ -240,6 +246,15 @@ def picture_of(
     drawn = draw(Look(title, study_marks(study), people, style.fonts())).figure
     files = {form: style.file_bytes(drawn, form, f"{study.name}: {title}") for form in forms}
     return Picture(block=block, name=name, caption=caption, files=files, title=title, numbers=numbers)
+
+
+def tab_separated(study: Study, table: pd.DataFrame) -> str:
+    """Return a table as tab-separated lines; the group of each participant follows the ID."""
+    members = group_members(study)
+    if members and "participant" in table:
+        table = table.drop(columns="group", errors="ignore")
+        table.insert([*table].index("participant") + 1, "group", table["participant"].map(members))
+    return table.to_csv(sep="\t", index=False)
 
 
 def sample_words(study: Study, n: int) -> str:

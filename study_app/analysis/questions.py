@@ -9,9 +9,9 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore, QuestionPlace
 from study_app.analysis.data.measures import quartiles_or_none
-from study_app.analysis.data.study_tables import Study
+from study_app.analysis.data.study_tables import Study, groups_shown
 from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult
-from study_app.analysis.wording import number
+from study_app.analysis.wording import number, with_group
 from study_app.discovery import by_name
 from study_app.protocol.questionnaires import instrument, instruments, score
 
@@ -152,7 +152,7 @@ def score_results(study: Study) -> tuple[ScoreResult, ...]:
 
 
 def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
-    measure = by_name(MEASURES, asked.question.measure)
+    measure, parts = by_name(MEASURES, asked.question.measure), groups_shown(study)
     return QuestionResult(
         where=asked.where.id,
         title=asked.where.title,
@@ -164,8 +164,9 @@ def _question_result(study: Study, asked: PlacedQuestion) -> QuestionResult:
         measure=measure.id,
         figure=asked.question.figure,
         groups=tuple(
-            GroupAnswers(code, name, measure.of(asked, rows))
-            for code, name, rows in _groups(asked.where, study.answers_to(asked))
+            GroupAnswers(code, group if group and code is None else with_group(name, group), measure.of(asked, rows))
+            for of_groups in zip(*(_groups(asked.where, part.answers_to(asked)) for _, part in parts), strict=True)
+            for (group, _), (code, name, rows) in zip(parts, of_groups, strict=True)
         ),
     )
 

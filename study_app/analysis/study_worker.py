@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -30,6 +31,7 @@ from study_app.analysis.worker_messages import (
     WriteTables,
 )
 from study_app.errors import StoreError
+from study_app.protocol.groups import EACH_GROUP
 from study_app.store import receipt
 from study_app.store.atomic import cannot_read
 from study_app.store.exclusions import exclude, include, keep
@@ -41,6 +43,7 @@ from study_app.workers.server import Stopped
 if TYPE_CHECKING:
     from study_app.analysis.data.study_tables import Study
     from study_app.analysis.page_layout import Picture
+    from study_app.analysis.results import Results
 
 # The libraries of an evaluation are loaded only when needed, after the sessions are listed.
 
@@ -119,24 +122,50 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
         else:
             send(FigureDrawn(name=name, title=answer_figures.title(block), caption=words))
         _go_on(stop)
-    drawn = list(_draw_questions(study, send, stop))
+    drawn = []
+    for picture in _question_pictures(study):
+        send(_figure(picture))
+        drawn.append(picture)
+        _go_on(stop)
     if study.revealed and study.n:
         _evaluate(study, drawn, send, stop)
-    else:
-        from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
+        return
+    from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
 
-        send(Proposed(undecided(study, None)))
+    send(Proposed(undecided(study, None)))
+    for part in _split(study):
+        answers = (
+            answer_figures.answers_picture(part, block, block_name(study, block), ("svg",))
+            for block in part.blocks
+            if len(part.answers(block))
+        )
+        for picture in chain(answers, _question_pictures(part)):
+            send(_figure(picture, split=part.split))
+            _go_on(stop)
 
 
-def _draw_questions(study: Study, send: Send, stop: Callable[[], bool]) -> Iterator[Picture]:
-    """Draw and yield the figures of questions outside blocks of statements."""
+def _question_pictures(study: Study) -> Iterator[Picture]:
+    """Draw the figures of questions outside blocks of statements."""
     from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
     from study_app.analysis.questions import question_results  # noqa: PLC0415
 
-    for picture in question_pictures(study, question_results(study), ("svg",)):
-        send(_figure(picture))
-        yield picture
-        _go_on(stop)
+    return question_pictures(study, question_results(study), ("svg",))
+
+
+def _groups(study: Study) -> tuple[str, ...]:
+    """Return the groups by which figures can be split; empty unless two groups have participants."""
+    from study_app.analysis.data.study_tables import group_counts  # noqa: PLC0415
+
+    groups = tuple(group_counts(study))
+    return groups if len(groups) > 1 else ()
+
+
+def _split(study: Study) -> Iterator[Study]:
+    """Yield the study with its groups compared, then each group alone."""
+    from study_app.analysis.data.study_tables import split_study  # noqa: PLC0415
+
+    if groups := _groups(study):
+        yield from (split_study(study, split) for split in (EACH_GROUP, *groups))
 
 
 def _figure(picture: Picture, **answer: str) -> FigureDrawn:
@@ -187,6 +216,7 @@ def _study_found(study: Study) -> StudyFound:
             "sunk": style.SEALED_GROUND,
             "hover": style.GROUND,
         },
+        groups=_groups(study),
     )
 
 
@@ -211,7 +241,7 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
         drawn.append(picture)
         send(_figure(picture))
         going("drawing", _EVALUATION + (1 - _EVALUATION) * min(1.0, number / 8))
-    names = []
+    page = []
     for place, card in enumerate(cards(results, numbers)):
         figure, answer = card.figure_of(drawn), " ".join(card.sentences)
         if figure is None:
@@ -219,8 +249,32 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
         else:
             shown = _figure(figure, question=card.question, verdict=card.verdict, answer=answer)
         send(shown)
-        names.append(shown.name)
-    send(FirstPage(tuple(names)))
+        page.append(shown)
+    send(FirstPage(tuple(shown.name for shown in page)))
+    _draw_groups(study, results, {shown.name: shown.question for shown in page}, send, stop)
+
+
+def _draw_groups(
+    study: Study, results: Results, questions: Mapping[str, str], send: Send, stop: Callable[[], bool]
+) -> None:
+    """Draw the figures by group; ``questions`` are those of the first page. Tests are of all participants."""
+    from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
+    from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures  # noqa: PLC0415
+    from study_app.analysis.report.study_figures import pictures  # noqa: PLC0415
+
+    for number, part in enumerate(_split(study)):
+        _going(send, stop, "drawing the groups", number / (1 + len(_groups(study))))
+        own = results
+        if part.split != EACH_GROUP:
+            blocks = evaluate(replace(part, levels=(), contrasts=()), recordings=False).blocks
+            own = replace(results, blocks=blocks)
+        for picture in chain(
+            _question_pictures(part),
+            pictures(part, own, ("svg",)),
+            summary_pictures(part, own, numbers_of(part), ("svg",)),
+        ):
+            send(_figure(picture, split=part.split, question=questions.get(picture.name, "")))
+            _go_on(stop)
 
 
 def _write(order: WriteTables | WriteReport, send: Send, stop: Callable[[], bool]) -> Done:

@@ -92,6 +92,11 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join(words) if len(words) < 3 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
+def with_group(name: str, group: str) -> str:
+    """Return the heading of a group's answers: "Water – experts"; without a group, the name."""
+    return f"{name} – {group}" if group else name
+
+
 def ms(delay_ms: float) -> str:
     """Return a delay with its unit."""
     return f"{delay_ms:g} ms"

@@ -107,6 +107,7 @@ class StudyFound:
 
     ``trials`` are the main trials of each session (participant, number): number and description, by code while the key
     is sealed. ``doubts`` are files that differ from their recorded state. ``colours`` are those of figures by purpose.
+    ``groups`` are the groups by which figures can be split.
     """
 
     name: str
@@ -117,6 +118,7 @@ class StudyFound:
     trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]]
     doubts: tuple[str, ...]
     colours: Mapping[str, str] = field(default_factory=dict)
+    groups: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,8 +130,9 @@ class Proposed:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureDrawn:
-    """A figure as SVG, which replaces an earlier one of the same ``name``.
+    """A figure as SVG, which replaces an earlier one of the same ``key``: its ``name`` and ``split``.
 
+    ``split`` is "" for all participants, the only group shown, or `EACH_GROUP` if the figure compares the groups.
     Without ``svg``, ``caption`` gives the reason. ``numbers`` are its data as tab-separated lines. A figure of the
     first page has the ``question`` that it answers, the ``verdict`` and the ``answer`` as sentences.
     """
@@ -142,6 +145,12 @@ class FigureDrawn:
     question: str = ""
     verdict: str = ""
     answer: str = ""
+    split: str = ""
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """The figure's identity."""
+        return self.name, self.split
 
 
 @dataclass(frozen=True, slots=True)

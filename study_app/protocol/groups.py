@@ -14,6 +14,8 @@ from study_app.protocol.table import Id, Table, invalid
 
 GroupAssignment: TypeAlias = Literal["randomised", "pre-existing"]
 ASSIGNMENT: Final = ("study", "group_assignment")
+EACH_GROUP: Final = "*"
+"""In place of a group's name, which is an ID: figures compare all groups."""
 _MOST_SHARE: Final = 20
 SEQUENCES: Final = ("sequence", "sequences.*", "groups.*.sequence", "groups.*.sequences.*")
 """Places of lists of steps in a document, as patterns."""

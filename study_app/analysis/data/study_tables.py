@@ -53,6 +53,7 @@ from study_app.analysis.data.session_files import (
     with_excluded,
 )
 from study_app.errors import AnalysisError, StoreError
+from study_app.protocol.groups import EACH_GROUP
 from study_app.protocol.model import RULES, Contrast
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
@@ -167,7 +168,8 @@ class Study:
     do not record it. ``withdrawn`` are the participants who withdrew and whose data were erased. ``contrasts``
     are the study's hypotheses and ``liquids`` its liquids' tables, once the key is open. ``sites`` are the names of the
     sites of a merged study, whose participants are SITE-ID. ``with_below_chance`` includes answers below chance even
-    though no person has decided about them.
+    though no person has decided about them. ``split`` is the only group that it contains, `EACH_GROUP` if its figures
+    compare the groups, or "".
     """
 
     folder: Path
@@ -196,6 +198,7 @@ class Study:
     contrasts: tuple[Contrast, ...] = ()
     with_below_chance: bool = False
     liquids: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    split: str = ""
     _aggregates: dict[tuple[str, ...], pd.DataFrame] = field(
         init=False, default_factory=dict, repr=False, compare=False
     )
@@ -568,6 +571,23 @@ def group_members(study: Study) -> dict[str, str]:
     """
     members = _members(study, "group")
     return dict(zip(map(str, members["participant"]), map(str, members["group"]), strict=True))
+
+
+def split_study(study: Study, split: str) -> Study:
+    """Return a study whose figures compare the groups (`EACH_GROUP`), or that contains only one group."""
+    if split == EACH_GROUP:
+        return replace(study, split=split)
+    people = {person for person, group in group_members(study).items() if group == split}
+    tables = {name: getattr(study, name) for name in ("responses", "trials", "participants", "answered", "intervals")}
+    own = {name: table[table["participant"].isin(people)] for name, table in tables.items() if "participant" in table}
+    return replace(study, split=split, **own)
+
+
+def groups_shown(study: Study) -> list[tuple[str, Study]]:
+    """Return the groups that a figure compares, with their studies; otherwise the study itself, without a name."""
+    if study.split != EACH_GROUP:
+        return [("", study)]
+    return [(group, split_study(study, group)) for group in sorted({*group_members(study).values()})]
 
 
 def group_assignment(study: Study) -> str | None:

@@ -23,10 +23,11 @@ from matplotlib.ticker import MaxNLocator
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import COUNT_COLUMNS, LEVELS, NEUTRAL, QUARTILES, Array, by_participant, quartiles
-from study_app.analysis.data.study_tables import Study
+from study_app.analysis.data.study_tables import Study, groups_shown
 from study_app.analysis.figures.people_figures import WIDTH_PT
-from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, Style, picture_of
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, Style, picture_of, tab_separated
 from study_app.analysis.statistics.thresholds import Threshold
+from study_app.analysis.wording import with_group
 from study_app.errors import AnalysisError
 from study_app.number_text import counted
 from study_app.psychophysics.families import success
@@ -57,12 +58,12 @@ def draw_answers(
     foot: str,
     look: Look,
     *,
-    own_scales: bool = False,
+    own_scales: Sequence[Array] = (),
 ) -> Sheet:
     """Draw answers against delay to scale: thin lines for participants (a selection of many), band, thick median.
 
     ``plots`` are short texts and answers (participants, delays), ``lowest_ms`` the lowest delays with a trend. With
-    ``own_scales`` they are measures, each on its own scale.
+    ``own_scales`` they are measures, each on the scale of the values given here.
     """
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     columns = min(len(plots), _PLOTS_A_ROW)
@@ -83,7 +84,7 @@ def draw_answers(
         axes = sheet.axes(x, top + title_pt + 6, width, _ANSWERS_PT)
         axes.set_label(f"item{place + 1}")
         if own_scales:
-            _scale_to(sheet, axes, values)
+            _scale_to(sheet, axes, own_scales[place])
         else:
             axes.set_ylim(_BOTTOM, _TOP)
             sheet.scale(axes, "y", LEVELS, LEVELS if column == 0 else (), lines=True)
@@ -365,23 +366,32 @@ _AGREEMENT: Final = (5, 6, 7)
 @style.own_settings()
 def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
     """Draw one panel per setting with a common statement axis; one answer has the same width everywhere."""
-    table = study.aggregate(block)
-    panels = [(setting, table[table["code"] == setting.code].reset_index(drop=True)) for setting in block.settings]
+    tables = [(group, part.aggregate(block)) for group, part in groups_shown(study)]
+    panels = [
+        (
+            setting.code,
+            with_group(block.name(setting), group),
+            table[table["code"] == setting.code].reset_index(drop=True),
+        )
+        for setting in block.settings
+        for group, table in tables
+    ]
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     wrapped = [ruler.wrap(item.short, 118, _LABEL_SIZE) for item in block.items]
     label_pt = max(ruler.text_width(line, _LABEL_SIZE) for lines in wrapped for line in lines)
-    columns = min(len(panels), _PANELS_A_ROW)
+    most = _PANELS_A_ROW - _PANELS_A_ROW % len(tables) or _PANELS_A_ROW  # the groups of a setting share a row
+    columns = min(len(panels), most)
     panel_pt = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - label_pt - 6) / columns
-    widths = _widths([counts for _, counts in panels], panel_pt - 2 * _PANEL_PADDING_PT)
+    widths = _widths([counts for *_, counts in panels], panel_pt - 2 * _PANEL_PADDING_PT)
 
-    rows = -(-len(panels) // _PANELS_A_ROW)
+    rows = -(-len(panels) // columns)
     plot_pt = len(block.items) * _ROW_PT
     row_pt = _HEADER_PT + plot_pt + _FOOT_PT
     sheet = look.sheet(_TOP_PT + rows * row_pt + (rows - 1) * 12)
     left_pt = MARGIN_PT + label_pt + 6
     _legend(sheet, block.labels, left_pt)
-    for place, (setting, counts) in enumerate(panels):
-        row, column = divmod(place, _PANELS_A_ROW)
+    for place, (code, name, counts) in enumerate(panels):
+        row, column = divmod(place, columns)
         top, x = _TOP_PT + row * (row_pt + 12) + _HEADER_PT, left_pt + column * panel_pt
         if column == 0:
             for number, lines in enumerate(wrapped):
@@ -390,7 +400,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
         else:
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
         x += (panel_pt - widths.total) / 2
-        _agreement_panel(sheet, setting.code, block.name(setting), counts, widths, x, top)
+        _agreement_panel(sheet, code, name, counts, widths, x, top)
     return sheet
 
 
@@ -543,7 +553,8 @@ def answers_picture(
             "it is an upper bound for the lowest noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)
-    numbers = study.aggregate(block).to_csv(sep="\t", index=False)
+    table = pd.concat(part.aggregate(block).assign(group=group or part.split) for group, part in groups_shown(study))
+    numbers = tab_separated(study, table if study.split else table.drop(columns="group"))
     return picture_of(study, block.id, name, title(block), words, draw, forms, counts(study, block), numbers)
 
 
@@ -551,10 +562,13 @@ def draw_block(study: Study, block: Block, lowest: Mapping[str, float], look: Lo
     """Draw the answers of a block; against delay, a participant's repeated answers are drawn as their median."""
     if block.kind != "delays" or not block.revealed:
         return draw_agreement(study, block, look)
-    answers = study.answers(block)
-    people = sorted(answers["participant"].unique())
-    plots = [(item.short, by_participant(answers, people, block.columns, item.id)) for item in block.items]
-    marked = [lowest.get(item.id) for item in block.items]
+    plots, marked = [], []
+    for group, part in groups_shown(study):
+        own = part.answers(block)
+        people = sorted(own["participant"].unique())
+        for item in block.items:
+            plots.append((with_group(item.short, group), by_participant(own, people, block.columns, item.id)))
+            marked.append(None if group else lowest.get(item.id))
     foot = f"Added delay in ms.   1 = {block.labels[0]}, 7 = {block.labels[-1]}."
     return draw_answers(plots, block.delays_ms, marked, foot, look)
 

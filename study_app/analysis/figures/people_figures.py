@@ -1,8 +1,13 @@
-"""Figures of people: each participant's numbers as small points, and beside them the mean with its interval."""
+"""Figures of people: each participant's numbers as small points, and beside them the mean with its interval.
+
+A study that is split by group shows the points and the mean of each group side by side, or one group alone.
+"""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from types import MappingProxyType
 from typing import Final
 
 import numpy as np
@@ -10,8 +15,10 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
-from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Sheet
+from study_app.analysis.data.study_tables import Study, group_members
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, picture_of
 from study_app.analysis.statistics.outcome import student_interval
+from study_app.protocol.groups import EACH_GROUP
 
 _A_ROW: Final = 3
 """Panels side by side."""
@@ -43,6 +50,8 @@ _ASIDE: Final = 0.27
 _GROUPS: Final = (style.ACCENT, "#b35600", "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
 _MARKERS: Final = "osD^vP"
 _LEAST_TICKS: Final = 3
+_GROUP_STEP: Final = 0.8
+"""How far apart the first and last of many groups of a column are, as a share of the distance of columns."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,13 +67,24 @@ class Mean:
 class Column:
     """The numbers of all participants, in the same order in every column, above one name, and their mean.
 
-    ``ends`` are the ends of each participant's own interval.
+    ``ends`` are the ends of each participant's own interval; ``group`` is the group that the column is of.
     """
 
     name: str
     values: Mapping[str, float]
     mean: Mean | None = None
     ends: Mapping[str, tuple[float, float]] | None = None
+    group: str = ""
+
+    def of_group(self, people: Mapping[str, str], group: str, *, log: bool) -> "Column":
+        """Return the column of one group of ``people``, with the mean of its values and Student's 95 % interval."""
+        values = {person: value for person, value in self.values.items() if people.get(person) == group}
+        ends = None if self.ends is None else {who: own for who, own in self.ends.items() if who in values}
+        mean = mean_of(math.log(value) for value in values.values()) if log else mean_of(values.values())
+        if mean is not None and log:
+            low, high = (None if end is None else math.exp(end) for end in (mean.low, mean.high))
+            mean = Mean(value=math.exp(mean.value), low=low, high=high)
+        return replace(self, values=values, mean=mean, ends=ends, group=group)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,6 +100,7 @@ class Panel:
     line, bound : a number, and the ends of a range, to be marked
     log : whether the scale is logarithmic
     ends : ends of the scale; by default from the numbers
+    ticks : positions and names below the columns; by default each column's own
     """
 
     title: str = ""
@@ -91,6 +112,7 @@ class Panel:
     bound: tuple[float, float] | None = None
     log: bool = False
     ends: tuple[float, float] | None = None
+    ticks: tuple[tuple[float, str], ...] = ()
 
     @property
     def xs(self) -> Sequence[float]:
@@ -98,31 +120,83 @@ class Panel:
         return self.places or tuple(map(float, range(len(self.columns))))
 
     @property
+    def names(self) -> Sequence[tuple[float, str]]:
+        """The positions and names below the columns."""
+        return self.ticks or [(x, column.name) for x, column in zip(self.xs, self.columns, strict=True)]
+
+    def split(self, people: Mapping[str, str], groups: Sequence[str]) -> "Panel":
+        """Return the panel with a column for each of ``groups`` of ``people`` in place of each column."""
+        columns = [column.of_group(people, group, log=self.log) for column in self.columns for group in groups]
+        if len(groups) == 1:
+            return replace(self, columns=tuple(columns))
+        bases = np.array(self.xs)
+        step = _GROUP_STEP / len(groups) * (float(np.diff(bases).min()) if len(bases) > 1 else 1.0)
+        offsets = step * (np.arange(len(groups)) - (len(groups) - 1) / 2)
+        places = tuple(float(base + offset) for base in bases for offset in offsets)
+        return replace(self, columns=tuple(columns), places=places, ticks=tuple(self.names))
+
+    @property
     def numbers(self) -> list[float]:
         """All numbers that the scale must include."""
         means = [column.mean for column in self.columns if column.mean is not None]
         of_means = [end for mean in means for end in (mean.value, mean.low, mean.high) if end is not None]
         own = [end for column in self.columns for ends in (column.ends or {}).values() for end in ends]
-        marks = [self.line] if self.line is not None else []
+        marks = [*([self.line] if self.line is not None else []), *(self.bound or ())]
         return [*(value for column in self.columns for value in column.values.values()), *of_means, *own, *marks]
 
 
-def numbers_of_panels(panels: Sequence[Panel]) -> str:
-    """Return the numbers of panels as tab-separated lines: one per participant, then means with intervals."""
-    columns = [(f"{panel.title} {column.name}".strip(), column) for panel in panels for column in panel.columns]
-    people = sorted({person for _, column in columns for person in column.values})
-    rows = [["participant", *(name for name, _ in columns)]]
-    rows += [[person, *(_cell(column.values.get(person)) for _, column in columns)] for person in people]
-    for field in ("value", "low", "high"):
-        label = {"value": "mean", "low": "lower end of the 95 % interval", "high": "upper end of the 95 % interval"}[
-            field
-        ]
-        rows.append([label, *(_cell(getattr(column.mean, field, None)) for _, column in columns)])
-    return "".join("\t".join(row) + "\n" for row in rows)
+def people_picture(
+    study: Study,
+    block: str,
+    name: str,
+    title: str,
+    caption: str,
+    panels: Sequence[Panel],
+    forms: Sequence[str],
+    *,
+    above: str,
+    below: str = "",
+    shared: bool = False,
+) -> Picture:
+    """Return the figure of panels (see `draw_people`), with the groups that the study's split shows."""
+    members = group_members(study)
+    groups = sorted({*members.values()})
+    if study.split and not any(column.group for panel in panels for column in panel.columns):
+        panels = [panel.split(members, groups) for panel in panels]
+        caption += " The mean of a group is that of its participants, with Student's 95 % interval."
+    people = {person for panel in panels for column in panel.columns for person in column.values}
+    own = {person: group for person, group in members.items() if person in people}
+    shown = own if study.split in ("", EACH_GROUP) else None
+    draw = partial(draw_people, panels, above=above, below=below, members=shown, shared=shared)
+    n = (f"n = {len(people)}",)
+    return picture_of(study, block, name, title, caption, draw, forms, n, numbers_of_panels(panels, own))
 
 
-def _cell(value: float | None) -> str:
-    return "" if value is None else repr(float(value))
+def numbers_of_panels(panels: Sequence[Panel], members: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Return the numbers of panels as tab-separated lines: one per participant, then means with intervals.
+
+    With ``members``, the second column is the group.
+    """
+    columns: dict[str, list[Column]] = {}
+    for panel in panels:
+        for column in panel.columns:
+            columns.setdefault(f"{panel.title} {column.name}".strip() or "value", []).append(column)
+    people = sorted({person for same in columns.values() for column in same for person in column.values})
+
+    def row(first: str, group: str, cells: Iterable[float | None]) -> list[str]:
+        numbers = ("" if cell is None else repr(float(cell)) for cell in cells)
+        return [first, *([group] if members else []), *numbers]
+
+    rows = [["participant", *(["group"] if members else []), *columns]]
+    for person in people:
+        values = (next((it.values[person] for it in same if person in it.values), None) for same in columns.values())
+        rows.append(row(person, members.get(person, ""), values))
+    means = {"value": "mean", "low": "lower end of the 95 % interval", "high": "upper end of the 95 % interval"}
+    for field, words in means.items():
+        for group in dict.fromkeys(column.group for same in columns.values() for column in same):
+            own = (next((it.mean for it in same if it.group == group), None) for same in columns.values())
+            rows.append(row(words, group, (getattr(mean, field, None) for mean in own)))
+    return "".join("\t".join(cells) + "\n" for cells in rows)
 
 
 def mean_of(values: Iterable[float]) -> Mean | None:
@@ -207,8 +281,8 @@ def _widths(row: Sequence[Panel], inside: float, *, shared: bool) -> list[float]
 
 def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
     """Return the names of columns, wrapped into lines."""
-    room = width / (len(panel.columns) or 1) - 3
-    return [ruler.wrap(column.name, room, SMALL) for column in panel.columns]
+    room = width / (len(panel.names) or 1) - 3
+    return [ruler.wrap(name, room, SMALL) for _, name in panel.names]
 
 
 def _legend(sheet: Sheet, groups: Sequence[str]) -> None:
@@ -276,7 +350,7 @@ def _draw_panel(
     xs = np.array(panel.xs)
     step = float(np.min(np.diff(np.unique(xs)))) if len(xs) > 1 else 1.0
     axes.set_xlim(xs.min() - 0.55 * step, xs.max() + 0.55 * step)
-    axes.set_xticks(xs.tolist(), ["\n".join(lines) for lines in names])
+    axes.set_xticks([x for x, _ in panel.names], ["\n".join(lines) for lines in names])
     for text in axes.get_xticklabels():
         text.set_fontproperties(sheet.font(SMALL))
     if panel.bound is not None:
@@ -284,7 +358,7 @@ def _draw_panel(
     if panel.line is not None:
         axes.axhline(panel.line, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     people = sorted({person for column in panel.columns for person in column.values})
-    alone = len(panel.columns) == 1 or not panel.joined
+    alone = not panel.joined or sum(len(column.values) for column in panel.columns) == len(people)
     offsets = dict(zip(people, _offsets(panel, people, apart=alone) * step, strict=True))
     for person in people:
         at = [(x + offsets[person], column.values[person])
@@ -297,20 +371,22 @@ def _draw_panel(
         axes.plot(*zip(*at, strict=True), marker, color=colour, markersize=2.6, markeredgewidth=0, zorder=3,
                   gid=f"person-{person}")  # fmt: skip
     for x, column in zip(xs, panel.columns, strict=True):
+        ink = _GROUPS[groups.index(column.group) % len(_GROUPS)] if column.group in groups else style.TEXT
         for person, ends in (column.ends or {}).items():
             axes.plot([x + offsets[person]] * 2, ends, color=style.PARTICIPANT, linewidth=0.5, zorder=2)
         if column.mean is not None:
             aside = x + (_ASIDE * step if column.values else 0.0)
-            axes.plot([aside], [column.mean.value], "D", color=style.TEXT, markersize=4, zorder=5, gid="mean")
+            axes.plot([aside], [column.mean.value], "D", color=ink, markersize=4, zorder=5, gid="mean")
             if column.mean.low is not None and column.mean.high is not None:
-                axes.plot([aside] * 2, [column.mean.low, column.mean.high], color=style.TEXT, linewidth=1.5, zorder=4)
+                axes.plot([aside] * 2, [column.mean.low, column.mean.high], color=ink, linewidth=1.5, zorder=4)
 
 
 def _offsets(panel: Panel, people: Sequence[str], *, apart: bool) -> np.ndarray:
     """Return the horizontal offset of each participant's points, so that equal numbers remain visible."""
     if len(people) < 2:
         return np.zeros(len(people))
-    order = np.argsort(np.argsort([panel.columns[0].values.get(person, 0.0) for person in people], kind="stable"))
+    first = [next(it.values[person] for it in panel.columns if person in it.values) for person in people]
+    order = np.argsort(np.argsort(first, kind="stable"))
     if panel.columns[0].ends is not None:
         return np.asarray((order / (len(people) - 1) - 0.75) * 2 * _SPREAD_OF_ENDS)
     spread = _SPREAD if apart else 0.5 * _SPREAD

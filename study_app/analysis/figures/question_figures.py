@@ -21,6 +21,7 @@ from study_app.analysis.page_layout import (
     Style,
     picture_of,
     sample_words,
+    tab_separated,
     try_figures,
 )
 from study_app.analysis.results import Failures, QuestionResult
@@ -230,4 +231,9 @@ def _picture(study: Study, asked: PlacedQuestion, result: QuestionResult, forms:
     figure = by_name(_FIGURES, result.figure or "")
     title = result.short if result.short == result.title else f"{result.title}: {result.short}"
     caption = f"{result.title}: “{result.text}” {figure.caption} {sample_words(study, study.n)}"
-    return picture_of(study, result.where, name, title, caption, partial(figure.draw, asked, result), forms)
+    rows = study.answers_to(asked)[["participant", "session", "code", "response"]].rename(
+        columns={"response": asked.id}
+    )
+    numbers = tab_separated(study, rows.dropna(axis="columns", how="all"))
+    draw = partial(figure.draw, asked, result)
+    return picture_of(study, result.where, name, title, caption, draw, forms, numbers=numbers)

@@ -8,16 +8,17 @@ import pandas as pd
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import QuestionPlace
-from study_app.analysis.data.study_tables import Study, group_members
-from study_app.analysis.figures.people_figures import Column, Mean, Panel, draw_people, mean_of, numbers_of_panels
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures.people_figures import Column, Mean, Panel, mean_of, people_picture
 from study_app.analysis.levels.answers import Answers, Settings
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic, level_words
 from study_app.analysis.levels.thresholds import Exponents, Thresholds
-from study_app.analysis.page_layout import Picture, picture_of, sample_words, try_figures
+from study_app.analysis.page_layout import Picture, sample_words, try_figures
 from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
 from study_app.number_text import capitalised
+from study_app.protocol.groups import EACH_GROUP
 
 _MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
     (Thresholds, "threshold", "threshold"),
@@ -87,7 +88,8 @@ def _pictures(
     study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], forms: Sequence[str]
 ) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
     for number, contrast in enumerate(results.contrasts, start=1):
-        if any(side.values for side in contrast.sides):
+        compares_groups = contrast.contrast.groups is not None
+        if any(side.values for side in contrast.sides) and not (compares_groups and _is_one_group(study)):
             name = f"hypothesis-{number}"
             yield contrast.contrast.blocks[0], name, partial(_hypothesis, study, results, contrast, forms, name)
     for level in results.levels:
@@ -99,9 +101,11 @@ def _pictures(
         yield where, name, partial(_answers, study, where, of_place[:MOST_PANELS], forms, name)
 
 
+def _is_one_group(study: Study) -> bool:
+    return study.split not in ("", EACH_GROUP)
+
+
 def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms: Sequence[str], name: str) -> Picture:
-    members = group_members(study)
-    shown = {person: members[person] for side in contrast.sides for person in side.values if person in members}
     within = contrast.contrast.groups is None
     log = contrast.ratio
     columns = tuple(
@@ -109,8 +113,9 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
             name=side.name,
             values=side.values,
             mean=None if side.mean is None else Mean(value=side.mean, low=side.low, high=side.high),
+            group=group,
         )
-        for side in contrast.sides
+        for side, group in zip(contrast.sides, contrast.contrast.groups or ("", ""), strict=True)
     )
     panels = [Panel(columns=columns, joined=within, share=1.6, log=log)]
     ends = contrast.interval
@@ -129,22 +134,17 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
         )
     )
     band = " Band: equivalence bounds." if bound is not None else ""
-    weighted = " Means are weighted as in the test." if contrast.contrast.measure == "threshold" else ""
+    is_weighted = contrast.contrast.measure == "threshold" and not (within and study.split)
+    weighted = " Means are weighted as in the test." if is_weighted else ""
     lines = "Each line joins a participant's two values. " if within else ""
     caption = (
         f"{capitalised(contrast.hypothesis)}. {lines}Right: {_effect_name(contrast)}"
         f"{', for each participant and on average' if within else ''}; dashed line: no difference.{band}{weighted} "
-        f"{sample_words(study, contrast.n)}"
+        f"{sample_words(study, len({who for side in contrast.sides for who in side.values} & {*study.people}))}"
     )
     result = next((level for level in results.levels if level.block == contrast.contrast.blocks[0]), None)
-    draw, numbers = (
-        partial(draw_people, panels, above=_scale_words(contrast, result), members=shown),
-        numbers_of_panels(panels),
-    )
-    title = capitalised(contrast.measure_name or contrast.contrast.measure_words)
-    return picture_of(
-        study, contrast.contrast.blocks[0], name, title, caption, draw, forms, (f"n = {contrast.n}",), numbers
-    )
+    title, above = capitalised(contrast.measure_name or contrast.contrast.measure_words), _scale_words(contrast, result)
+    return people_picture(study, contrast.contrast.blocks[0], name, title, caption, panels, forms, above=above)
 
 
 def _effect_name(contrast: ContrastResult) -> str:
@@ -174,12 +174,13 @@ def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: s
     estimates = estimates_of(result)
     if estimates is None:
         return None
-    places = sorted({place_of(one) for one in estimates.own}, key=lambda place: (str(type(place)), place))
+    own = [one for one in estimates.own if one.participant in study.people]
+    places = sorted({place_of(one) for one in own}, key=lambda place: (str(type(place)), place))
     alone = len(places) == 1
     log = estimates.attribute in ("threshold", "pse") and result.spacing == "log"
 
     def column(place: float | str | None) -> Column:
-        here = [one for one in estimates.own if place_of(one) == place]
+        here = [one for one in own if place_of(one) == place]
         group = next((one for one in estimates.group if place_of(one) == place), None)
         value = None if group is None else getattr(group, estimates.attribute)
         ends = {one.participant: (one.low, one.high) for one in here if None not in (one.low, one.high)}
@@ -191,7 +192,7 @@ def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: s
         )
 
     panel = Panel(columns=tuple(map(column, places)), log=log)
-    people = len({one.participant for one in estimates.own})
+    people = len({one.participant for one in own})
     of_each = " Thin lines: each participant's 95 % interval, sorted by value." if alone else ""
     caption = (
         f"{result.title}: {estimates.words} for each participant, and the mean with its 95 % interval.{of_each} "
@@ -201,12 +202,8 @@ def _estimates(study: Study, result: LevelsResult, forms: Sequence[str], name: s
     above = level_words(result) if estimates.attribute in ("threshold", "pse") else words
     of = "Standard" if getattr(estimates.own[0], "level", None) is None else "Level"
     below = "" if result.quantity is None or alone else f"{of}: {result.quantity} [{result.unit}]"
-    draw, numbers = (
-        partial(draw_people, [panel], above=above, below=below, members=group_members(study)),
-        numbers_of_panels([panel]),
-    )
     title = f"{result.title}: {estimates.words}"
-    return picture_of(study, result.block, name, title, caption, draw, forms, (f"n = {people}",), numbers)
+    return people_picture(study, result.block, name, title, caption, [panel], forms, above=above, below=below)
 
 
 def numbers_of(study: Study) -> dict[str, list[Numbers]]:
@@ -274,5 +271,4 @@ def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence
         f"{title}: the value for each participant, and the mean with its 95 % confidence interval (Student's t). "
         f"{sample_words(study, people)}"
     )
-    draw, numbers = partial(draw_people, panels, above="", members=group_members(study)), numbers_of_panels(panels)
-    return picture_of(study, where, name, title, caption, draw, forms, (f"n = {people}",), numbers)
+    return people_picture(study, where, name, title, caption, panels, forms, above="")

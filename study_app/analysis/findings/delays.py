@@ -5,10 +5,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
+import pandas as pd
+
 from study_app import number_text
 from study_app.analysis.data.blocks import Block
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.motion import OF_REACHES
+from study_app.analysis.data.study_tables import groups_shown
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.findings.finding import (
     FOUND,
@@ -24,7 +27,7 @@ from study_app.analysis.findings.finding import (
 )
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
 from study_app.analysis.html_page import heading, paragraph, table, table_of
-from study_app.analysis.page_layout import Drawing, Picture
+from study_app.analysis.page_layout import Drawing, Picture, tab_separated
 from study_app.analysis.results import (
     BlockResult,
     NotTested,
@@ -39,7 +42,19 @@ from study_app.analysis.statistics.equivalence import Equivalence, fewest_partic
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.analysis.statistics.trend import StepDown, step_down
-from study_app.analysis.wording import all_of, bound_text, counted, interval, listed, ms, number, p_value, percent
+from study_app.analysis.wording import (
+    all_of,
+    bound_text,
+    counted,
+    interval,
+    listed,
+    ms,
+    number,
+    p_value,
+    percent,
+    with_group,
+)
+from study_app.protocol.groups import EACH_GROUP
 
 
 @dataclass(frozen=True, slots=True)
@@ -399,8 +414,8 @@ class DetectionThreshold(Finding[Threshold | None]):
 
     def figure(self, drawing: Drawing) -> Picture | None:
         threshold = self.value
-        if threshold is None or not any(threshold.asked):
-            return None
+        if threshold is None or not any(threshold.asked) or drawing.study.split == EACH_GROUP:
+            return None  # each group has its own figure
         lowest = min(
             (lowest.over_all_ms for lowest in LowestDelay.of(drawing.found) if lowest.over_all_ms is not None),
             default=None,
@@ -420,8 +435,12 @@ class DetectionThreshold(Finding[Threshold | None]):
             "Proportion of answers that express agreement (5 to 7), as a function of the requested delay "
             f"({drawing.simulated}n = {threshold.n}). Small points: individual participants. {curve}{dashed}"
         )
-        draw = partial(answer_figures.draw_threshold, threshold, self._shares(drawing), lowest)
-        return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",))
+        shares = self._shares(drawing)
+        numbers = tab_separated(
+            drawing.study, pd.DataFrame(shares).T.rename(columns=ms).rename_axis("participant").reset_index()
+        )
+        draw = partial(answer_figures.draw_threshold, threshold, shares, lowest)
+        return drawing.picture(self.figure_title, caption, draw, (f"n = {threshold.n}",), numbers)
 
     def _shares(self, drawing: Drawing) -> dict[str, dict[float, float]]:
         """Return, for each participant, the share of answers that agree, by delay."""
@@ -618,10 +637,20 @@ class Movement(Finding[None]):
         if not drawing.found.delays_ms or measured is None or not measured.recorded_in(block.id):
             return None
         medians = measured.medians(block.id).reset_index()
+        medians = medians[medians["participant"].isin(drawing.study.people)]
+
+        def of(people: Sequence[str], measure: str) -> Any:
+            rows = medians[medians["participant"].isin(people)]
+            return rows.pivot(index="participant", columns="code", values=measure)[list(block.codes)].to_numpy()
+
+        measures = [*zip(_MEASURES, OF_REACHES, strict=True)]
+        groups = groups_shown(drawing.study)
         plots = [
-            (title, medians.pivot(index="participant", columns="code", values=measure)[list(block.codes)].to_numpy())
-            for title, measure in zip(_MEASURES, OF_REACHES, strict=True)
+            (with_group(title, group), of(part.people, measure))
+            for group, part in groups
+            for title, measure in measures
         ]
+        scales = [of(drawing.study.people, measure) for _, measure in measures] * len(groups)
         people = medians["participant"].nunique()
         n = counted(people, "participant")
         foot = (
@@ -635,5 +664,6 @@ class Movement(Finding[None]):
             f"last time. The axes do not start at zero. {_kept(block, drawing.results)}"
         )
         delays_ms = [setting.delay_ms or 0.0 for setting in block.settings]
-        draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=True)
-        return drawing.picture(self.figure_title, caption, draw, (f"{n} with recordings", n))
+        draw = partial(answer_figures.draw_answers, plots, delays_ms, [None] * len(plots), foot, own_scales=scales)
+        numbers = tab_separated(drawing.study, medians)
+        return drawing.picture(self.figure_title, caption, draw, (f"{n} with recordings", n), numbers)

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Final
 
 import numpy as np
+import pandas as pd
 
 from study_app import number_text
 from study_app.analysis.figures import answer_figures
@@ -22,11 +23,12 @@ from study_app.analysis.findings.finding import (
 )
 from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
 from study_app.analysis.html_page import heading, paragraph, table_of
-from study_app.analysis.page_layout import Drawing, Picture
+from study_app.analysis.page_layout import Drawing, Picture, tab_separated
 from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short_text
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named_labels, recognition
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value
+from study_app.protocol.groups import EACH_GROUP
 
 _NONE_RECOGNISED: Final = "We could not show that participants recognised any liquid above chance."
 
@@ -114,7 +116,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
 
     def figure(self, drawing: Drawing) -> Picture | None:
         study, block, named = drawing.study, drawing.block, self.value
-        if named is None:
+        if named is None or study.split == EACH_GROUP:  # each group has its own figure
             return None
         shorts = {item.id: item.short for item in self.found.items}
         right = [None if label is None else named.labels.index(label) for label in named.right]
@@ -130,17 +132,14 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             f"({drawing.simulated}{answer_figures.counts(study, block)[0]}). Cells show counts and row percentages; "
             f"correct names are outlined. Undecided: two or more names were tied for the highest rating.{chance}"
         )
+        labels = [shorts[label] for label in named.labels]
+        table = pd.DataFrame(named.found.table, self.found.names, [*labels, "undecided", "unanswered"])
         return drawing.picture(
             self.figure_title,
             caption,
-            partial(
-                answer_figures.draw_recognition,
-                named.found.table,
-                self.found.names,
-                [shorts[label] for label in named.labels],
-                right,
-            ),
+            partial(answer_figures.draw_recognition, named.found.table, self.found.names, labels, right),
             answer_figures.counts(study, block),
+            tab_separated(study, table.rename_axis("liquid").reset_index()),
         )
 
     def methods(self) -> Iterator[str]:

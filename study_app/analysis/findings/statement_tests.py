@@ -12,8 +12,7 @@ import numpy as np
 from study_app import number_text
 from study_app.analysis.data.blocks import KINDS, TRENDS
 from study_app.analysis.data.measures import LEVELS, by_participant, medians
-from study_app.analysis.data.study_tables import group_members
-from study_app.analysis.figures.people_figures import Column, Panel, draw_people, mean_of, numbers_of_panels
+from study_app.analysis.figures.people_figures import Column, Panel, mean_of, people_picture
 from study_app.analysis.findings.finding import (
     FDR,
     HOLM,
@@ -405,16 +404,18 @@ class Effects(Finding[tuple[Effect, ...]]):
             "t), not corrected for the number of intervals. Conclusions are based on the tests."
             + (f" Band: equivalence bounds of ±{bound:g}." if bound else "")
         )
-        draw = partial(
-            draw_people,
+        return people_picture(
+            study,
+            drawing.block.id,
+            drawing.name,
+            f"Differences from {first}" if over_delay else self.figure_title,
+            caption,
             panels,
+            drawing.forms,
             above=f"Difference from {first}, in points" if over_delay else "Points on the scale",
             below="Added delay in ms" if over_delay else "",
-            members=group_members(study),
             shared=True,
         )
-        title = f"Differences from {first}" if over_delay else self.figure_title
-        return drawing.picture(title, caption, draw, (f"n = {result.n}",), numbers_of_panels(panels))
 
 
 @dataclass(frozen=True, slots=True)

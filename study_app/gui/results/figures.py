@@ -37,6 +37,7 @@ from study_app.gui.widgets.cards import Bar, Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted
+from study_app.protocol.groups import EACH_GROUP
 from study_app.store.atomic import write_file
 from study_app.store.exclusions import Exclusion
 
@@ -95,7 +96,8 @@ class ResultsView:
     ``trials`` are the main trials of each session (participant, number), with their labels. ``colours`` are the
     figures' print colours, by the theme role that replaces them. ``sealed`` is None while unknown, ``opened`` describes
     how the key was opened; ``listed`` tells whether the study's sessions are read. ``drawing`` is the activity while
-    there are no figures yet, ``testing`` while there are; ``untested`` means that it was stopped.
+    there are no figures yet, ``testing`` while there are; ``untested`` means that it was stopped. ``groups`` are the
+    groups by which figures can be split, ``split`` is the one shown, `EACH_GROUP` if all are compared, or "".
     """
 
     studies: tuple[StudyAt, ...] = ()
@@ -115,6 +117,18 @@ class ResultsView:
     testing: Progress | None = None
     untested: bool = False
     trouble: Trouble | None = None
+    groups: tuple[str, ...] = ()
+    split: str = ""
+
+    @property
+    def shown(self) -> list[FigureDrawn]:
+        """The figures of the split in order; one that cannot compare the groups is shown for each group."""
+        kept = [figure for figure in self.figures if figure.split == self.split]
+        if self.split == EACH_GROUP:
+            compared = {figure.name for figure in kept}
+            kept += [figure for figure in self.figures if figure.split and figure.name not in compared]
+        places = {figure.name: place for place, figure in enumerate(self.figures) if not figure.split}
+        return sorted(kept, key=lambda figure: places.get(figure.name, len(places)))
 
     @property
     def kind(self) -> Kind:
@@ -497,10 +511,7 @@ class _WorkLine(Card):
             self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
             self.bar.show_share(going.share)
         elif untested:
-            self.words.show_text(
-                "The computation was stopped before the tests ran, so the recognition results and the lowest delays "
-                "are missing."
-            )
+            self.words.show_text("The computation was stopped, so results of tests and some figures are missing.")
 
 
 class _TroubleCard(Card):
@@ -570,28 +581,28 @@ class FiguresPanel(QScrollArea):
 
     def show_view(self, view: ResultsView) -> None:
         """Show the figures; a card is kept while its figure is redrawn."""
-        names = [figure.name for figure in view.figures]
-        if [card.figure.name for card in self.cards] != names:
-            self._order_cards(view)
-        for card, figure in zip(self.cards, view.figures, strict=True):
+        shown = view.shown
+        if [card.figure.key for card in self.cards] != [figure.key for figure in shown]:
+            self._order_cards(shown, view.colours)
+        for card, figure in zip(self.cards, shown, strict=True):
             if card.figure is not figure:
                 card.show_figure(figure, view.colours)
         if view.trouble is not None:
             self.trouble.show_trouble(view.trouble)
-        elif view.drawing is not None and not view.figures:
+        elif view.drawing is not None and not shown:
             self.trouble.show_going(view.drawing)
-        self.trouble.setVisible(view.trouble is not None or (view.drawing is not None and not view.figures))
-        self.work.show_going(view.testing or (view.drawing if view.figures else None), untested=view.untested)
+        self.trouble.setVisible(view.trouble is not None or (view.drawing is not None and not shown))
+        self.work.show_going(view.testing or (view.drawing if shown else None), untested=view.untested)
         self.fit_width()
 
-    def _order_cards(self, view: ResultsView) -> None:
+    def _order_cards(self, shown: Sequence[FigureDrawn], colours: Mapping[str, str]) -> None:
         """Keep the cards of existing figures and create the others, in the figures' order."""
-        kept = {card.figure.name: card for card in self.cards}
+        kept = {card.figure.key: card for card in self.cards}
         self.cards = []
-        for place, figure in enumerate(view.figures):
-            card = kept.pop(figure.name, None)
+        for place, figure in enumerate(shown):
+            card = kept.pop(figure.key, None)
             if card is None:
-                card = FigureCard(figure, view.colours)
+                card = FigureCard(figure, colours)
                 card.failed.connect(self.failed)
                 card.person_asked.connect(self.person_asked)
             self._column.insertWidget(place, card)

@@ -66,6 +66,7 @@ from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
 from study_app.number_text import counted
+from study_app.protocol.groups import EACH_GROUP
 from study_app.store.exclusions import Exclusion
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import FOLDER, folders_of
@@ -399,7 +400,7 @@ class ResultsPlace(Place):
         self._orders: dict[int, Order] = {}
         self._since_s = 0.0
         self._going: Progress | None = None
-        self._redrawn: set[str] = set()
+        self._redrawn: set[tuple[str, str]] = set()
         self._blocks = 0
         self._listening = QTimer(self, interval=_LISTEN_MS)
         self._listening.timeout.connect(self._read_answers)
@@ -414,10 +415,14 @@ class ResultsPlace(Place):
         self.report = ActionButton("file", "Report …", role="primary", height=44)
         self.sessions = _SessionsCard()
         self.exclusions = _ExclusionsCard()
+        self.split = Choice()
+        self.split.setAccessibleName("Groups")
+        self.split.setFont(font("body"))
         self.figures = FiguresPanel()
         self._lay_out()
         self._connect()
         self._show_studies()
+        self._show_groups()
         self.show_view(ResultsView())
 
     def _connect(self) -> None:
@@ -432,6 +437,7 @@ class ResultsPlace(Place):
         self.figures.asked.connect(self._apply_remedy)
         self.figures.failed.connect(lambda why: self.message.emit("The figure was not saved", why))
         self.figures.person_asked.connect(self._open_participant)
+        self.split.activated.connect(lambda: self._update_view(split=self.split.currentData()))
         self.sessions.rows.opened.connect(self._open_session)
         self.sessions.rows.version_asked.connect(self.version_asked)
 
@@ -449,7 +455,11 @@ class ResultsPlace(Place):
         self._left.setContentsMargins(0, 0, 0, 0)
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._row.setSpacing(16 - 2 * SHADOW)
-        add_parts(self._row, self._panel, (self.figures, 1))
+        self._split_row = QWidget()
+        hbox(
+            label("Groups", "label"), self.split, STRETCH, spacing=8, margins=(SHADOW, 0, 0, 4), parent=self._split_row
+        )
+        add_parts(self._row, self._panel, (vbox(self._split_row, (self.figures, 1), spacing=0, margins=0), 1))
         inside = QWidget()
         vbox(self._head, self._below, (self._row, 1), spacing=12, margins=(24, 20, 24, 18), parent=inside)
         self.area = scrolled(inside)
@@ -478,6 +488,8 @@ class ResultsPlace(Place):
             self.sessions.show_sessions(view.sessions, view.without_sessions)
         if (view.left_out, view.proposed) != (before.left_out, before.proposed):
             self.exclusions.show_left_out(view.left_out, view.proposed)
+        if view.groups != before.groups:
+            self._show_groups()
         self._show_chips()
         self.unblind.setVisible(view.sealed is True)
         for button in (self.unblind, self.export, self.report):
@@ -499,6 +511,15 @@ class ResultsPlace(Place):
             self.study.setCurrentIndex(places.index(self.view.chosen) if self.view.chosen in places else -1)
         self.study.setVisible(bool(self.view.studies))
         self.study.updateGeometry()
+
+    def _show_groups(self) -> None:
+        self.split.clear()
+        self.split.addItem("All together", "")
+        self.split.addItem("Side by side", EACH_GROUP)
+        for group in self.view.groups:
+            self.split.addItem(f"Only {group}", group)
+        self.split.setCurrentIndex(self.split.findData(self.view.split))
+        self._split_row.setVisible(bool(self.view.groups))
 
     def _show_chips(self) -> None:
         chips = []
@@ -726,16 +747,18 @@ class ResultsPlace(Place):
                     doubts=answer.doubts,
                     colours=answer.colours,
                     trouble=None if answer.blocks else nothing,
+                    groups=answer.groups,
+                    split=self.view.split if self.view.split in (EACH_GROUP, *answer.groups) and answer.groups else "",
                 )
             case FirstPage() if newest:
                 places = {name: place for place, name in enumerate(answer.names)}
                 figures = sorted(self.view.figures, key=lambda figure: places.get(figure.name, len(places)))
                 self._update_view(figures=tuple(figures))
             case FigureDrawn() if newest:
-                self._redrawn.add(answer.name)
-                names = [figure.name for figure in self.view.figures]
-                figures = [answer if figure.name == answer.name else figure for figure in self.view.figures]
-                self._update_view(figures=tuple(figures if answer.name in names else [*figures, answer]))
+                self._redrawn.add(answer.key)
+                keys = [figure.key for figure in self.view.figures]
+                figures = [answer if figure.key == answer.key else figure for figure in self.view.figures]
+                self._update_view(figures=tuple(figures if answer.key in keys else [*figures, answer]))
 
     def _take_studies(self, answer: StudiesFound) -> None:
         folders = [study.folder for study in answer.studies]
@@ -784,7 +807,7 @@ class ResultsPlace(Place):
         if isinstance(order, _Decided):
             self._read_study(order.folder)
         elif isinstance(order, ReadStudy) and newest:
-            kept = tuple(figure for figure in self.view.figures if figure.name in self._redrawn)
+            kept = tuple(figure for figure in self.view.figures if figure.key in self._redrawn)
             self._update_view(figures=kept, drawing=None, testing=None)
 
     def _show_refusal(self, order: Order, refused: Refused) -> None:

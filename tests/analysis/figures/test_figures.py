@@ -102,7 +102,7 @@ def test_measures_of_reaches_have_a_scale_each() -> None:
     look = Look("Motion", [], ["n = 2"], style.FALLBACK_FONTS)
     plots = [("Time, s", values), ("Flat", np.ones((2, 3)))]
     first, second = answer_figures.draw_answers(
-        plots, [0.0, 100.0, 200.0], [None, None], "", look, own_scales=True
+        plots, [0.0, 100.0, 200.0], [None, None], "", look, own_scales=[values, np.ones((2, 3))]
     ).figure.axes
     gids = {str(line.get_gid()): line for line in first.lines}
     assert np.asarray(gids["item1-participant1"].get_ydata()).tolist() == [0.8, 0.9, 1.0]

@@ -64,3 +64,48 @@ def test_no_text_leaves_the_figure_or_touches_another(panels: int, shared: bool)
         assert 0 <= box.y0 <= box.y1 <= height, words
     for (words, box), (other, beside) in combinations(boxes, 2):
         assert not box.overlaps(beside), (words, other)
+
+
+RATIOS = {"A": 0.5, "B": 2.0, "C": 3.0, "D": 12.0, "E": 6.0}
+MEMBERS = {"A": "experts", "B": "experts", "C": "novices", "D": "novices", "E": "novices"}
+GROUPS = ("experts", "novices")
+
+
+def split_panel(*, log: bool) -> Panel:
+    doubled = {person: 2 * value for person, value in RATIOS.items()}
+    made = (Column(name="Thin", values=RATIOS), Column(name="Thick", values=doubled))
+    return Panel(columns=made, log=log).split(MEMBERS, GROUPS)
+
+
+@pytest.mark.parametrize(("log", "means"), [(False, [1.25, 7.0]), (True, [1.0, 6.0])])
+def test_groups_are_side_by_side_with_the_mean_of_their_own_participants(log: bool, means: list[float]) -> None:
+    """The geometric means of 0.5 and 2, and of 3, 12 and 6, are 1 and 6."""
+    figure = draw_people([split_panel(log=log)], LOOK, above="Points", members=MEMBERS).figure
+    (axes,) = figure.axes
+    drawn = [line for line in axes.lines if line.get_gid() == "mean"]
+    assert [line.get_ydata()[0] for line in drawn] == pytest.approx([*means, *(2 * mean for mean in means)])
+    points = {str(line.get_gid()): line for line in axes.lines if str(line.get_gid()).startswith("person-")}
+    colours = [points[f"person-{person}"].get_color() for person in ("A", "B", "C", "D", "E")]
+    assert colours == [drawn[0].get_color()] * 2 + [drawn[1].get_color()] * 3
+    assert [text.get_text() for text in axes.get_xticklabels()] == ["Thin", "Thick"]
+    xs = {person: points[f"person-{person}"].get_xdata() for person in MEMBERS}
+    for column in (0, 1):
+        assert max(xs[person][column] for person in "AB") < min(xs[person][column] for person in "CDE")
+
+
+def test_numbers_of_groups_name_the_group_of_each_participant_and_mean() -> None:
+    panel = split_panel(log=False)
+    rows = [line.split("\t") for line in numbers_of_panels([panel], MEMBERS).splitlines()]
+    assert rows[0] == ["participant", "group", "Thin", "Thick"]
+    assert rows[1:6] == [[who, MEMBERS[who], str(value), str(2 * value)] for who, value in RATIOS.items()]
+    assert rows[6:8] == [["mean", "experts", "1.25", "2.5"], ["mean", "novices", "7.0", "14.0"]]
+    alone = numbers_of_panels([panel.split(MEMBERS, ["novices"])], {})
+    assert [line.split("\t")[0] for line in alone.splitlines()[1:4]] == ["C", "D", "E"]
+
+
+def test_a_wide_bound_is_within_the_scale() -> None:
+    """Qt draws no clip path, so that a band beyond the axes would cover the heading."""
+    (axes,) = draw_people([Panel(columns=columns(1), bound=(-7, 8))], LOOK, above="Points").figure.axes
+    low, high = axes.get_ylim()
+    assert low < -7
+    assert high > 8

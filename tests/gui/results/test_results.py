@@ -2,6 +2,7 @@
 
 import multiprocessing
 import shutil
+import statistics
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -9,20 +10,25 @@ from typing import Any
 import psutil
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 from pytestqt.qtbot import QtBot
 
+from study_app.analysis.data.study_tables import group_members, load_study
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import Answer, Order, start_analysis_worker
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow
+from study_app.gui.results.figures import FigureCard
 from study_app.gui.results.view import ResultsPlace
-from study_app.gui.widgets.controls import ActionButton
+from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.main_view import Place
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.blinding import reveals
 from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.workers.server import Crashed, Refused
-from tests.studies import rehearsed
+from tests.protocol.groups.grouped import GROUPS, STUDY
+from tests.studies import made_up, rehearsed
 
 pytestmark = pytest.mark.slow
 
@@ -156,6 +162,80 @@ def test_leaving_out_changes_foot_figures_and_list_until_it_is_taken_back(shown:
     assert exclusions(results / "demo") == ()
     assert shown.place.sessions.head.text() == "3 of 3 sessions in the figures"
     assert not shown.place.exclusions.lines
+
+
+def choose(qtbot: QtBot, choice: Choice, text: str) -> None:
+    """Choose an item with the keyboard."""
+    choice.setFocus()
+    down = choice.findText(text) - choice.currentIndex()
+    for _ in range(abs(down)):
+        qtbot.keyClick(choice, Qt.Key.Key_Down if down > 0 else Qt.Key.Key_Up)
+
+
+def copied_rows(opened: Opened, card: FigureCard) -> list[dict[str, str]]:
+    """Return what a card's Copy numbers puts on the clipboard, row by row."""
+    opened.click(card.copy_numbers)
+    head, *lines = [line.split("\t") for line in QGuiApplication.clipboard().text().splitlines()]
+    return [dict(zip(head, line, strict=True)) for line in lines]
+
+
+def test_figures_are_split_by_the_groups_that_unblinding_makes_known(qtbot: QtBot, tmp_path: Path) -> None:
+    source, folder = tmp_path / "grouped.toml", tmp_path / "results" / "grouped"
+    source.write_text(STUDY + GROUPS, encoding="utf-8", newline="\n")
+    rehearse_answers(source, participants=6, seed=8, results=folder, features=made_up(str(source)))
+    opened = Opened(qtbot, folder.parent)
+    place = opened.place
+    assert not place.split.isVisible(), "the groups are randomised and sealed"
+    opened.decide(place.unblind, "AK", "collection closed")
+    assert place.split.isVisible()
+
+    study = load_study(folder)
+    answers = study.responses[study.responses["counted"] & (study.responses["block"] == "thick")]
+    members = group_members(study)
+    groups = sorted({*members.values()})
+    names = {code: setting.liquid for (block, code), setting in study.settings.items() if block == "thick"}
+    own = answers.groupby(["participant", answers["code"].map(names)])["response"].median()  # of two answers
+
+    def mean(group: str, liquid: str) -> float:
+        return statistics.mean(own[person, liquid] for person in members if members[person] == group)
+
+    def cards() -> list[FigureCard]:
+        return [card for card in place.figures.cards if card.figure.name == "effects-thick"]
+
+    (together,) = cards()
+    verdict = together.figure.verdict
+    assert verdict
+    choose(qtbot, place.split, "Side by side")
+    opened.wait()
+    (compared,) = cards()
+    assert compared.figure.question == together.figure.question
+    assert not compared.figure.verdict, "the tests are of all participants"
+    rows = copied_rows(opened, compared)
+    assert {row["participant"]: row["group"] for row in rows[:6]} == members
+    found = {row["group"]: row for row in rows if row["participant"] == "mean"}
+    means = {
+        (group, name): mean(group, liquid)
+        for group in groups
+        for name, liquid in (("Heavy Honey", "honey"), ("Heavy Water", "water"))
+    }
+    assert {(group, name): float(found[group][name]) for group, name in means} == pytest.approx(means)
+    assert len(set(means.values())) == 4, "or any mean would do"
+
+    choose(qtbot, place.split, f"Only {groups[1]}")
+    opened.wait()
+    (alone,) = cards()
+    people = [row["participant"] for row in copied_rows(opened, alone) if row["participant"].startswith("P")]
+    assert people == [person for person in sorted(members) if members[person] == groups[1]]
+    choose(qtbot, place.split, "All together")
+    opened.wait()
+    assert [card.figure.verdict for card in cards()] == [verdict]
+    opened.window.close()
+
+
+def test_a_study_without_groups_has_no_choice_of_groups(shown: Opened) -> None:
+    shown.decide(shown.place.unblind, "AK", "collection closed")
+    assert not shown.place.split.isVisible()
+    assert {card.figure.split for card in shown.place.figures.cards} == {""}
 
 
 def cut_table(study: Path) -> None:
