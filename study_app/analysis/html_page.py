@@ -26,6 +26,8 @@ _FOLDED = 12
 
 _PX_PER_PT = 1.9
 """Pixels of the page for a point of a figure that has the room."""
+_BESIDE_PT = 420
+"""Of a figure that fills its place beside an answer; narrower ones do not, so that all texts are equally large."""
 
 _VARIABLES = {
     style.TEXT: "text",
@@ -36,6 +38,7 @@ _VARIABLES = {
     style.AXIS: "axis",
     style.ACCENT: "accent",
     style.BAND: "band",
+    style.SECOND: "second",
     style.PARTICIPANT: "person",
     style.WARN: "warn",
     style.WARN_GROUND: "warn-ground",
@@ -151,10 +154,12 @@ def _inline_svg(svg: str, words: str) -> Markup:
         for part in parts[1::2]
     ]
     width = round(_PX_PER_PT * float(size[1])) if (size := _SIZE.search(svg)) else 600
+    share = min(100, round(100 * width / (_PX_PER_PT * _BESIDE_PT)))
     view = size[0] if size else ""
     root = re.sub(r' (?:width|height)="[^"]*"', "", view, count=2)
     label = Markup.escape(words)
-    shown = root.replace("<svg ", f'<svg role="img" aria-label="{label}" style="width: {width}px" ', 1)
+    look = f"width: {width}px; --share: {share}%"
+    shown = root.replace("<svg ", f'<svg role="img" aria-label="{label}" style="{look}" ', 1)
     return Markup("".join(parts).replace(view, shown, 1))  # noqa: S704 - matplotlib escapes its texts
 
 

@@ -114,7 +114,7 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     from study_app.analysis.figures import answer_figures  # noqa: PLC0415
     from study_app.analysis.report.study_figures import block_name  # noqa: PLC0415
 
-    for number, block in enumerate(study.blocks):
+    for number, block in enumerate(study.blocks if study.n else ()):
         send(Progress("drawing", 0.3 + 0.7 * number / len(study.blocks)))
         words, name = "No completed session has answers in this block yet.", block_name(study, block)
         if len(study.answers(block)):
@@ -210,6 +210,7 @@ def _study_found(study: Study) -> StudyFound:
             "border": style.BORDER,
             "accent": style.ACCENT,
             "band": style.BAND,
+            "second": style.SECOND,
             "ctl": style.PARTICIPANT,
             "warn": style.WARN,
             "warn_bg": style.WARN_GROUND,

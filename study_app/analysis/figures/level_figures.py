@@ -138,7 +138,7 @@ _ASIDE: Final = 0.025
 """How far the points of one standard are from those of the next, as a share of the axis."""
 _BELOW: Final = 0.03
 """How far the interval of one standard's threshold is drawn below that of the one before, as a share correct."""
-_COLOURS: Final = (style.ACCENT, "#b35600", style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
+_COLOURS: Final = (style.ACCENT, style.SECOND, style.TEXT, "#6d1007", "#5d8aa8", "#b75a26", "#02256d", style.AXIS)
 
 
 def _level_picture(study: Study, result: LevelsResult, forms: Sequence[str], name: str, tracked: _Tracked) -> Picture:

@@ -47,7 +47,7 @@ _GOLDEN: Final = 0.6180339887
 """Steps that put many points evenly apart."""
 _ASIDE: Final = 0.27
 """How far the mean is from the points that it is of."""
-_GROUPS: Final = (style.ACCENT, "#b35600", "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
+_GROUPS: Final = (style.ACCENT, style.SECOND, "#5d6a75", "#6d1007", "#5d8aa8", "#02256d")
 _MARKERS: Final = "osD^vP"
 _LEAST_TICKS: Final = 3
 _GROUP_STEP: Final = 0.8

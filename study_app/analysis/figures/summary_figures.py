@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 import pandas as pd
 
 from study_app import figure_style as style
-from study_app.analysis.data.blocks import QuestionPlace
+from study_app.analysis.data.blocks import PlacedScore, QuestionPlace
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import Column, Mean, Panel, mean_of, people_picture
 from study_app.analysis.levels.answers import Answers, Settings
@@ -19,6 +19,7 @@ from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
 from study_app.number_text import capitalised
 from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.questionnaires import instruments, published_name
 
 _MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
     (Thresholds, "threshold", "threshold"),
@@ -219,7 +220,8 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
     tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
     if scores:
         tables = [
-            (score.name, None, score.where, scored(study, score).rename(columns={"score": "value"})) for score in scores
+            (_score_name(score), None, score.where, scored(study, score).rename(columns={"score": "value"}))
+            for score in scores
         ]
     else:
         asked = [
@@ -247,6 +249,15 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
         if any(by_setting.values()):
             numbers.append(Numbers(title, bounds, bool(scores), by_setting))
     return numbers
+
+
+def _score_name(score: PlacedScore) -> str:
+    """Return the name of a score after that of its standard questionnaire: "SUS", "NASA-TLX raw"."""
+    name = score.name.replace("_", " ")
+    if score.instrument is None or score.instrument not in instruments():
+        return name
+    published = published_name(score.instrument)
+    return published if name.upper() == published else f"{published} {name}"
 
 
 def _with_room(low: float, high: float) -> tuple[float, float]:

@@ -1,5 +1,6 @@
 """The first page: an answer to each question of a study, in order, beside the figure that shows it."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -22,6 +23,8 @@ from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, number, significant
 from study_app.protocol.model import quoted_title
 
+_BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] ")
+"""Where a line must not break: in an interval, before a percent sign, in "n = 12" and "p < .001"."""
 _LIMITS_SHOWN: Final = 6
 """So many limits are listed on the first page; the others are folded."""
 
@@ -177,7 +180,7 @@ def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) ->
 
 def _number_words(numbers: Numbers) -> str:
     """Return the means of a score or question by setting, and for two settings the mean difference."""
-    what = f"The mean score ({numbers.title})" if numbers.is_score else f"The mean of “{numbers.title}”"
+    what = f"The mean {numbers.title} score" if numbers.is_score else f"The mean of “{numbers.title}”"
     means = [(name, mean, len(held)) for name, held in numbers.by_setting.items() if (mean := mean_of(held.values()))]
     parts = [
         f"{number(mean.value)}{f' {_setting_words(name)}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
@@ -246,18 +249,32 @@ def first_page(
                 "question": card.question,
                 "verdict": card.verdict,
                 "state": card.verdict.replace(" ", "-"),
-                "small": card.is_small,
-                "sentences": list(card.sentences),
+                "small": is_small,
+                "sentences": [_unbroken(line) for line in card.sentences],
                 "figure": "" if figure is None else picture(figure, beside=True),
                 "caption": "" if figure is None else figure.caption,
             }
-            for card, figure in shown
+            for (card, figure), is_small in zip(shown, _in_pairs(given), strict=True)
         ],
         sentences=[*filter(None, [look]), *(() if given else (none_found(results),))],
         limits=_limits_once(limits),
         shown=_LIMITS_SHOWN,
         empty=empty_studies(max(block.n for block in results.blocks)) if claimed and not results.decided.looks else "",
     )
+
+
+def _unbroken(sentence: str) -> str:
+    return _BREAKS.sub(lambda match: match[0].replace(" ", "\u00a0"), sentence)
+
+
+def _in_pairs(given: Sequence[Card]) -> list[bool]:
+    """Return which cards stand side by side: of successive small ones each pair."""
+    paired: list[bool] = []
+    for place, card in enumerate(given):
+        if len(paired) == place:
+            is_pair = card.is_small and any(after.is_small for after in given[place + 1 : place + 2])
+            paired += [True, True] if is_pair else [False]
+    return paired
 
 
 def _limits_once(limits: Sequence[str]) -> list[str]:

@@ -172,6 +172,7 @@ _FAMILY = re.compile(rb"font-family: [^;\"]*")
 _SIZE = re.compile(rb'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
 _WHITE = b"#ffffff"
 BAND_LIGHT, BAND_DARK = 0.22, 0.34
+SECOND_LIGHT, SECOND_DARK = "#b35600", "#f0955a"
 
 
 def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
@@ -193,6 +194,8 @@ def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
 
 def _ink(theme: Theme, role: str) -> str:
     """Return the colour of a role; "band" is a lighter accent, on which lines are visible."""
+    if role == "second":
+        return SECOND_DARK if theme.dark else SECOND_LIGHT
     if role != "band":
         return str(getattr(theme, role))
     paper, accent = QColor(theme.surface), QColor(theme.accent)
@@ -524,7 +527,6 @@ class _TroubleCard(Card):
         self._remedy: _Remedy = "again"
         self.title = label("", "card")
         self.sentence = label("", "body", "text2", wraps=True)
-        self.sentence.setMaximumWidth(640)
         self.sentence.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.bar = Bar()
         self.bar.setMaximumWidth(420)

@@ -360,6 +360,16 @@ _MISTAKE: Final = Trouble(
     button="Refresh",
     remedy="again",
 )
+_NO_QUESTIONS: Final = Trouble(
+    title="No figures", sentence="This study does not have a questionnaire.", button="Refresh", remedy="again"
+)
+_NONE_COMPLETE: Final = Trouble(
+    title="No complete session to show",
+    sentence="Figures appear once a session is complete and not excluded. Start or continue a session on Home.",
+    button="Go to Home",
+    remedy="home",
+)
+_HIDDEN: Final = "Conditions appear as codes. Tests, hypotheses and thresholds are hidden until you unblind the study."
 
 _Decided: TypeAlias = LeaveOut | TakeBack | OpenKey
 _REFUSALS: Final = {
@@ -455,11 +465,11 @@ class ResultsPlace(Place):
         self._left.setContentsMargins(0, 0, 0, 0)
         self._row = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._row.setSpacing(16 - 2 * SHADOW)
-        self._split_row = QWidget()
-        hbox(
-            label("Groups", "label"), self.split, STRETCH, spacing=8, margins=(SHADOW, 0, 0, 4), parent=self._split_row
-        )
-        add_parts(self._row, self._panel, (vbox(self._split_row, (self.figures, 1), spacing=0, margins=0), 1))
+        self._groups = QWidget()
+        hbox(label("Groups", "label"), self.split, spacing=8, margins=0, parent=self._groups)
+        self.hidden = label(_HIDDEN, "label", "text2", wraps=True, weight=400)
+        above = hbox(self._groups, (self.hidden, 1), spacing=16, margins=(SHADOW, 0, SHADOW, 4))
+        add_parts(self._row, self._panel, (vbox(above, (self.figures, 1), spacing=0, margins=0), 1))
         inside = QWidget()
         vbox(self._head, self._below, (self._row, 1), spacing=12, margins=(24, 20, 24, 18), parent=inside)
         self.area = scrolled(inside)
@@ -490,6 +500,7 @@ class ResultsPlace(Place):
             self.exclusions.show_left_out(view.left_out, view.proposed)
         if view.groups != before.groups:
             self._show_groups()
+        self.hidden.setVisible(view.sealed is True and bool(view.figures))
         self._show_chips()
         self.unblind.setVisible(view.sealed is True)
         for button in (self.unblind, self.export, self.report):
@@ -519,7 +530,7 @@ class ResultsPlace(Place):
         for group in self.view.groups:
             self.split.addItem(f"Only {group}", group)
         self.split.setCurrentIndex(self.split.findData(self.view.split))
-        self._split_row.setVisible(bool(self.view.groups))
+        self._groups.setVisible(bool(self.view.groups))
 
     def _show_chips(self) -> None:
         chips = []
@@ -528,7 +539,7 @@ class ResultsPlace(Place):
         if self.view.kind == "pilot":
             chips.append(("warn", "info", "Pilot", "Pilot sessions, stored separately"))
         if self.view.sealed:
-            chips.append(("neutral", "lock", "Blinded: shown by code", "The condition names are sealed"))
+            chips.append(("neutral", "lock", "Blinded", "The condition names are sealed"))
         if self.view.opened:
             opened, most = self.view.opened, 2 * _REASON_SIGNS
             text = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
@@ -740,13 +751,12 @@ class ResultsPlace(Place):
                 self._update_view(proposed=answer.exclusions)
             case StudyFound() if newest:
                 self._blocks = answer.blocks
-                sentence = "This study does not have a questionnaire."
-                nothing = Trouble(title="No figures", sentence=sentence, button="Refresh", remedy="again")
+                trouble = None if answer.n else _NONE_COMPLETE
                 self._update_view(
                     trials=answer.trials,
                     doubts=answer.doubts,
                     colours=answer.colours,
-                    trouble=None if answer.blocks else nothing,
+                    trouble=trouble if answer.blocks else _NO_QUESTIONS,
                     groups=answer.groups,
                     split=self.view.split if self.view.split in (EACH_GROUP, *answer.groups) and answer.groups else "",
                 )

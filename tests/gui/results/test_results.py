@@ -125,7 +125,7 @@ def shown(qtbot: QtBot, results: Path) -> Iterator[Opened]:
 
 
 def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorded(shown: Opened, results: Path) -> None:
-    assert shown.chips == ["Simulated participants", "Blinded: shown by code"]
+    assert shown.chips == ["Simulated participants", "Blinded"]
     assert shown.titles == ["Agreement for each setting", "Answers for each delay setting"]
     drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
     assert b">L1<" in drawn
