@@ -1,5 +1,6 @@
 """The first page: what it answers in studies of every kind, how often it is wrong, and what a claim needs."""
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,8 +16,9 @@ from study_app.analysis.findings.delays import ContrastsWithControl, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, with_gates
+from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
-from study_app.analysis.report.first_page import first_page
+from study_app.analysis.report.first_page import Card, first_page
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
 from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
@@ -231,3 +233,18 @@ def test_a_block_without_reaching_measures_says_why(
         monkeypatch.setattr(sections, name, lambda *_, value=value, **__: value)
     page = "".join(sections.motion(results))
     assert [sentence in page for sentence in sentences] == [said == 0, said == 1]
+
+
+def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short card without a neighbour would leave half of the page empty."""
+    kinds = "S SS L SSS L S".replace(" ", "")
+    made = [
+        Card(question=f"{place}", verdict="", sentences=("n = 12",), block="b", figures=(), is_small=kind == "S")
+        for place, kind in enumerate(kinds)
+    ]
+    monkeypatch.setattr(pages, "cards", lambda *_: made)
+    page = first_page(rising(5), ())
+    assert ["S" if small else "-" for small in re.findall(r'<article class="card( small)?">', page)] == list(
+        "SS--SS---"
+    )
+    assert page.count("n\u00a0=\u00a012") == len(made)

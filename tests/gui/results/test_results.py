@@ -28,7 +28,7 @@ from study_app.store.exclusions import exclusions
 from study_app.store.folders import StudyFolder
 from study_app.workers.server import Crashed, Refused
 from tests.protocol.groups.grouped import GROUPS, STUDY
-from tests.studies import made_up, rehearsed
+from tests.studies import begun, made_up, rehearsed
 
 pytestmark = pytest.mark.slow
 
@@ -126,6 +126,7 @@ def shown(qtbot: QtBot, results: Path) -> Iterator[Opened]:
 
 def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorded(shown: Opened, results: Path) -> None:
     assert shown.chips == ["Simulated participants", "Blinded"]
+    assert shown.place.hidden.isVisible()
     assert shown.titles == ["Agreement for each setting", "Answers for each delay setting"]
     drawn = b"".join(card.figure.svg for card in shown.place.figures.cards)
     assert b">L1<" in drawn
@@ -137,6 +138,7 @@ def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorde
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
     assert shown.chips[1].endswith("by AK: collection closed")
     assert not shown.place.unblind.isVisible()
+    assert not shown.place.hidden.isVisible()
     assert shown.titles[:2] == ["Every participant's answers", "Answers as a function of added delay"]  # first page
     assert "Agreement for each liquid" in shown.titles
     questions = [card.question.text() for card in shown.place.figures.cards]
@@ -252,11 +254,17 @@ def without_sessions(study: Path) -> None:
     (study / "data").mkdir(parents=True)
 
 
+def none_complete(study: Path) -> None:
+    shutil.rmtree(study)
+    begun(study).close()
+
+
 @pytest.mark.parametrize(
     ("change", "title", "named", "listed"),
     [
         (shutil.rmtree, "No studies yet", "", 0),
         (without_sessions, "No sessions yet", "", 0),
+        (none_complete, "No complete session to show", "Start or continue a session on Home", 1),
         (cut_table, "The study cannot be read", "P002", 3),
         (cut_exclusions, "The study cannot be read", "exclusions.csv", 0),
     ],
