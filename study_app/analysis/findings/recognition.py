@@ -1,6 +1,6 @@
 """Recognition of liquids by the statement rated highest, and the first page's answer to which were distinguished."""
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Final
@@ -21,7 +21,7 @@ from study_app.analysis.findings.finding import (
     rows_alone,
     test_row,
 )
-from study_app.analysis.findings.statement_tests import Pairs, SettingsDiffer
+from study_app.analysis.findings.statement_tests import Effects, Pairs, SettingsDiffer
 from study_app.analysis.html_page import heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture, tab_separated
 from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short_text
@@ -220,7 +220,7 @@ class Distinguished(Finding[None]):
         ]
         items = [f"“{short_text(result, one.item)}”" for one in differing if one.verdict == verdict]
         if apart:
-            text = f"Rated differently: {listed(list(dict.fromkeys(apart)))}."
+            text = f"Participants rated these pairs differently: {listed(list(dict.fromkeys(apart)))}."
         elif items:
             text = (
                 f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which ones "
@@ -228,6 +228,7 @@ class Distinguished(Finding[None]):
             )
         else:
             text = f"No statement showed a difference between any two {result.kind}."
+        text += self._largest_words({test.item for test in differing if test.verdict == verdict})
         if named is not None and named.found.p is not None:
             names = listed([result.names[place].lower() for place in known])
             hits = (
@@ -241,3 +242,17 @@ class Distinguished(Finding[None]):
         if not verdicts:
             return self.answered("not shown", f"{text} {NO_EVIDENCE}")
         return self.answered(verdict, text, claims=True)
+
+    def _largest_words(self, items: Container[str]) -> str:
+        """Return a sentence on the largest mean difference from the first setting in ``items``, with a space."""
+        result = self.found
+        known = [effect for effect in Effects.of(result) if effect.item in items and effect.low is not None]
+        if not known:
+            return ""
+        most = max(known, key=lambda effect: abs(effect.mean or 0.0))
+        first, other = (name(result, code).lower() for code in (result.settings[0].code, most.code))
+        ends = f"[{number(most.low)}, {number(most.high)}]"
+        return (
+            f" The largest mean difference from {first} is {number(most.mean)} points "
+            f"(“{short_text(result, most.item)}” for {other}, 95 % confidence interval {ends}, n = {most.n})."
+        )

@@ -337,6 +337,16 @@ class Effect:
     high: float | None
 
 
+_MOST_LETTERS: Final = 64
+"""Of the ends of a scale; longer ones would reach the legend."""
+
+
+def _scale_words(labels: Sequence[str]) -> str:
+    """Return the title of a scale, with its ends if there is room."""
+    words = f"Points from {LEVELS[0]} ({labels[0]}) to {LEVELS[-1]} ({labels[-1]})"
+    return words if len(words) <= _MOST_LETTERS else "Points on the scale"
+
+
 class Effects(Finding[tuple[Effect, ...]]):
     """The figure of effects: the difference of each setting from the first for each statement, with intervals."""
 
@@ -412,7 +422,7 @@ class Effects(Finding[tuple[Effect, ...]]):
             caption,
             panels,
             drawing.forms,
-            above=f"Difference from {first}, in points" if over_delay else "Points on the scale",
+            above=f"Difference from {first}, in points" if over_delay else _scale_words(drawing.block.labels),
             below="Added delay in ms" if over_delay else "",
             shared=True,
         )

@@ -288,6 +288,26 @@ def pairs_differ(match: re.Match[str], told: Told) -> bool:
     return listed_in(match[1]) == found[stated]
 
 
+def largest_of_settings(match: re.Match[str], told: Told) -> bool:
+    """Check that no mean difference from the first setting is larger in a statement with a difference."""
+    first, mean, item, other, low, high, n = match.groups()
+    block = told.block
+    names = {it["code"]: text.lower() for it, text in zip(block["settings"], block["names"], strict=True)}
+    rows = told.asked("settings differ")
+    verdicts = {row["verdict"] for row in (*rows, *told.asked("two settings differ"))}
+    stated = "shown" if "shown" in verdicts or _recognition_shown(told) else "suggested"
+    differing = {row["item"] for row in rows if row["verdict"] == stated}
+    known = [effect for effect in block["effects"] if effect["item"] in differing]
+    (named,) = (it for it in known if {it["item"]} == names_in(item) and names[it["code"]] == other)
+    return (
+        first == block["names"][0].lower()
+        and all(abs(effect["mean"]) <= abs(named["mean"]) for effect in known)
+        and is_number(mean, named["mean"])
+        and (is_number(low, named["low"]) and is_number(high, named["high"]))
+        and int(n) == named["n"]
+    )
+
+
 def _recognition_shown(told: Told) -> bool:
     return bool(recognised(told)) and told.block["named"]["verdict"] == "shown"
 
@@ -679,7 +699,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
     (r"We could not show that participants recognised any liquid above "
      r"chance\.", when(lambda told: not recognised(told))),
-    (r"Rated differently: (.*)\.", pairs_differ),
+    (r"Participants rated these pairs differently: (.*)\.", pairs_differ),
+    (rf"The largest mean difference from (.*) is {R} points \(({ITEM}) for (.*), 95 % confidence interval {ENDS}, "
+     r"n = (\d+)\)\.", largest_of_settings),
     (r"The liquids were rated differently on (.*), but the tests do not show which ones differ\.", statements_differ),
     (r"No statement showed a difference between any two liquids\.", no_statement_differs),
     # First page: a block with a single setting
