@@ -179,16 +179,15 @@ def themed_svg(svg: bytes, colours: Mapping[str, str], theme: Theme) -> bytes:
     """Return a figure with its print colours (role → ``#rrggbb``) replaced by those of ``theme``.
 
     White is paper, except in letters, which are on coloured bars. The levels of agreement keep their colours
-    everywhere; on dark paper they get an edge. Qt uses only one font family of a list, so the first is written.
+    everywhere; on dark paper they get an edge.
     """
     letters = {colour.lower().encode(): _ink(theme, role).encode() for role, colour in colours.items()}
     edge = theme.ctl if theme.dark else theme.surface
     paper = {**letters, b"stroke: " + _WHITE: f"stroke: {edge}".encode(), _WHITE: theme.surface.encode()}
-    family = b"font-family: " + FAMILIES[0].encode()
     parts = _LETTERS.split(svg)  # every second part is a text
     accent = colours.get("accent", "#").lower().encode()
     parts[::2] = [_with_colours(part, paper, accent) for part in parts[::2]]
-    parts[1::2] = [_FAMILY.sub(family, _with_colours(part, letters, accent)) for part in parts[1::2]]
+    parts[1::2] = [_with_colours(part, letters, accent) for part in parts[1::2]]
     return b"".join(parts)
 
 
@@ -211,9 +210,14 @@ def _with_colours(part: bytes, by: Mapping[bytes, bytes], accent: bytes) -> byte
     return pattern.sub(lambda match: by.get(match[0], match[0]), part)
 
 
+def _renderer(svg: bytes) -> QSvgRenderer:
+    """Return what draws an SVG; Qt uses only one font family of a list, so only the first is left."""
+    return QSvgRenderer(_FAMILY.sub(b"font-family: " + FAMILIES[0].encode(), svg))
+
+
 def drawn_svg(svg: bytes, size: QSize, ratio: float) -> QImage:
     """Return an SVG as an image of ``size`` logical px for a screen with that device pixel ratio."""
-    renderer = QSvgRenderer(svg)
+    renderer = _renderer(svg)
     image = QImage(round(size.width() * ratio), round(size.height() * ratio), QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
@@ -358,7 +362,7 @@ _PNG_SCALE = 300 / 72
 
 def _save_figure(figure: FigureDrawn, path: Path) -> None:
     """Write a figure as PDF, SVG or PNG, by the ending of ``path``; StoreError if it cannot be written."""
-    renderer = QSvgRenderer(figure.svg)
+    renderer = _renderer(figure.svg)
     size = renderer.defaultSize()
     if (ending := path.suffix.lower()) == ".svg":
         content = figure.svg
@@ -471,7 +475,7 @@ class FigureCard(Card):
 
     def _copy_figure(self) -> None:
         """Copy the figure as a picture."""
-        size = QSvgRenderer(self.figure.svg).defaultSize()
+        size = _renderer(self.figure.svg).defaultSize()
         QGuiApplication.clipboard().setImage(drawn_svg(self.figure.svg, size, _PNG_SCALE))
 
     def _ask_where(self) -> None:

@@ -469,6 +469,7 @@ class ResultsPlace(Place):
         hbox(label("Groups", "label"), self.split, spacing=8, margins=0, parent=self._groups)
         self.hidden = label(_HIDDEN, "label", "text2", wraps=True, weight=400)
         above = hbox(self._groups, (self.hidden, 1), spacing=16, margins=(SHADOW, 0, SHADOW, 4))
+        above.setAlignment(self._groups, Qt.AlignmentFlag.AlignLeft)
         add_parts(self._row, self._panel, (vbox(above, (self.figures, 1), spacing=0, margins=0), 1))
         inside = QWidget()
         vbox(self._head, self._below, (self._row, 1), spacing=12, margins=(24, 20, 24, 18), parent=inside)

@@ -17,8 +17,8 @@ SVG = b"""<?xml version="1.0"?>
 <path d="M 0 30 L 200 30" style="fill: none; stroke: #0b65a3"/>
 <path d="M 50 40 L 150 40 L 150 60 L 50 60 z" id="level7" style="fill: #02256d; stroke: #ffffff"/>
 <path d="M 50 70 L 150 70 L 150 90 L 50 90 z" id="shade" style="fill: #0b65a3; fill-opacity: 0.3"/>
-<text x="60" y="55" style="font-family: 'Inter', sans-serif; fill: #ffffff" id="white">7</text>
-<text x="5" y="15" style="font-family: 'Inter', sans-serif; fill: #13202c" id="ink">A</text>
+<text x="60" y="55" style="font-family: 'Inter', 'DejaVu Sans', sans-serif; fill: #ffffff" id="white">7</text>
+<text x="5" y="15" style="font-family: 'Inter', 'DejaVu Sans', sans-serif; fill: #13202c" id="ink">A</text>
 </svg>
 """
 STUDY = Path("results/rek2024")

@@ -59,8 +59,6 @@ def test_in_the_dark_theme_paper_and_letters_change_and_levels_do_not():
     assert b'fill: #ffffff" id="white">7<' in made, "letters on a dark level stay white"
     assert f'fill: {DARK.text}" id="ink"'.encode() in made
     assert b'id="shade" style="fill: #0b65a3; fill-opacity: 0.3"' in made, "a shade under light letters stays deep"
-    assert b"font-family: Inter;" in made
-    assert b"sans-serif" not in made
 
 
 def test_a_figure_is_drawn_at_the_screens_resolution(qapp):

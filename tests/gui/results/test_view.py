@@ -7,12 +7,14 @@ from dataclasses import replace
 import pytest
 from PySide6.QtCore import QPoint, QSize, Qt
 from PySide6.QtGui import QGuiApplication
+from PySide6.QtSvg import QSvgRenderer
 from PySide6.QtWidgets import QLabel
 
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.report.study_figures import plot
 from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, TakeBack
+from study_app.gui.results import figures
 from study_app.gui.results.view import NO_SAV
 from study_app.gui.widgets.controls import ActionButton
 from tests.analysis.conftest import SAMPLE
@@ -100,7 +102,10 @@ def test_a_figure_asks_for_the_width_at_which_it_is_read_and_the_height_of_its_p
     assert place.figures.cards[0].drawing.sizeHint() == QSize(900, 450)
 
 
-def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, qtbot, tmp_path):
+def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, qtbot, tmp_path, monkeypatch):
+    """Qt takes a list of font families for one name, which no font has."""
+    drawn = []
+    monkeypatch.setattr(figures, "QSvgRenderer", lambda svg: drawn.append(svg) or QSvgRenderer(svg))
     asked = {"question": "Which liquids were distinguished?", "verdict": "shown", "answer": "Water and honey were."}
     first = replace(view().figures[0], numbers="participant\twater\nP001\t3.0\n", **asked)
     place.show_view(view(figures=(first, *view().figures[1:])))
@@ -118,6 +123,8 @@ def test_an_answer_stands_above_its_figure_which_can_be_copied_and_saved(place, 
         (made,) = tmp_path.glob(f"{name}*")
         assert made.read_bytes().startswith(begin)
     assert (tmp_path / "d.pdf").is_file()
+    assert drawn
+    assert all(re.findall(rb"font-family: (.*?);", svg) == [b"Inter"] * 2 for svg in drawn)
     with qtbot.waitSignal(place.message) as told:
         card.save_to(tmp_path / "none" / "a.png")
     assert "cannot be written" in told.args[1]
