@@ -589,7 +589,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         else None,
         ("SD", _sd_words),
         ("Bayes factor BF₁₀", lambda row: "–" if row.bayes_factor is None else significant(row.bayes_factor)),
-        ("p", lambda result: p_value(result.p)),
+        ("largest p", lambda result: p_value(result.largest_p)),
         ("adjusted p", lambda result: p_value(result.p_adjusted)),
         ("Verdict", lambda result: result.verdict),
         words=1,
