@@ -95,7 +95,7 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     assert found.statistic == pytest.approx(expected.mean / error)
     assert found.p == pytest.approx(student.sf(expected.mean / error, 5))
     page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
-    first = page[page.index('class="first"') :]
+    first = page[page.index('class="first"') :].replace("\u00a0", " ")
     asked = "Threshold is higher in Late than in Prompt; equivalent within 1.25"
     assert first.index(asked) < first.index("Prompt: ")
     assert f"; mean ratio {found.effect:.2f}, 95 % confidence interval" in first
