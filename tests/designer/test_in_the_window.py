@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtWidgets import QApplication
 
 from study_app.store.drafts import draft_of
 from tests.designer.support.inputs import QtInput
@@ -89,3 +90,24 @@ def test_a_kill_while_typing_loses_at_most_the_last_second(designer: Any, tmp_pa
         lost = [moment for letters, moment in typed.items() if letters > len(kept)]  # the draft may be ahead of `typed`
         assert not lost or killed - lost[0] < 1.0
         assert designer.file.read_bytes() == before
+
+
+def test_a_pressed_segment_stays_chosen_and_shows_what_it_says(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    place, preview = designer.place, designer.controller.preview
+    shows = {
+        "Fit": lambda: preview.page.scale_now < 1,
+        "100 %": lambda: preview.page.scale_now == 1,
+        "Form": lambda: place.form.isVisible() and not place.pane.isVisible(),
+        "Views": lambda: place.pane.isVisible() and not place.form.isVisible(),
+    }
+    for segments in (place.pane.tabs, preview.zoom, preview.moments, place.sides):
+        if segments is place.sides:
+            designer.window.resize(1024, 640)
+        for button in (*segments.buttons[1:], segments.buttons[0]):
+            text = button.text()
+            button.click()
+            QApplication.processEvents()
+            assert [other.text() for other in segments.buttons if other.isChecked()] == [text]
+            assert text not in shows or shows.pop(text)(), text
+    assert not shows

@@ -81,6 +81,7 @@ def drafts(story: Story) -> None:
     act("copy a shipped one", lambda: designer.controller.begin_study("demo", "mine"))
     story.expect("Draft kept HH:MM", kept="not saved", undo="")
     story.has('name = "mine"', 'version = "0.1"')
+    assert kept_original(designer.file.with_name("mine.toml")) == "demo"
     story.play("ctrl+s")
     story.expect(kept="saved")
 
@@ -853,10 +854,16 @@ def hypotheses(story: Story) -> None:
         hypothesis = {"measure": measure, "blocks": blocks, "conditions": tuple(conditions.split())}
         assert designer.value(*contrasts) == (hypothesis | more,)
 
+    def offered(*compared: str) -> None:
+        """Check which second items are offered for the first one."""
+        assert [line().second.itemText(at) for at in range(line().second.count())] == [*compared]
+
     story.press("Add a hypothesis")
     stated("feels_liquid", "thin thick", expected="higher")
+    offered("Thick in Liquids")
     story.choose(line().first, "Late in Delays")
     stated("harder", "late prompt", expected="higher")
+    offered("Prompt in Delays")
     story.choose(line().measure, "Comfortable")
     stated("comfortable", "late prompt", expected="higher")
     story.choose(line().relation, "is equal to")
@@ -891,6 +898,7 @@ def hypotheses(story: Story) -> None:
     story.choose(line().first, "A, Prompt in Delays − Late in Delays")
     pair = {"blocks": ("delays",), "groups": ("a", "b"), "conditions": ("prompt", "late")}
     assert designer.value(*contrasts) == ({"measure": "harder", "expected": "higher", **pair},)
+    offered("B, Prompt in Delays − Late in Delays")
     story.choose(line().relation, "is different from")
     assert designer.value(*contrasts) == ({"measure": "harder", **pair},)
     assert [line().first.currentText(), line().second.currentText()] == [

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from study_app.devices import driver
+from study_app.devices.descriptors import DEVICES
 from study_app.devices.doctor import DeviceFailure
 from study_app.devices.falcon.failures import FAILURES as FALCON
 from study_app.devices.force_dimension.library import FAILURES as FORCE_DIMENSION
@@ -480,6 +481,13 @@ def test_a_name_that_is_none_is_refused_with_those_there_are(name: str) -> None:
     with pytest.raises(DeviceNotFound, match="is not known; choose one of: mouse, falcon, "):
         open_device(name)
     assert list_devices()[0] == "mouse"
+
+
+def test_a_device_without_a_doctor_is_told_which_devices_have_one() -> None:
+    with pytest.raises(DeviceError, match="the doctor cannot examine 'mouse'; it examines only ") as refused:
+        doctor_of("mouse")
+    listed = str(refused.value).partition("it examines only ")[2].partition(": see ")[0].split(", ")
+    assert sorted(listed) == sorted(device.usage for device in DEVICES if device.doctor is not None)
 
 
 @pytest.mark.parametrize("name", ["falcon", "inverse3", "force-dimension"])

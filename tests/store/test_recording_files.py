@@ -170,6 +170,16 @@ def test_frames_come_back_with_their_age(tmp_path: Path) -> None:
     assert [tuple(one) for one in read[["video_frame", "video_ns", "video_age_ns"]].tolist()] == video
 
 
+def test_frames_of_format_3_are_those_of_sessions_without_a_video(tmp_path: Path) -> None:
+    path = write_frames(tmp_path / "trial-003_frames.parquet", np.array([[7, 3, 5, 11, 13]]), FACTS).path
+    whole, facts = parquet.read_table(path), json.loads(parquet.read_metadata(path).metadata[b"liquid_study"])
+    earlier = whole.select(["painted_ns", "sample_ns", "age_ns"])
+    with parquet.ParquetWriter(path, earlier.schema) as writer:
+        writer.write_table(earlier)
+        writer.add_key_value_metadata({b"liquid_study": json.dumps(facts | {"format": 3})})
+    assert read_frames(path).tolist() == [(7, 3, 4, -1, 0, -1)]
+
+
 def test_what_is_no_recording_is_named(tmp_path: Path, samples_of: Make) -> None:
     samples = write(tmp_path / "trial-003.parquet", samples_of(100)).path
     frames = write_frames(tmp_path / "frames.parquet", np.array([[5, 3, -1, 0, -1]]), FACTS).path

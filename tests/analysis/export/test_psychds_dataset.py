@@ -4,6 +4,7 @@ import hashlib
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -21,6 +22,7 @@ from study_app.store.blinded.blinding import reveal
 from study_app.store.csv_files import Column, optional
 from study_app.store.output_files import FileCopy, write_files
 from tests.analysis.export.described import undescribed
+from tests.analysis.made_up import everybody, liquids, study
 from tests.studies import rehearsed
 
 pytestmark = pytest.mark.slow
@@ -108,6 +110,30 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
         assert f"Add the files that are missing from `materials`: waves.mp4 (SHA-256 {digest}; {why})." in readme
 
 
+@pytest.mark.parametrize(
+    ("is_revealed", "sentence"),
+    [
+        (True, "Conditions appear under their names."),
+        (False, "Conditions appear as codes, because the study is blinded."),
+    ],
+)
+def test_the_readme_says_who_took_part_and_where_what_is(is_revealed: bool, sentence: str) -> None:
+    settings = liquids(2)
+    made = study(settings, list(everybody(settings, 3, lambda *_: 4)))
+    made = made if is_revealed else replace(made, settings={})
+    tables, reports = {"a.csv": b"", "b.csv": b""}, {"report.html": b"", "report.R": b""}
+    lines = psychds_dataset._readme(made, tables, reports, ["waves.mp4", "sea.mp4"]).decode().splitlines()
+    assert lines[0] == "# Made up"
+    assert lines[2].startswith("**All participants are simulated.** This Psych-DS dataset contains data from 3 part")
+    assert f". {sentence} Missing values" in lines[2]
+    assert [line for line in lines if line.startswith("- `")] == [
+        "- `data/a.csv`",
+        "- `data/b.csv`",
+        "- `results/report.html`: the report; `Rscript analysis/report.R data results` recomputes its main numbers",
+    ]
+    assert "Add the files that are missing from `materials`: waves.mp4, sea.mp4." in lines
+
+
 def test_the_file_and_the_footage_of_a_study_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = shipped_file("rek2024")
     found = _study_file("rek2024", {protocol_hash(file.read_bytes())}, {})
@@ -116,8 +142,8 @@ def test_the_file_and_the_footage_of_a_study_are_found_by_name(tmp_path: Path, m
     conditions = {"fast": {"view": "b.mp4", "footage_sha256": "1f"}, "slow": {"view": "a.mp4", "footage_sha256": "2e"}}
     key = SimpleNamespace(tables={"conditions": conditions | {"none": {"view": ""}}})
     monkeypatch.setattr(psychds_dataset, "revealed_key", lambda _folder: key)
-    study: Any = SimpleNamespace(folder=tmp_path)
-    assert _footage(study) == {"a.mp4": "2e", "b.mp4": "1f"}
+    of_folder: Any = SimpleNamespace(folder=tmp_path)
+    assert _footage(of_folder) == {"a.mp4": "2e", "b.mp4": "1f"}
 
 
 def test_footage_that_changes_while_it_is_copied_leaves_nothing(tmp_path: Path) -> None:

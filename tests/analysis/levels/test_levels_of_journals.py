@@ -156,3 +156,10 @@ def test_the_report_of_a_sealed_study_shows_counts_and_times_by_code_and_no_leve
             told = words.in_text(path.read_text(encoding="utf-8"))
             assert [word for word in told if word != "other"] == [], path.name  # a condition, and an English word
     assert "viscosity_pa_s" not in page
+
+
+def test_each_estimate_on_the_first_page_stands_beside_its_figure(reported_levels: Path) -> None:
+    page = (reported_levels / "report.html").read_text(encoding="utf-8")
+    cards = re.findall(r'<article class="card.*?</article>', page, re.S)
+    assert len(cards) >= len(BLOCKS)
+    assert [card for card in cards if '<div class="shown">' not in card] == []

@@ -12,10 +12,11 @@ from scipy.stats import binom
 
 from study_app.analysis.data.blocks import Block, Decided, Item
 from study_app.analysis.evaluate import evaluate, evaluate_block
-from study_app.analysis.findings.delays import ContrastsWithControl, LowestDelay
+from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, Lowest, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
 from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, with_gates
+from study_app.analysis.page_layout import Drawing
 from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import Card, first_page
@@ -41,15 +42,20 @@ def of_liquids(answer: Said, people: int = 12, decided: Decided = DECIDED) -> Re
     return evaluate(study(liquids(3), list(everybody(liquids(3), people, answer)), decided))
 
 
-def rising(from_code: int, **decided: Any) -> Results:
-    """Return a study in which one statement rises and the other falls by 4 points from a setting (D1 …) on."""
+def rising_answer(from_code: int) -> Said:
+    """Return answers to one statement that rise, and to the other that fall, by 4 points from a setting (D1 …) on."""
     rng = np.random.default_rng(2)
 
     def answer(_person: int, _session: int, code: str, item: str) -> int:
         up = 4 * (int(code[1:]) >= from_code)
         return int(np.clip((2 + up if item == ITEMS[0] else 6 - up) + rng.integers(-1, 2), 1, 7))
 
-    return of_delays(answer, replace(DECIDED, **decided))
+    return answer
+
+
+def rising(from_code: int, **decided: Any) -> Results:
+    """Return the results of a study with these answers."""
+    return of_delays(rising_answer(from_code), replace(DECIDED, **decided))
 
 
 def ordered(people: int, **decided: Any) -> Results:
@@ -124,6 +130,29 @@ def test_what_is_answered(pytestconfig: pytest.Config) -> None:
         lines += [f"{one.question}, {one.claims}, {one.verdict}: {one.text}" for one in answers(results)]
     lines += page_lines(first_page(rising(3), ()))
     compare(GOLDEN / "first-page.txt", lines, pytestconfig)
+
+
+def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_the_threshold() -> None:
+    def with_surer_steps(number: int, lowest: Lowest) -> Lowest:
+        """Return the first two steps of one statement, and the first of the other, with a p that six digits keep."""
+        steps = [
+            replace(step, trend=replace(step.trend, p=1e-9)) if at < 2 - number else step
+            for at, step in enumerate(lowest.steps.steps)
+        ]
+        return replace(lowest, members=10**6, steps=replace(lowest.steps, steps=tuple(steps)))
+
+    made = study(delays(DELAYS), list(everybody(delays(DELAYS), 20, rising_answer(2))))
+    results = changed(evaluate(made), LowestDelay, with_surer_steps)
+    (block,) = results.blocks
+    lines = list(page_lines("".join(LowestDelay(block, results).section())))
+    at = next(at for at, line in enumerate(lines) if line.startswith("Statement | lowest | uncorrected | "))
+    assert [line.split(" | ")[:3] for line in lines[at + 1 : at + 3]] == [
+        ["Different", "≤ 100 ms", "≤ 50 ms"],
+        ["Harder", "≤ 150 ms", "≤ 50 ms"],
+    ]
+    picture = DetectionThreshold(block, results).figure(Drawing(made, made.blocks[0], block, results, "threshold", ()))
+    assert picture is not None
+    assert picture.caption.endswith("the shortest delay at which any statement shows a trend, 100 ms.")
 
 
 @pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])

@@ -1,6 +1,7 @@
 """The appendix of questions, and what changed between versions: from the receipts alone."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from markupsafe import escape
 from study_app.analysis.report.write_report import appendix, report
 from study_app.protocol.source.files import shipped_file
 from study_app.store import receipt
+from study_app.store.folders import StudyFolder
+from study_app.store.sites.merge import merge_sites
 from study_app.store.study_runs import RecordedContent, content_changes, recorded_contents
 from study_app.store.study_versions import save_study
 from study_app.store.workstation import DEFAULTS, save_settings
@@ -37,14 +40,22 @@ def results(tmp_path: Path) -> Path:
     return folder
 
 
-def test_the_first_session_of_each_version_and_who_saved_it_are_read_from_receipts(results: Path) -> None:
+def test_the_first_session_of_each_version_and_who_saved_it_are_read_from_receipts(
+    results: Path, tmp_path: Path
+) -> None:
     contents = recorded_contents(results)
 
     assert [(content.participant, content.saved_by) for content in contents] == [("P001", "BC"), ("P002", "AK")]
+    for content in contents:
+        held = receipt.read(StudyFolder(results).session(content.participant, 1).receipt)
+        assert (content.began, content.protocol) == (held["started_at"], held["protocol"])
     ((after, sentences),) = content_changes(contents)
     assert after.participant == "P002"
     assert len(sentences) == 1
     assert OLD in sentences[0]
+    shutil.rmtree(results / "data" / "sub-P001")  # sites must have the same version
+    merge_sites({"North": results}, tmp_path / "pooled")
+    assert recorded_contents(tmp_path / "pooled") == (replace(contents[1], participant="North-P002"),)
 
 
 def test_versions_are_listed_where_all_texts_are_in_one_language(results: Path) -> None:

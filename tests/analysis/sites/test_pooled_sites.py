@@ -2,21 +2,23 @@
 
 import shutil
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import pytest
 
-from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.data.study_tables import load_study, pool_sites
 from study_app.analysis.export_study import export
 from study_app.analysis.planning.preregistration import FILE, Commitment, commitment_lines, deviations
 from study_app.analysis.report.write_report import report
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.exclusions import exclude
+from study_app.store.exclusions import Exclusion, exclude
 from study_app.store.sites.merge import merge_sites
 from study_app.store.unblinding import unblind, unblind_folder
 from study_app.store.withdrawals import withdraw
 from tests.analysis.levels.level_studies import ADAPTIVE
+from tests.analysis.made_up import delays, everybody, study
 from tests.analysis.report.read_report import read
 from tests.protocol.trials.level_studies import text_of_damper
 from tests.studies import made_up
@@ -132,6 +134,48 @@ def test_answers_are_pooled_by_condition(opened: Path) -> None:
         assert block.codes == tuple(one.condition for one in first.settings)
     recorded = {code for site in "AB" for (_, code) in load_study(opened / "sites" / site).settings}
     assert not recorded & set(found.responses["code"])
+
+
+@pytest.mark.parametrize("is_revealed", [True, False])
+def test_each_row_of_a_site_is_in_the_pooled_tables_once(is_revealed: bool) -> None:
+    answers, settings = count(1), delays((0.0, 40.0, 90.0))
+    if not is_revealed:
+        settings = tuple(replace(setting, condition=None, delay_ms=None) for setting in settings)
+    sites = {}
+    for site in ("North", "South"):
+        own = study(settings, list(everybody(settings, 2, lambda *_: next(answers))))
+        row = Exclusion(
+            participant="P001", session=1, trial=next(answers), rule_or_person="AB", reason=site, excluded_at=""
+        )
+        sites[site] = replace(own, exclusions=(row,), late=(replace(row, trial=next(answers)),), doubts=(site,))
+    codes = {f"D{place}": f"delay_{place}" for place in (1, 2, 3)}
+
+    def pooled_code(site: str, code: str) -> str:
+        return codes[code] if is_revealed else f"{site}-{code}"
+
+    pooled = pool_sites(Path("pooled"), sites, ())
+    for name in ("responses", "answered", "trials"):
+        rows = getattr(pooled, name)
+        assert [*rows.index] == [*range(len(rows))], name
+        assert [*zip(rows["participant"], rows["code"], rows["trial"], strict=True)] == [
+            (f"{site}-{row.participant}", pooled_code(site, row.code), row.trial)
+            for site, own in sites.items()
+            for row in getattr(own, name).itertuples()
+        ]
+    assert [*pooled.responses["response"]] == [
+        *sites["North"].responses["response"],
+        *sites["South"].responses["response"],
+    ]
+    assert [*pooled.participants["participant"]] == [f"{site}-P{number:03d}" for site in sites for number in (0, 1)]
+    assert pooled.participants.index.is_unique
+    own_codes = [pooled_code(site, code) for site in sites for code in codes]
+    assert list(pooled.blocks[0].codes) == list(dict.fromkeys(own_codes))
+    assert {code for _, code in pooled.settings} == set(own_codes)
+    for name in ("exclusions", "late"):
+        assert getattr(pooled, name) == tuple(
+            replace(row, participant=f"{site}-P001") for site, own in sites.items() for row in getattr(own, name)
+        )
+    assert pooled.doubts == ("North", "South")
 
 
 def test_exclusions_and_withdrawals_of_a_site_are_those_of_the_merged_study(opened: Path, tmp_path: Path) -> None:

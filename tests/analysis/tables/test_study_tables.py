@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pandas as pd
@@ -14,6 +15,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from study_app.store.columns import RESPONSES
 from study_app.store.csv_files import table_problems
+from tests.analysis import made_up
 from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal
 
@@ -42,7 +44,9 @@ def test_what_a_block_compares_is_told_by_its_receipt_and_not_by_the_letter_of_i
         ("L1", "delays"),
     ]
     results.open()
-    assert [block.kind for block in load_study(results.folder).blocks] == ["liquids", "delays"]
+    found = load_study(results.folder)
+    assert [block.kind for block in found.blocks] == ["liquids", "delays"]
+    assert [found.blocks_of(block.kind) for block in found.blocks] == [(block,) for block in found.blocks]
 
 
 def test_receipts_of_earlier_versions_do_not_say_what_a_block_compares(rek: Results) -> None:
@@ -78,6 +82,15 @@ def test_sessions_that_were_not_completed_are_kept_and_do_not_count(rek: Results
     assert (study.n, study.people, study.left_out) == (1, ("P001",), 1)
     assert len(study.responses) == 62 + 27 - 0
     assert cell(study, "L1", "immersive")["n"] == 1
+
+
+@pytest.mark.parametrize("name", ["simulated", "pilot"])
+def test_one_simulated_or_pilot_session_makes_the_study_one(name: str) -> None:
+    settings = made_up.liquids(2)
+    found = made_up.study(settings, list(made_up.everybody(settings, 2, lambda *_: 4)))
+    participants = found.participants.assign(**{name: [False, True]})
+    assert getattr(replace(found, participants=participants), name)
+    assert not getattr(replace(found, participants=participants[:1]), name)
 
 
 def test_an_excluded_trial_takes_all_its_attempts_and_is_one_presentation(rek: Results) -> None:

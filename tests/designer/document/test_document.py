@@ -18,7 +18,16 @@ from study_app.designer.document.toml_edits import Insert, Set
 from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped
-from study_app.store.drafts import REST_S, Draft, Keeper, delete_draft, draft_of, drafted_files, write_draft
+from study_app.store.drafts import (
+    REST_S,
+    Draft,
+    Keeper,
+    delete_draft,
+    draft_of,
+    drafted_files,
+    unsaved_files,
+    write_draft,
+)
 from study_app.store.receipt import without_conditions
 from study_app.store.study_runs import Run, keep_run_content, runs_of_study
 from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save_study
@@ -98,7 +107,12 @@ def test_files_with_a_draft_are_listed(tmp_path: Path) -> None:
         write_draft(tmp_path / name, Draft(text="a = 1\n", base=""))
     (data_folder() / "drafts" / "broken.json").write_text("{", encoding="utf-8", newline="\n")
     assert drafted_files() == (tmp_path.resolve() / "a.toml", tmp_path.resolve() / "b.toml")
-    delete_draft(tmp_path / "a.toml")
+    (tmp_path / "within").mkdir()
+    write_draft(tmp_path / "within" / "c.toml", Draft(text="c = 3\n", base=""))
+    (tmp_path / "b.toml").write_text("b = 2\n", encoding="utf-8", newline="\n")
+    assert unsaved_files(tmp_path) == (tmp_path.resolve() / "a.toml",)
+    for name in ("a.toml", "within/c.toml"):
+        delete_draft(tmp_path / name)
     assert drafted_files() == (tmp_path.resolve() / "b.toml",)
 
 

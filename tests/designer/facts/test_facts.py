@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import outline, usage_text
+from study_app.designer.document.fields import all_references
 from study_app.designer.document.steps import RetypeFile, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Set, Unset
@@ -46,6 +47,17 @@ def test_what_is_the_only_one_is_used_where_its_name_is_left_out(name: str, path
 def test_liquids_are_used_as_conditions_where_a_study_has_none() -> None:
     document = {"liquids": {"water": {}, "oil": {}}, "blocks": {"one": {"conditions": ("water",)}}}
     assert [usage_text(document, ("liquids", name)) for name in ("water", "oil")] == ["used by 1 block", "not used"]
+
+
+@pytest.mark.parametrize("file", [*PROTOCOLS.glob("*.toml"), *FOLDER.glob("*.toml")], ids=lambda file: file.stem)
+def test_a_reference_names_its_target_or_is_left_out(file: pathlib.Path) -> None:
+    document = study_of(file).document
+    references = list(all_references(document))
+    assert len(set(references)) == len(references)
+    for place, target in references:
+        name = value_at(document, target)["id"] if isinstance(target[-1], int) else target[-1]
+        assert value_at(document, place) in (name, None), place
+        assert target not in (place[: len(target)], place[:2]), f"{place} names the element that it is in"
 
 
 @pytest.mark.parametrize("file", [*PROTOCOLS.glob("*.toml"), *FOLDER.glob("*.toml")], ids=lambda file: file.stem)

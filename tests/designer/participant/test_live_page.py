@@ -85,6 +85,16 @@ def test_keys_answer_the_page_and_go_on_and_esc_leaves_it(qtbot: Any, designer: 
     assert not designer.results.exists()
 
 
+def test_the_space_bar_presses_a_button_of_the_page(designer: Any, live: Any) -> None:
+    preview = designer.controller.preview
+    designer.go_to("pages", "welcome")
+    live.setFocus()
+    before = preview.view.step
+    QTest.keyClick(live, Qt.Key.Key_Space)
+    QApplication.processEvents()
+    assert preview.view.step != before
+
+
 def test_the_mouse_answers_the_scaled_page(designer: Any, live: Any, qtbot: Any) -> None:
     assert live.scale_now < 0.6
     qtbot.waitUntil(lambda: not ignores_clicks(live.page_window.widget))

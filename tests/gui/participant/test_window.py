@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt, QTimer
-from PySide6.QtGui import QAccessible, QImage
+from PySide6.QtGui import QAccessible, QColor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QPushButton, QWidget
 
 from study_app.gui.participant.window import LEAST_SIZE
+from study_app.gui.theme.theme import PARTICIPANT
 from study_app.gui.widgets.main_view import HOLD_MS, EscapeKey
 from study_app.protocol.wording.languages import words
 from study_app.session.pages import EndPage, FeedbackPage, Page, PausePage, TroublePage
@@ -54,6 +55,17 @@ def test_every_page_fills_the_window_names_itself_and_leaves_no_widget_behind(op
         assert told_of(opened.window).role() == QAccessible.Role.Window
         headings = [one for one in opened.page.findChildren(QLabel) if told_of(one).role() == QAccessible.Role.Heading]
         assert not headings or name_of(headings[0]) in opened.page.accessibleName()
+
+
+@pytest.mark.parametrize("is_right", [True, False])
+def test_feedback_names_the_answer_and_shows_a_green_sign_for_a_correct_one_alone(
+    opening: Opening, is_right: bool
+) -> None:
+    opened = opening(FeedbackPage(is_right), size=SMALL)
+    assert name_of(opened.page) == (words("en").right if is_right else words("en").not_right)
+    image = opened.page.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
+    colours = np.frombuffer(image.constBits(), np.uint32) & 0xFFFFFF
+    assert bool((colours == QColor(PARTICIPANT.ok).rgb() & 0xFFFFFF).any()) == is_right
 
 
 def test_the_window_stays_one_to_a_screen_reader_whatever_is_connected_to_it(opened: Participant) -> None:

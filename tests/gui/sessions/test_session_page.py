@@ -2,19 +2,28 @@
 
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from PySide6.QtWidgets import QWidget
 
 from study_app.gui.sessions.session_facts import sessions
-from study_app.gui.sessions.session_page import SessionPage, _judged_sentence, read_record
+from study_app.gui.sessions.session_page import (
+    SessionPage,
+    TrialRecord,
+    _judged_sentence,
+    _limits_sentence,
+    read_record,
+)
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal_events
+from study_app.store.journals.journal_events import UNDELIVERED
+from study_app.store.missing_trials import MissingTrials
 from study_app.store.unblinding import unblind
 from tests.golden import compare, each_once, what_comes
 from tests.golden_values import changed
@@ -130,6 +139,24 @@ def test_unblinding_keeps_the_validity_of_a_rehearsed_session_and_names_its_cond
     assert [trial.words for trial in after.trials] == [
         f"{trial.words}: {codes[trial.words.rpartition(' ')[2]]}" for trial in before.trials
     ]
+
+
+@pytest.mark.parametrize(
+    ("undelivered", "sentence"),
+    [
+        (0, ""),
+        (1, "1 presentation exceeded a limit and was not followed by a question. "),
+        (2, "2 presentations exceeded a limit and were not followed by a question. "),
+    ],
+)
+def test_presentations_beyond_a_limit_are_counted(undelivered: int, sentence: str) -> None:
+    trial = TrialRecord(
+        number=1, attempt=1, words="", outcome="complete", valid=True, broken=(), answers=1, unconfirmed=(), notes="",
+        lost="", excluded=None,
+    )  # fmt: skip
+    trials = [trial, *[replace(trial, outcome=UNDELIVERED)] * undelivered]
+    text = _limits_sentence(trials, MissingTrials(limits={}), sealed=False)
+    assert text == f"{sentence}The measured trial met the study's limits."
 
 
 def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblinding_already(tmp_path):

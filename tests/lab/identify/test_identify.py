@@ -160,7 +160,10 @@ def test_a_reversed_sign_is_noticed_and_the_explained_share_is_told():
     assert wrong.explained < 0.01
     left = f"{100 * right.share:.0f} % of the force instead of {100 * wrong.share:.0f} %"
     assert any(left in warning and "opposite sign" in warning for warning in wrong.warnings)
-    assert any("accelerate the body" in warning for warning in wrong.warnings)
+    weight_n = 30 * np.linalg.norm(force_n, axis=1).max() * np.array([0.6, -0.8, 0.0])
+    for sign in (1, -1):
+        found = fit(OIL, "oil", ["viscosity_pa_s"], REACH, sign * force_n + weight_n)
+        assert any("accelerate the body" in warning for warning in found.warnings) == (sign == -1)
 
 
 def test_values_that_do_not_follow_the_motion_are_no_force_on_the_body():

@@ -134,6 +134,23 @@ def test_the_error_of_the_force_sent_comes_out_again_and_another_is_named(
     assert all(it.endswith("the column delivered_error differs") for it in found)
 
 
+def test_each_computed_column_of_a_recording_is_compared(rehearsed: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read = recordings.read_samples
+    columns = (*recordings.ROUNDED_TO, "limiters", "status")
+
+    def changed_samples(path: Path, secret: bytes) -> Any:
+        samples = read(path, secret)
+        for row, name in enumerate(columns, start=1):
+            samples[name][-row] += 1
+        return samples
+
+    monkeypatch.setattr(recordings, "read_samples", changed_samples)
+    found = replay(session(rehearsed)).differences
+    names = ["force on the hand" if name == "device_force_n" else f"column {name}" for name in columns]
+    counts = {name: sum(f"the {name} differs in second" in it for it in found) for name in names}
+    assert counts == dict.fromkeys(names, 4)
+
+
 def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -15,9 +15,10 @@ from hypothesis import strategies as st
 from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.orders.schedule import stream
-from study_app.protocol.simulated import OBSERVER, Comparison
+from study_app.protocol.simulated import OBSERVER, Comparison, Observer
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
+from study_app.session.simulated.participant import AdjustingObserver
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features
 from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_out
 from study_app.session.tasks import TankView, TaskView
@@ -114,6 +115,20 @@ def test_senses_measure_force_speed_of_the_hand_roughness_and_delay() -> None:
     assert felt.delay_s == pytest.approx(0.105)
     for delays, vary, sensed in ((True, "delay_ms", 0.105), (False, "force_loss", 5.0), (False, "", 12.5)):
         assert Comparison(delays, False, OBSERVER, vary).sensed(felt) == pytest.approx(sensed)
+
+
+@pytest.mark.parametrize(
+    ("start", "steps"), [(-6, [4, 4, -1, -1, 0]), (7, [-4, -4, 1, 0]), (-1, [4, -1, -1, -1, 0]), (0, [0])]
+)
+def test_a_setting_begins_with_large_steps_and_ends_after_it_was_crossed_in_small_ones(
+    start: int, steps: list[int]
+) -> None:
+    observer = AdjustingObserver(Comparison(True, False, Observer(delay_jnd_s=0.0), "delay_ms"), lambda: 0.5)
+    level, made = start, list[int]()
+    while not made or made[-1]:
+        made.append(observer.steps(0.3 + 0.01 * level, 0.3))
+        level += made[-1]
+    assert made == steps
 
 
 @needs_servo

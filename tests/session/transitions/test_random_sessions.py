@@ -1,5 +1,6 @@
 """The transition table driven at random: no answer is lost, every trial is ended."""
 
+import copy
 from dataclasses import replace
 from typing import Any
 
@@ -9,8 +10,10 @@ from hypothesis import strategies as st
 
 from study_app.errors import SessionError
 from study_app.protocol.load import load, parse
-from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.model import Protocol
+from study_app.protocol.orders.schedule import Trial, build_schedule, draw_key, stream
 from study_app.protocol.tracks import design_of
+from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (
@@ -19,6 +22,7 @@ from study_app.session.transitions.events import (
     Chosen,
     Continue,
     EndRequested,
+    Event,
     FadeIn,
     Finish,
     ForceStopped,
@@ -44,7 +48,7 @@ from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, initial_state
 from tests.protocol.edited_studies import text_of
 from tests.session import small
-from tests.session.transitions.states import EVENTS, event_of
+from tests.session.transitions.states import EVENTS, event_of, state_in
 
 CHOICES = st.one_of(st.integers(1, 7), st.none())
 ANY_EVENT = st.one_of(
@@ -163,6 +167,39 @@ def pages_of_session(shown: Any, language: str) -> list[Any]:
             event = Submitted(at_s)
             if state.phase is not Phase.ANSWERING:
                 event = TimeUp(at_s) if state.phase in {Phase.RESTING, Phase.FEEDBACK} else event
+
+
+def test_each_trial_starts_with_its_task_and_delay_and_stays_for_the_longest_delay_of_its_block() -> None:
+    tables = copy.deepcopy(small.TABLES)
+    for name, delay_ms in (("is_thin", 53.0), ("is_thick", 29.0), ("on_time", 71.0)):
+        tables["conditions"][name]["delay_ms"] = delay_ms
+    study = Protocol.model_validate(tables)
+    codes = draw_key(study, stream(1, "key").random)
+    state, starts = initial_state(study, build_schedule(study, "P001", 1), codes, "en"), list[StartTrial]()
+    trials = {step.number: step for step in state.plan.schedule.steps if isinstance(step, Trial)}
+    while state.phase is not Phase.COMPLETE:
+        state, commands = advance(state, small.next_event(state, state.since_s))
+        starts += [command for command in commands if isinstance(command, StartTrial)]
+    assert [command.trial for command in starts] == sorted(trials)
+    for command in starts:
+        block = study.blocks[trials[command.trial].block]
+        condition = codes[block.id][trials[command.trial].code]
+        longest_ms = max(tables["conditions"][name]["delay_ms"] for name in block.conditions)
+        assert command.linger_s == pytest.approx(longest_ms / 1000 + 0.1)
+        assert replace(command, linger_s=0.0) == StartTrial(
+            trial=command.trial,
+            attempt=1,
+            task=study.tasks[block.task],
+            presented=Stimulated(condition),
+            delay_s=tables["conditions"][condition]["delay_ms"] / 1000,
+            linger_s=0.0,
+        )
+
+
+@pytest.mark.parametrize("event", [ItemShown(9.0, "lquid"), Chosen(9.0, "lquid", 3), Retracted(9.0, "lquid")])
+def test_an_unknown_item_is_named_with_the_items_of_the_page(event: Event) -> None:
+    with pytest.raises(SessionError, match="'lquid' is not on this page, which contains the items liquid, strong, sp"):
+        advance(state_in(Phase.ANSWERING), event)
 
 
 def plain(page: Any) -> Any:

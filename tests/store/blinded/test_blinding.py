@@ -135,9 +135,10 @@ def test_a_block_with_another_of_the_studys_methods_has_other_conditions(tmp_pat
 def test_lines_of_unblinding_that_cannot_be_read_are_numbered_from_1(tmp_path: Path) -> None:
     path = StudyFolder(tmp_path).reveals
     path.parent.mkdir(parents=True)
-    path.write_bytes(b'\nrubbish\n{"at": "2026-03')
-    assert unreadable_reveals(tmp_path) == ((2, False), (3, True)), "only the last may be of a power cut"
-    assert reveals(tmp_path) == ()
+    for last, is_torn in ((b'{"at": "2026-03', True), (b'{"at": "2026-03"}', False)):
+        path.write_bytes(b"\nrubbish\n" + last)
+        assert unreadable_reveals(tmp_path) == ((2, False), (3, is_torn)), "a power cut leaves half of the last line"
+        assert reveals(tmp_path) == ()
 
 
 def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, protocol: Protocol) -> None:

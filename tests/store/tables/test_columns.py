@@ -6,11 +6,12 @@ import pytest
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import KINDS
-from study_app.store.blinded.blinding import open_or_draw_key
-from study_app.store.columns import RESPONSES
+from study_app.store.blinded.blinding import open_or_draw_key, reveal
+from study_app.store.columns import PARTICIPANTS, RESPONSES, TRIALS_MISSING, every_column
+from study_app.store.csv_files import Row
 from study_app.store.folders import StudyFolder
 from study_app.store.tables.column_dictionary import dictionary_markdown
-from study_app.store.tables.study_files import check_study, write_description
+from study_app.store.tables.study_files import check_study, columns_of, description_bytes, write_description
 
 
 @pytest.mark.parametrize(
@@ -28,6 +29,18 @@ def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:
     assert line in dictionary_markdown().splitlines()
 
 
+@pytest.mark.parametrize(
+    ("title", "file", "meaning"),
+    [
+        ("Exclusions", "exclusions.csv", "one row per excluded session or trial"),
+        ("Frames", "recordings/trial-…_frames.parquet", "one row per frame shown"),
+        ("Journal", "journal.jsonl", "one line per event"),
+    ],
+)
+def test_a_heading_is_followed_by_file_and_meaning_of_a_row(title: str, file: str, meaning: str) -> None:
+    assert f"## {title}\n\n`{file}`: {meaning}\n\n" in dictionary_markdown()
+
+
 def test_the_column_of_kinds_names_every_kind_of_question() -> None:
     (kind,) = (column for column in RESPONSES if column.name == "kind")
     assert set(KINDS) == set(kind.description.rstrip(".").partition(": ")[2].split(", "))
@@ -42,6 +55,26 @@ def test_a_new_version_of_the_study_renews_it(tmp_path: Path, protocol: Protocol
     assert (content["version"], content["description"]) == ("1.1", "What liquids feel like.")
 
 
+def test_sealed_columns_are_described_once_tables_have_them(tmp_path: Path, protocol: Protocol) -> None:
+    sealed = {column.name for column in every_column() if column.sealed}
+
+    def described(folder: StudyFolder) -> set[str]:
+        write_description(folder, protocol.study.model_copy(update={"version": "1.1"}))
+        content = json.loads(folder.description.read_text(encoding="utf-8"))
+        assert content["version"] == "1.1"
+        return sealed & {variable["name"] for variable in content["variableMeasured"]}
+
+    folder = StudyFolder(tmp_path)
+    write_description(folder, protocol.study)
+    assert described(folder) == set()
+    folder.description.write_bytes(description_bytes(protocol.study, sealed=False))
+    assert described(folder) == sealed, "an earlier version of the program described them"
+    folder.description.unlink()
+    open_or_draw_key(folder.path, protocol)
+    reveal(folder.path, by="AB", reason="to analyse")
+    assert described(folder) == sealed
+
+
 @pytest.mark.parametrize("intervals", [False, True])
 def test_only_sessions_with_trials_of_intervals_can_be_incomplete(
     tmp_path: Path, protocol: Protocol, intervals: bool
@@ -51,6 +84,9 @@ def test_only_sessions_with_trials_of_intervals_can_be_incomplete(
     variables = json.loads(folder.description.read_text(encoding="utf-8"))["variableMeasured"]
     described = {variable["name"]: str(variable) for variable in variables}
     assert ("trials_missing" in described, "incomplete" in described["status"]) == (intervals, intervals)
+    rows: list[Row] = [{TRIALS_MISSING.name: 3}] if intervals else []
+    names = [column.name for column in columns_of(folder, rows)]
+    assert names == [*(column.name for column in PARTICIPANTS), *(["trials_missing"] if intervals else [])]
 
 
 def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Protocol) -> None:

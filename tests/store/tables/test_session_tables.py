@@ -47,7 +47,10 @@ def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str
     rows = SessionRows(script._lines).trials
     content = csv_bytes(TRIALS, rows)
     assert b",'-1 and more," in content
-    assert read_table(content, TRIALS) == rows
+    assert read_table(content, TRIALS) == read_table(content, TRIALS[::-1]) == rows
+    assert read_table(content, TRIALS[2:4]) == [
+        {column.name: row[column.name] for column in TRIALS[2:4]} for row in rows
+    ]
 
 
 def test_the_row_of_an_answer_says_what_was_chosen_and_when() -> None:

@@ -13,6 +13,7 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.store import receipt
 from study_app.store.blinded import blinding
+from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.output_files import write_files
@@ -60,6 +61,18 @@ def test_nothing_is_written_outside_of_the_folder_asked_for(tmp_path: Path, name
         write_files(to, {"fine.csv": b"", name: b"x"})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]
     assert [path.name for path in to.iterdir()] == ["linked"]
+
+
+@needs_links
+def test_a_study_is_used_through_a_link_to_its_folder(tmp_path: Path, finished: SessionStore) -> None:
+    study = tmp_path / "linked"
+    study.symlink_to(tmp_path / "study")
+    finished.folder.checksums.unlink()
+    rebuild_session(study / "data/sub-P007/ses-01")
+    assert verify_study(study).is_sound
+    exclude(study, "P007", 1, by="AB", reason="coughed")
+    assert unblind(study, "AB", "to analyse").left == ()
+    assert withdraw(study, "P007", by="AB", reason="asked").left == ()
 
 
 @pytest.mark.nightly
