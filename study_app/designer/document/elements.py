@@ -249,7 +249,7 @@ def usage_text(document: Mapping[str, Any], path: Path) -> str:
         return ""
     users = {
         (place[:4] if place[2:3] == (ITEMS,) else place[:2]) for place, used in all_references(document) if used == path
-    } - {path}
+    }
     counts = Counter(user[-2] for user in users)
     using = (
         counted(count, "step") if section == "sequence" else counted_elements(count, section)

@@ -118,24 +118,6 @@ def test_a_site_without_the_preregistration_of_another_is_named(sealed: Path, tm
     assert said(A=one) == ()
 
 
-def test_answers_are_pooled_by_condition(opened: Path) -> None:
-    found = load_study(opened)
-    assert found.revealed
-    for site in "AB":
-        own = load_study(opened / "sites" / site)
-        names = {pair: setting.condition for pair, setting in own.settings.items()}
-        mine = found.responses[found.responses["participant"].str.startswith(f"{site}-")]
-        assert [
-            (f"{site}-{one.participant}", one.block, names[one.block, one.code], one.item, one.response)
-            for one in own.responses.itertuples()
-        ] == [(one.participant, one.block, one.code, one.item, one.response) for one in mine.itertuples()]
-    for block, first in zip(found.blocks, load_study(opened / "sites/A").blocks, strict=True):
-        assert [one.condition for one in block.settings] == [one.condition for one in first.settings]
-        assert block.codes == tuple(one.condition for one in first.settings)
-    recorded = {code for site in "AB" for (_, code) in load_study(opened / "sites" / site).settings}
-    assert not recorded & set(found.responses["code"])
-
-
 @pytest.mark.parametrize("is_revealed", [True, False])
 def test_each_row_of_a_site_is_in_the_pooled_tables_once(is_revealed: bool) -> None:
     answers, settings = count(1), delays((0.0, 40.0, 90.0))
