@@ -133,10 +133,16 @@ class Source:
         for one, two in pairwise(arguments):
             if not isinstance(one, ast.Starred) and not isinstance(two, ast.Starred) and ast.dump(one) != ast.dump(two):
                 yield "argument", self._exchange(one, two)
+        for one, two in pairwise(keyword.value for keyword in getattr(node, "keywords", []) if keyword.arg):
+            if ast.dump(one) != ast.dump(two):
+                yield "keyword", self._exchange(one, two)
+        for condition in (test for loop in getattr(node, "generators", []) for test in loop.ifs):
+            yield "filter", ((*self.span(condition), b"True"),)
         elements = node.keys if isinstance(node, ast.Dict) else getattr(node, "elts", [])
         for one, two in pairwise(elements):
-            if isinstance(one, ast.Constant) and isinstance(two, ast.Constant) and one.value != two.value:
-                yield "column", self._exchange(one, two)
+            last = [part.elts[-1] if isinstance(part, ast.Tuple) and part.elts else part for part in (one, two)]
+            if all(isinstance(part, ast.Constant) for part in last) and ast.dump(last[0]) != ast.dump(last[1]):
+                yield "column", self._exchange(*last)
 
     def _between(self, left: ast.expr, right: ast.expr, operator: str) -> tuple[int, int, bytes]:
         begin, end = self.span(left)[1], self.span(right)[0]
