@@ -330,7 +330,8 @@ class ProblemsCard(Card):
     def show_problems(self, rows: tuple[ProblemRow, ...], element: object) -> None:
         """Show problems; ``element`` is selected. The list closes when the last problem is solved."""
         had, self.problems, self._element = bool(self.problems), rows, element
-        self.repairs = {row: sentences for row, sentences in self.repairs.items() if row in rows}
+        now = {row.identity: row for row in rows}
+        self.repairs = {now[row.identity]: sentences for row, sentences in self.repairs.items() if row.identity in now}
         self._show_lines(closes=had)
 
     def show_warnings(self, rows: tuple[ProblemRow, ...]) -> None:
@@ -344,6 +345,8 @@ class ProblemsCard(Card):
 
     def _show_lines(self, *, closes: bool = False) -> None:
         rows = self.rows
+        if self.at is not None:  # lines above may have moved it
+            self.at = next((row for row in rows if row.identity == self.at.identity), self.at)
         if closes and not rows and not self.under_pointer:
             self.hide()
         counts = ((len(self.problems), "problem"), (len(self._warnings), "warning"))

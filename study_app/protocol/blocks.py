@@ -174,8 +174,8 @@ class Block(Table):
                 instead = {
                     "repetitions": "set it in the method's table",
                     "questionnaire": "ask its questions in a form after the block",
-                }.get(name, "omit it")
-                raise invalid(f"cannot be used in a block with {what}: {instead}", name, kind="surplus")
+                }.get(name, "")
+                raise invalid(f"cannot be used in a block with {what}", name, instead, kind="surplus")
         if what == "a design" and (self.standard not in self.conditions or len(self.conditions) < 2):
             raise invalid("must be one of the block's conditions, and the block needs at least two", "standard")
         return self
@@ -188,11 +188,9 @@ class Block(Table):
             if self.part is None:
                 raise invalid("a main block needs a part (1, 2, …)", "part")
         elif self.compares is not None:
-            raise invalid(
-                f"a {self.phase} block does not compare conditions: omit this key", "compares", kind="surplus"
-            )
+            raise invalid(f"a {self.phase} block does not compare conditions", "compares", kind="surplus")
         elif self.code_prefix is not None:
-            raise invalid(f"a {self.phase} block is not blinded: omit code_prefix", "code_prefix", kind="surplus")
+            raise invalid(f"a {self.phase} block is not blinded", "code_prefix", kind="surplus")
         elif len(self.conditions) > 1 and self.design is None:
             count = len(self.conditions)
             raise invalid(
@@ -209,7 +207,7 @@ class Block(Table):
                 raise invalid(
                     f'requires order = "constrained", but order is "{self.order}"',
                     given[0],
-                    'write order = "constrained", or omit the key',
+                    'write order = "constrained"',
                     ("order", "constrained"),
                     "surplus",
                 )

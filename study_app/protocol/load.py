@@ -185,7 +185,7 @@ def _with_liquids_of_files(document: dict[str, Any]) -> tuple[dict[str, Any], li
     resolved: dict[str, Any] = dict(liquids)
     faults: list[Fault] = []
     for name in named:
-        table, alone = liquids[name], Fault((), "belongs in the liquid file", "specify only file", kind="surplus")
+        table, alone = liquids[name], Fault((), "belongs in the liquid file", kind="surplus")
         faults += [alone._replace(path=("liquids", name, key)) for key in table if key != "file"]
         try:
             resolved[name] = _liquid_of_file(table["file"], texts)

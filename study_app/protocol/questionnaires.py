@@ -83,7 +83,7 @@ class Questionnaire(Table):
 
     title: Localised | None = Field(default=None, description="Heading; default: the trial's name.")
     intro: Localised = Field(description="The question shown above the statements.")
-    scale: Id | None = Field(default=None, description="The scale for all statements; omit it if there are none.")
+    scale: Id | None = Field(default=None, description="The scale for all statements, if there are any.")
     item_order: Literal["fixed", "shuffled"] = Field(
         default="fixed", description="fixed: as written; shuffled: a new order for every trial."
     )
@@ -219,7 +219,7 @@ def _fill_in(
             whole["scale"] = scale_name(of, item["scale"])
         kind = item.get("kind", STATEMENT)
         if whole.get("kind", kind) != kind:
-            fault = f'must be "{kind}", as in {of}: omit it'
+            fault = f'must be "{kind}", as in {of}'
             faults.append(Fault((*place, *(path or ()), "kind"), fault, kind="surplus"))
             whole["kind"] = kind
         fields = KINDS[kind].model_fields

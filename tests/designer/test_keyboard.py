@@ -71,3 +71,16 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
     assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
         part.accessibleName() for part in focus_stops(form.inside) if part.isVisible() and part.isEnabled()
     ]
+
+
+def test_the_button_that_removes_a_key_is_reached_by_tab_and_pressed_by_space(designer: Any) -> None:
+    designer.open()
+    path = ("pages", "welcome", "button")
+    designer.go_to(*path[:2])
+    row = designer.form_row(*path)
+    assert row.row.is_removable
+    designer.place.parts.focus_header()
+    assert passed(designer, lambda part: part is row.remove)
+    designer.hit("Space")
+    assert path[2] not in designer.study.document["pages"]["welcome"]
+    assert designer.place.form.isAncestorOf(designer.keyboard), "the keyboard stays in the form"

@@ -55,7 +55,10 @@ def test_header_and_list_count_problems_and_warnings_after_each_step(designer: A
     for here_only in (True, False):
         problems.limit.buttons[here_only].click()
     assert [line.here for line in problems.lines] == marks, "also in lines that are made anew"
-    for _ in range(3):
+    (line,) = [line.row.line for line in problems.lines if line.here]
+    designer.editing.handle_request(RetypeFile(f"# a new line\n# and another\n{designer.study.text}"))
+    qtbot.waitUntil(lambda: [line + 2] == [shown.row.line for shown in problems.lines if shown.here])
+    for _ in range(4):
         designer.editing.undo()
     qtbot.waitUntil(lambda: header.words == sound)
     assert heading.text() == "No problems"

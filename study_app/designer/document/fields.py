@@ -20,7 +20,7 @@ from study_app.protocol.json_schema import schema
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.source.problems import rule_of, shown_value
+from study_app.protocol.source.problems import NO_BOUND, rule_of, shown_value
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 from study_app.protocol.trials.designs import KINDS as DESIGNS
 from study_app.protocol.trials.designs import Design, default_design
@@ -400,8 +400,6 @@ _OF_NUMBERS: Final = {
     "maximum": "at most {}",
     "exclusiveMaximum": "less than {}",
 }
-_NO_BOUND: Final = 1e6
-"""Numbers so large are limits of the computer, of which a form says nothing."""
 _HOLDS: Final = {
     "minimum": operator.ge, "exclusiveMinimum": operator.gt, "maximum": operator.le, "exclusiveMaximum": operator.lt,
 }  # fmt: skip
@@ -672,7 +670,7 @@ def _numbers_in(node: _Node) -> _Node:
 
 
 def _bound_texts(node: _Node, numbers: _Node) -> tuple[str, ...]:
-    stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < _NO_BOUND}
+    stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < NO_BOUND}
     phrases = [_OF_NUMBERS[key].format(shown_value(number)) for key, number in stated.items()]
     if "prefixItems" not in node:
         phrases += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]

@@ -183,7 +183,6 @@ class RowWidget(Themed, QWidget):
         self.words.setBuddy(self.field)
         removes = f"Remove {row.label} from the file"
         self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
-        self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # no Tab stop at each field
         self.remove.clicked.connect(self._ask_to_remove)
         room = self.remove.sizePolicy()
         room.setRetainSizeWhenHidden(True)

@@ -255,7 +255,7 @@ def _check_comparisons(parts: Draft) -> Iterator[Fault]:
             )
         elif block.compares is not None and varied not in ([], [block.compares]):
             message = f'is "{block.compares}", but its conditions differ in {compared(presented)}'
-            yield Fault(("blocks", name, "compares"), message, "correct it, or omit it")
+            yield Fault(("blocks", name, "compares"), message, kind="surplus")
 
 
 def _check_blocks(parts: Draft) -> Iterator[Fault]:

@@ -95,7 +95,7 @@ def _unknown_name(path: Path, name: Any, kind: str, known: Collection[str]) -> I
 def _repeated_names(listed: Sequence[tuple[Path, Any]]) -> Iterator[Fault]:
     for at, (path, name) in enumerate(listed):
         if name in [earlier for _, earlier in listed[:at]]:
-            yield Fault(path, f'"{name}" is listed twice', "remove one of them", kind="surplus")
+            yield Fault(path, f'"{name}" is listed twice', kind="surplus")
 
 
 def check_references(document: Document) -> Iterator[Fault]:
@@ -242,17 +242,17 @@ def check_groups(document: Mapping[str, Any]) -> Iterator[Fault]:
     tables = [table for _, table in entries(document, "groups.*") if isinstance(table, Mapping)]
     if not tables:
         if value_at(document, ASSIGNMENT) == "pre-existing":
-            yield Fault(ASSIGNMENT, "the study does not have groups", "add groups, or omit this key", kind="surplus")
+            yield Fault(ASSIGNMENT, "the study does not have groups", "add groups", kind="surplus")
         return
     if len(names(document, "groups")) == 1:
-        yield Fault(("groups",), "the study has only one group", "add another group, or omit groups")
+        yield Fault(("groups",), "the study has only one group", "add another group", kind="surplus")
     own = [any(key in table for key in OWN) for table in tables]
     for key in OWN:
         if key in document and all(own):
             yield Fault(
                 (key,),
                 f"is not used, because every group has its own {key} or {next(other for other in OWN if other != key)}",
-                f"remove {key} here, or omit it in at least one group",
+                kind="surplus",
             )
     used = {step for _, steps in sequences_in(document) for step in steps if isinstance(step, str)}
     for block in names(document, "blocks"):
@@ -277,7 +277,7 @@ def check_decisions(document: Document) -> Iterator[Fault]:
             yield Fault(path, f'"{name}" is also expected to decrease', "an item can be in only one of the two lists")
     for path, name in entries(document, "conditions.*.label"):
         if isinstance(name, str) and name not in named:
-            yield Fault(path, f'"{name}" is not among analysis.names', "add it there, or omit the label")
+            yield Fault(path, f'"{name}" is not among analysis.names', "add it there", kind="surplus")
 
 
 def check_questions(document: Document) -> Iterator[Fault]:

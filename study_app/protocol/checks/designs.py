@@ -103,12 +103,13 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
         if not correct and getattr(block, key) is not None:
             forced = design.has_correct_answer
             what = 'a forced choice with level = "value"' if forced else f'a design "{block.design}"'
-            yield Fault((*place, key), f"{what} does not have a correct answer", "omit the key")
+            yield Fault((*place, key), f"{what} does not have a correct answer", kind="surplus")
     if not correct and design.feedback not in {None, "never"}:
         yield Fault(
             ("designs", str(block.design), "feedback"),
             "its answers are neither correct nor incorrect, so feedback is not possible",
-            'omit the key (feedback = "never" is permitted)',
+            'write feedback = "never"',
+            kind="surplus",
         )
     if block.break_every is not None and not (order := order_of(protocol, block)).breaks:
         message = f"is {block.break_every}, but the block has only {order.trials} trials, so there would be no break"
@@ -148,9 +149,10 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
         )
     if design.first is not None and len(tracks_of(protocol, block)) > 1:
         yield Fault(
-            (*place, "design"),
-            "a modulus needs a single standard",
-            "omit it, or use a separate block for each standard",
+            ("designs", str(block.design), "modulus"),
+            f'needs a single standard, but block "{block.id}" has several',
+            "use a separate block for each standard",
+            kind="surplus",
         )
     yield from _check_levels(protocol, block)
 
@@ -159,19 +161,23 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
     """Check that a published value belongs to a block of levels, and its standard to the block."""
     of_levels = [block.id for block in protocol.blocks.values() if block.stimulus is not None]
     if published.block not in of_levels:
-        fault = unknown_name(
-            (*place, "block"), f'there is no block "{published.block}" with levels', published.block, of_levels
-        )
-        yield fault if of_levels else fault._replace(hint="omit it")
+        message = f'there is no block "{published.block}" with levels'
+        if of_levels:
+            yield unknown_name((*place, "block"), message, published.block, of_levels)
+        else:
+            yield Fault(place, message, kind="surplus")
         return
     standards = [
         standard for standard in standards_of(protocol, protocol.blocks[published.block]) if standard is not None
     ]
     if published.standard is not None and published.standard not in standards:
-        listed = (
-            f"choose one of these: {', '.join(f'{standard:g}' for standard in standards)}" if standards else "omit it"
+        listed = ", ".join(f"{standard:g}" for standard in standards)
+        yield Fault(
+            (*place, "standard"),
+            f"the block does not have the standard {published.standard:g}",
+            f"choose one of these: {listed}" if listed else "",
+            kind="surplus",
         )
-        yield Fault((*place, "standard"), f"the block does not have the standard {published.standard:g}", listed)
     ends = (
         published.value if published.low is None else published.low,
         published.value,
@@ -250,7 +256,7 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
             if not can_vary(stimulus.vary):
                 message = f"{stimulus.vary} is not a parameter of a liquid: it applies to the whole session"
                 hint = f"use a parameter of the liquid, or {', '.join(OF_CONDITION)}"
-                yield Fault((*place, "vary"), message, hint, kind="surplus")
+                yield Fault((*place, "vary"), message, hint)
 
 
 def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:

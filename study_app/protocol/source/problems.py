@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
@@ -49,15 +49,20 @@ class Fault(NamedTuple):
         return self.missing_language in ("", language) and not (self.kind == "one language" and language == first)
 
     def located(self, places: Places) -> Problem:
-        """Return the problem with its line; in the displayed place, entries count from 1."""
+        """Return the problem with its line; in the displayed place, entries count from 1.
+
+        What does not belong there is to be removed, which the designer offers as a repair.
+        """
         place = ".".join(str(step + 1) if isinstance(step, int) else step for step in self.path)
-        return Problem(place or "file", self.message, places.line(self.path), hint=self.hint)
+        hints = (self.hint, "remove it" if self.kind == "surplus" else "")
+        return Problem(place or "file", self.message, places.line(self.path), hint=", or ".join(filter(None, hints)))
 
 
 _PATTERNS = {
     r"^[a-z][a-z0-9_]*$": "lowercase letters, digits and underscores, starting with a letter",
     r"^[a-z0-9][a-z0-9_]*$": "lowercase letters, digits and underscores",
     r"^[a-z][a-z0-9]*$": "lowercase letters and digits (no underscores), starting with a letter",
+    r"^[A-Za-z][A-Za-z0-9_]*$": "letters, digits and underscores, starting with a letter",
     r"^[a-z]{2}$": "a language code of two lowercase letters, such as en",
     r"^[A-Z]$": "one capital letter",
     r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$": "tank, camera, or a file such as film.mp4",
@@ -83,6 +88,8 @@ _BOUNDS = {
     "less_than": ("lt", "less than"),
     "less_than_equal": ("le", "at most"),
 }
+NO_BOUND: Final = 1e6
+"""Numbers so large are limits of the computer, of which forms and messages say nothing."""
 _LENGTHS = {
     "too_short": "has too few entries ({actual_length}): it needs at least {min_length}",
     "too_long": "has too many entries ({actual_length}): it may have at most {max_length}",
@@ -103,7 +110,7 @@ def shown_value(value: Any) -> str:
 
 def rule_of(pattern: str) -> str:
     """Return the rule of a pattern as text."""
-    return _PATTERNS.get(pattern, f"text that matches {pattern}")
+    return _PATTERNS.get(pattern, "text of another form")
 
 
 def did_you_mean(word: str, permitted: Iterable[str]) -> str:
@@ -171,8 +178,11 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
     if kind in _BOUNDS:
         (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
+        reason = next(filter(None, hints), "")
+        if abs(bound) >= NO_BOUND:
+            return Fault(path, f"is {shown_value(value)}, which is too {'small' if bound < 0 else 'large'}", reason)
         sentence = f"is {shown_value(value)}, but must be {expected} {shown_value(bound)}"
-        return Fault(path, sentence, next(filter(None, hints), ""), use=(path, bound) if key in {"ge", "le"} else None)
+        return Fault(path, sentence, reason, use=(path, bound) if key in {"ge", "le"} else None)
     if kind in _KINDS:
         number: _FaultKind = "not a number" if "number" in _KINDS[kind] else ""
         return Fault(path, f"must be {_KINDS[kind]}, not {shown_value(value)}", kind=number)

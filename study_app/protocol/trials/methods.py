@@ -249,7 +249,7 @@ class Adjustment(Method):
     repetitions: Annotated[int, Field(ge=1, le=1000)] = Field(
         default=10, description="Number of adjustments in each track."
     )
-    step_size: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
+    step_size: Annotated[float, within(1e-6, 1e6, "a track needs steps of a usable size")] | None = Field(
         default=None,
         description=(
             "Step size: a factor if levels are spaced logarithmically, otherwise a difference; "
@@ -510,7 +510,7 @@ class UpDown(_Adaptive):
             "after 2, 3 or 4 consecutive correct answers."
         ),
     )
-    step_up: Annotated[float, within(1e-6, 1e6, "a step is at least 1e-6 and at most 1e6")] | None = Field(
+    step_up: Annotated[float, within(1e-6, 1e6, "a track needs steps of a usable size")] | None = Field(
         default=None,
         description=(
             "Step after an incorrect answer: a factor if levels are spaced logarithmically, otherwise a "
@@ -537,7 +537,7 @@ class UpDown(_Adaptive):
             yield (
                 "ratio",
                 f"{self.rule} with ratio {self.ratio:g} converges to {reached:.1f} % only if steps are small; "
-                f"omit ratio to converge to {published:.1f} % with steps of any size",
+                f"ratio = {RATIOS[successes]:g} converges to {published:.1f} % with steps of any size",
             )
         if self.tracks == 1:
             yield "tracks", "participants can predict the levels of a single up–down track: choose tracks = 2"

@@ -1,6 +1,7 @@
 """Repairs of faults, numbers that follow every edit, and levels as limits clip them."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -26,10 +27,11 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_level
+from study_app.protocol.source.document import places_of
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.warnings.expected_precision import ThresholdPlan, expected, threshold_plan
 from tests.designer.document.grown import PROTOCOLS
-from tests.protocol.edited_studies import FAULTY, Case
+from tests.protocol.edited_studies import FAULTY, FILES, Case, cases_of
 
 
 def study_of(name: str, *changes: tuple[str, str]) -> Study:
@@ -44,6 +46,18 @@ def study_of(name: str, *changes: tuple[str, str]) -> Study:
 def test_each_repair_of_the_known_faults_removes_its_fault() -> None:
     repaired = {case.name for case in FAULTY if _repaired(case)}
     assert len(repaired) >= 30, sorted(repaired)
+
+
+def test_what_does_not_belong_there_is_removed_by_a_repair_and_not_by_its_reader() -> None:
+    studies = [(case, read_study(case.text.encode())) for file in FILES for case in cases_of(file)]
+    surplus = [(study, fault, case) for case, study in studies for fault in study.faults if fault.kind == "surplus"]
+    assert len({fault.message for _, fault, _ in surplus}) > 15
+    for study, fault, case in surplus:
+        assert not re.search(r"\bomit|\bremove\b", f"{fault.message} {fault.hint}"), case.name
+        assert "Remove" in [repair.words for repair in repairs(study, fault)], (case.name, fault)
+        assert str(fault.located(places_of(study.text))).endswith("remove it)")
+    for case, study in studies:
+        assert not [fault for fault in study.faults if "omit" in f"{fault.message} {fault.hint}"], case.name
 
 
 def _repaired(case: Case) -> int:

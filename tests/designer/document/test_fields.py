@@ -12,7 +12,7 @@ from study_app.designer.document.study import Study, read_study
 from study_app.designer.form.form import form_of
 from study_app.protocol.json_schema import schema
 from study_app.protocol.source.document import Path
-from study_app.protocol.source.problems import Fault, shown_value
+from study_app.protocol.source.problems import Fault, rule_of, shown_value
 from tests.protocol.edited_studies import FAULTY, Case
 
 DEFS = schema()["$defs"]
@@ -81,6 +81,20 @@ def test_bounds_are_words_or_numbers_that_a_person_can_reach() -> None:
     bounds = {bound for row in every_row({}) for bound in row.bounds}
     assert "at most 8" in bounds
     assert not {bound for bound in bounds if "^" in bound or "e+" in bound}
+
+
+def patterns_in(node: Any) -> Iterator[str]:
+    """Yield the patterns of texts in a JSON Schema."""
+    if isinstance(node, dict) and isinstance(node.get("pattern"), str):
+        yield node["pattern"]
+    for part in node.values() if isinstance(node, dict) else node if isinstance(node, list) else ():
+        yield from patterns_in(part)
+
+
+def test_every_pattern_of_the_models_is_told_in_words() -> None:
+    patterns = {*patterns_in(schema())}
+    assert len(patterns) >= 7
+    assert [pattern for pattern in patterns if rule_of(pattern) == rule_of("^$") or "^" in rule_of(pattern)] == []
 
 
 def test_every_value_that_can_be_chosen_has_its_sentence() -> None:

@@ -100,7 +100,8 @@ def test_a_block_with_a_design_does_not_offer_a_questionnaire_after_each_trial(s
     wrong = after(study, SetValue(DESIGN, "abx"), SetValue((*DESIGN[:2], "questionnaire"), "after"))
     (fault,) = wrong.faults
     assert fault.kind == "surplus"
-    assert fault.message == "cannot be used in a block with a design: ask its questions in a form after the block"
+    assert fault.message == "cannot be used in a block with a design"
+    assert fault.hint == "ask its questions in a form after the block"
 
 
 def test_a_design_that_is_added_and_removed_again_leaves_no_problem(study: Study) -> None:
