@@ -62,11 +62,13 @@ def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
             _read(order.folder, send, stop)
         case LeaveOut():
             place = locate_participant(order.folder, order.participant)
-            if isinstance(order, TakeBack) and order.rule:
-                keep(*place, order.session, rule=order.rule, by=order.by, reason=order.reason)
+            who_and_why = {"by": order.by, "reason": order.reason}
+            if not isinstance(order, TakeBack):
+                exclude(*place, order.session, trial=order.trial, rule=order.rule, **who_and_why)
+            elif order.rule:
+                keep(*place, order.session, rule=order.rule, **who_and_why)
             else:
-                change = include if isinstance(order, TakeBack) else exclude
-                change(*place, order.session, trial=order.trial, by=order.by, reason=order.reason)
+                include(*place, order.session, trial=order.trial, **who_and_why)
         case OpenKey():
             opened = unblind_folder(order.folder, by=order.by, reason=order.reason)
             return Done(warnings=tuple(line for site in opened.values() for line in site.left))

@@ -28,7 +28,7 @@ class ReadStudy:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LeaveOut:
-    """Exclude a session or a trial (see ``store.exclusions.exclude``)."""
+    """Exclude a session or a trial, or a session that meets a ``rule`` (see ``store.exclusions.exclude``)."""
 
     folder: Path
     participant: str
@@ -36,13 +36,12 @@ class LeaveOut:
     trial: int | None
     by: str
     reason: str
+    rule: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class TakeBack(LeaveOut):
     """Reverse the exclusion of a session or a trial, or keep a session that meets a ``rule``."""
-
-    rule: str = ""
 
 
 @dataclass(frozen=True, slots=True)

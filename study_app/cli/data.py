@@ -159,15 +159,16 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=click.IntRange(1), help="Exclude only this trial; default: the whole session.")
+@click.option("--rule", metavar="RULE", default="", help="The exclusion rule that the session meets.")
 @BY
 @REASON
-def exclude(results: Path, participant: str, session: int, trial: int | None, by: str, reason: str) -> None:
+def exclude(results: Path, participant: str, session: int, trial: int | None, rule: str, by: str, reason: str) -> None:
     """Exclude a session or a trial from the analysis, with a reason; nothing is deleted."""
     from study_app.store.exclusions import describe_exclusion
     from study_app.store.exclusions import exclude as exclude_from
     from study_app.store.merged import locate_participant
 
-    new = exclude_from(*locate_participant(results, participant), session, trial=trial, by=by, reason=reason)
+    new = exclude_from(*locate_participant(results, participant), session, trial=trial, by=by, reason=reason, rule=rule)
     click.echo(describe_exclusion(replace(new, participant=participant)))
     _warn_if_opened(results)
 

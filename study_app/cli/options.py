@@ -52,9 +52,7 @@ _LONGEST: Final = 150
 Command = TypeVar("Command", bound=Callable[..., Any])
 FILE = click.argument("protocol", metavar="FILE")
 SCENE_FILE = click.argument("scene", metavar="FILE")
-BY = click.option(
-    "--by", required=True, metavar="NAME", help="Name or initials of the person responsible, or the rule applied."
-)
+BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person responsible.")
 PARTICIPANT = click.option("--participant", required=True, metavar="ID", help="ID of the participant, such as P007.")
 SESSION = click.option("--session", type=click.IntRange(1, 99), default=1, show_default=True, help="Session number.")
 REASON = click.option("--reason", required=True, metavar="TEXT", help="Reason, which is recorded with the time.")

@@ -56,11 +56,13 @@ class Exclusion:
 
 @dataclass(frozen=True, slots=True)
 class Reversal:
-    """A reversed exclusion, with the time of its reversal and whether the key was open (None: not recorded)."""
+    """A reversed exclusion: when, by whom and why, and whether the key was open (None: not recorded)."""
 
     exclusion: Exclusion
     at: str
     key_open: bool | None
+    by: str = ""
+    reason: str = ""
 
 
 def exclude(
@@ -71,6 +73,7 @@ def exclude(
     trial: int | None = None,
     by: str,
     reason: str,
+    rule: str = "",
     now: datetime | None = None,
 ) -> Exclusion:
     """Exclude a session of the study in ``folder``, or one of its trials, from the analysis.
@@ -86,19 +89,25 @@ def exclude(
     trial : int, optional
         The trial's number; by default the whole session is excluded.
     by : str
-        The rule, or the initials of the person.
+        The initials of the person, or the rule that the program applies.
     reason : str
         The reason.
+    rule : str, optional
+        The planned rule that the session meets; the reason then also names the person who decided.
     now : datetime, optional
         Wall time with its zone; by default the system's.
 
     Raises
     ------
     StoreError
-        There is no such session or trial, it is excluded already, ``by`` or ``reason`` is empty, or the list cannot be
-        read or written.
+        There is no such session, trial or rule, ``by`` is a planned rule, it is excluded already, ``by`` or ``reason``
+        is empty, or the list cannot be read or written.
     """
     by, reason = check_name_and_reason(by, reason, "an exclusion requires a rule or name, and a reason")
+    if by in RULES:
+        raise StoreError(f"{by} is an exclusion rule: specify it as the rule, and the name of the person who decides")
+    if rule:
+        by, reason = _decided_by_person(rule, by, reason)
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, trial)
     at = (now if now is not None else datetime.now().astimezone()).isoformat(timespec="milliseconds")
@@ -185,14 +194,13 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
         There is no such session, it is excluded, this was decided already, ``by`` or ``reason`` is empty, or the record
         cannot be read or written.
     """
-    if rule not in RULES:
-        raise StoreError(f"there is no exclusion rule {rule!r} ({did_you_mean(rule, RULES)})")
     by, reason = check_name_and_reason(by, reason, "keeping a session requires a name and a reason")
+    rule, decided = _decided_by_person(rule, by, reason)
     study = StudyFolder(folder)
     _check_recorded(study, participant, session, None)
     at = datetime.now().astimezone().isoformat(timespec="milliseconds")
     kept = Exclusion(
-        participant=participant, session=session, trial=None, rule_or_person=rule, reason=reason, excluded_at=at
+        participant=participant, session=session, trial=None, rule_or_person=rule, reason=decided, excluded_at=at
     )
     with lock_folder(folder):
         if kept.what in {row.what for row in exclusions(folder)}:
@@ -203,6 +211,13 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
         record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": kept.fields()}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")
     return kept
+
+
+def _decided_by_person(rule: str, by: str, reason: str) -> tuple[str, str]:
+    """Return a planned rule, and the reason for a decision about it with the person who decided."""
+    if rule not in RULES:
+        raise StoreError(f"there is no exclusion rule {rule!r} ({did_you_mean(rule, RULES)})")
+    return rule, f"{reason} (decided by {by})"
 
 
 def exclusions(folder: Path) -> tuple[Exclusion, ...]:
@@ -257,7 +272,8 @@ def _parse_reversal(path: Path, number: int, line: bytes) -> Reversal:
             and isinstance(taken.key_open, bool | None)
         ):
             key_open = record.get("key_open")
-            return Reversal(taken, str(record.get("at", "")), key_open if isinstance(key_open, bool) else None)
+            about = {name: str(record.get(name, "")) for name in ("at", "by", "reason")}
+            return Reversal(taken, key_open=key_open if isinstance(key_open, bool) else None, **about)
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: remove it, or restore it from a back-up")
 
 

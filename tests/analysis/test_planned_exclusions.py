@@ -119,18 +119,20 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     assert keep(pairs, "P002", 1, rule="fast_answers", by="AB", reason="practised").rule_or_person == "fast_answers"
     study = load_study(pairs)
     (found,) = proposals(study, evaluate(study, recordings=False))
-    assert (found.decision, found.by.partition(": ")[2]) == ("kept", "left-handed")
+    assert (found.decision, found.by.partition(": ")[2]) == ("kept", "left-handed (decided by AB)")
     assert thresholds(study) == [None, "P001", "P002"]
     report(pairs, tmp_path / "kept")
     assert "no decision has been made yet" not in (tmp_path / "kept" / "report.html").read_text("utf-8")
 
-    exclude(pairs, "P002", 1, by="below_chance", reason="keys exchanged")
+    with pytest.raises(StoreError, match="specify it as the rule, and the name of the person who decides"):
+        exclude(pairs, "P002", 1, by="below_chance", reason="keys exchanged")
+    exclude(pairs, "P002", 1, rule="below_chance", by="CD", reason="keys exchanged")
     with pytest.raises(StoreError, match="is excluded: include it without --rule"):
         keep(pairs, "P002", 1, rule="constant_answers", by="AB", reason="left-handed")
     study = load_study(pairs)
     planned = planned_exclusions(study, evaluate(study, recordings=False))
     assert planned is not None
-    assert [(one.decision, one.why) for one in planned.proposals] == [("excluded", "keys exchanged")]
+    assert [(one.decision, one.why) for one in planned.proposals] == [("excluded", "keys exchanged (decided by CD)")]
     assert [len(one.people) for one in (planned.included, planned.left_out)] == [2, 1]
 
 

@@ -60,14 +60,19 @@ def appendix(contents: Sequence[RecordedContent]) -> Iterator[str]:
 
 
 def _texts(protocol: Mapping[str, Any]) -> Iterator[_Text]:
-    """Yield the introduction and questions of each questionnaire, and the labels of each scale."""
+    """Yield the texts of each questionnaire and question, with options and ends, and the labels of each scale."""
     only = str(protocol["study"]["languages"][0])
     for name, questionnaire in protocol["questionnaires"].items():
         yield from _translations(name, questionnaire.get("intro"), only)
         for item in questionnaire["items"]:
-            yield from _translations(f"{name}.{item['id']}", item.get("text"), only)
+            place = f"{name}.{item['id']}"
+            for key in ("text", "low", "high", "unit"):
+                yield from _translations(place if key == "text" else f"{place}, {key}", item.get(key), only)
+            for option in item.get("options", ()):
+                yield from _translations(f"{place}, option {option['id']}", option["text"], only)
     for name, scale in protocol.get("scales", {}).items():
         yield from _translations(f"scale {name}", scale["labels"], only)
+        yield from _translations(f"scale {name}, cannot judge", scale.get("cannot_judge"), only)
 
 
 def _translations(name: str, text: Any, only: str) -> Iterable[_Text]:

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
 import pandas as pd
@@ -46,9 +47,11 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
+from study_app.protocol.model import RULES
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
-from study_app.store.exclusions import describe_exclusion
+from study_app.store.exclusions import dated_reversals, describe_exclusion
+from study_app.store.merged import folders_of
 from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_reason
 from study_app.store.study_runs import recorded_contents
 
@@ -393,6 +396,19 @@ def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
     yield from (paragraph(source, "soft") for source in dict.fromkeys(score.source for score in scores) if source)
 
 
+def _reversed_exclusions(study: Study) -> Iterator[str]:
+    """Yield each exclusion that a person reversed; sessions that were kept from the start stand with the rules."""
+    for prefix, place in folders_of(study.folder).items():
+        for reversal in dated_reversals(place):
+            exclusion = replace(reversal.exclusion, participant=f"{prefix}{reversal.exclusion.participant}")
+            if exclusion.rule_or_person not in RULES or exclusion.excluded_at != reversal.at:
+                yield (
+                    f"{describe_exclusion(exclusion)}: excluded ({exclusion.rule_or_person}, "
+                    f"{exclusion.excluded_at[:10]}: {exclusion.reason}), included again ({reversal.by}, "
+                    f"{reversal.at[:10]}: {reversal.reason})"
+                )
+
+
 _UNITS: Final = {"s": "s", "m": "m", "mm": "mm", "n": "N", "percent": "%"}
 _SHOWN: Final = 20
 """So many exclusions and doubts are listed; all of them stand in report.json."""
@@ -429,6 +445,9 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         were = "was" if study.left_out == 1 else "were"
         gone.append(f"{counted(study.left_out, 'session')} {were} not completed and therefore not analysed")
     yield bullets(_first(gone)) if gone else paragraph("There are no exclusions.")
+    if reversed_ones := [*_reversed_exclusions(study)]:
+        yield heading(3, "Exclusions that were reversed")
+        yield bullets(_first(reversed_ones))
     yield from _missing(study)
     if study.doubts:
         yield heading(3, "Files that have changed since recording")

@@ -160,20 +160,20 @@ class LeaveOutDialog(Question):
             parent,
             theme,
             "Exclude from the analysis",
-            "The chosen session or trial is excluded from measures, figures and tests. No data are deleted: "
-            "exclusions.csv and every report state what was excluded, who excluded it and why.",
+            f"{_rule_sentence(proposed)}The chosen session or trial is excluded from measures, figures and tests. No "
+            "data are deleted: exclusions.csv and every report state what was excluded, who excluded it and why.",
             ActionButton("minus", "Exclude", role="primary"),
             fields=(
                 choice_field(
                     "session", "Session", {(facts.participant, facts.session): facts.name for facts in sessions}
                 ),
                 choice_field("trial", "Scope", {}),
-                *_decision_fields("By", "Your initials, or the rule's name", "fell asleep"),
+                *_decision_fields("By", "Your name or initials, such as AK", "fell asleep"),
             ),
             needs=_NEEDS,
             width=QUESTION_PX,
         )
-        self._trials = trials
+        self._trials, self._proposed = trials, proposed
         if chosen is not None:
             self.editors["session"].show_value((chosen.participant, chosen.session))
         self.editors["session"].edited.connect(self._show_trials)
@@ -181,7 +181,6 @@ class LeaveOutDialog(Question):
         if proposed is not None:
             self.editors["session"].show_value((proposed.participant, proposed.session))
             self._show_trials()
-            self.editors["by"].show_value(proposed.rule_or_person)
             self.editors["reason"].show_value(proposed.reason)
 
     def _show_trials(self) -> None:
@@ -194,6 +193,18 @@ class LeaveOutDialog(Question):
     def chosen(self) -> tuple[str, int, int | None]:
         """Participant, session and trial; None for the whole session."""
         return *self.value("session"), self.value("trial")
+
+    @property
+    def rule(self) -> str:
+        """The rule that proposed the chosen session; "" for a person's own decision."""
+        proposed = self._proposed
+        return "" if proposed is None or self.chosen != proposed.what else proposed.rule_or_person
+
+
+def _rule_sentence(proposed: Exclusion | None) -> str:
+    if proposed is None:
+        return ""
+    return f"{exclusion_text(proposed)} meets the rule “{proposed.rule_or_person.replace('_', ' ')}”. "
 
 
 COLUMNS = (
@@ -598,8 +609,8 @@ class ResultsPlace(Place):
 
         def leave_out() -> None:
             participant, session, trial = dialog.chosen
-            by, reason = dialog.value("by"), dialog.value("reason")
-            decide(participant=participant, session=session, trial=trial, by=by, reason=reason)
+            who_and_why = {"by": dialog.value("by"), "reason": dialog.value("reason"), "rule": dialog.rule}
+            decide(participant=participant, session=session, trial=trial, **who_and_why)
 
         dialog.accepted.connect(leave_out)
         self._open_dialog(dialog)

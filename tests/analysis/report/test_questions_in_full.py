@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from markupsafe import escape
 
+from study_app.analysis.report.questions_in_full import changed_questions
 from study_app.analysis.report.write_report import appendix, report
 from study_app.protocol.source.files import shipped_file
 from study_app.store import receipt
@@ -65,6 +66,31 @@ def test_versions_are_listed_where_all_texts_are_in_one_language(results: Path) 
 
     page = "".join(appendix([*map(english, recorded_contents(results))]))
     assert (">versions<" in page, ">language<" in page) == (True, False)
+
+
+def test_options_ends_and_labels_are_among_the_texts_and_their_rewording_is_a_caveat(results: Path) -> None:
+    (content, *_) = recorded_contents(results)
+    item = {
+        "id": "tired", "text": "How tired?", "low": "Not at all", "high": "Extremely",
+        "options": [{"id": "left", "text": {"en": "Left", "nl": "Links"}}],
+    }  # fmt: skip
+    scales = {"agree": {"labels": ["No", "Yes"], "cannot_judge": "I cannot say"}}
+    texts = (*(item[key] for key in ("low", "high")), "Left", "Links", "No · Yes", "I cannot say")
+
+    def reworded(old: str, new: str) -> RecordedContent:
+        protocol = {**content.protocol, "questionnaires": {"about": {"items": [item]}}, "scales": scales}
+        return replace(content, protocol=json.loads(json.dumps(protocol).replace(old, new)))
+
+    page = "".join(appendix([reworded("", "")]))
+    assert [text for text in texts if text not in page] == []
+    for old, place in (
+        ("Extremely", "about.tired, high"),
+        ("Links", "about.tired, option left"),
+        ("I cannot say", "scale agree, cannot judge"),
+        ("Yes", "scale agree"),
+    ):
+        (caveat,) = changed_questions([reworded("", ""), reworded(old, "Otherwise")])
+        assert caveat.startswith(f"The wording of {place} changed in version 1.0 (first session: P001"), caveat
 
 
 @pytest.mark.usefixtures("figures_of_the_page")

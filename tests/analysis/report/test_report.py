@@ -4,13 +4,17 @@ import csv
 import random
 import re
 import shutil
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.evaluate import evaluate
+from study_app.analysis.report.sections import conduct
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
+from study_app.store.exclusions import exclude, include, keep
 from tests.analysis.conftest import HIDDEN, Results, twelve
 from tests.analysis.report.read_report import answered_by_two, numbers, read, run_in_r
 
@@ -88,6 +92,24 @@ def test_the_exclusions_and_what_was_not_completed_are_listed(rek: Results, tmp_
     assert "participant P002, session 1, trial 2: the phone rang" in told
     assert "1 session was not completed and therefore not analysed" in told
     assert numbers(tmp_path / "report")["study"]["participants"] == 5
+
+
+def test_an_exclusion_that_was_reversed_is_told_with_both_persons_and_reasons(small: Results) -> None:
+    answered_by_two(small)
+    at = datetime(2026, 3, 2, 9, tzinfo=UTC)
+    for participant, by in (("P001", "DL"), ("P002", "EM")):
+        exclude(small.folder, participant, 1, by=by, reason=f"{participant} spoke", now=at)
+    include(small.folder, "P001", 1, by="AK", reason="only once", now=at + timedelta(days=3))
+    keep(small.folder, "P001", 1, rule="fast_answers", by="AK", reason="practised")
+    study = load_study(small.folder)
+    page = "".join(conduct(study, evaluate(study, recordings=False)))
+    exclusions, _, reversed_ones = page.partition("Exclusions that were reversed")
+    assert "participant P002, session 1: P002 spoke (EM, 2026-03-02" in exclusions
+    assert (
+        "participant P001, session 1: excluded (DL, 2026-03-02: P001 spoke), included again (AK, 2026-03-05: only once)"
+        in reversed_ones
+    )
+    assert "practised" not in page, "it was never excluded"
 
 
 def test_what_progress_raises_ends_the_report_at_every_step_and_nothing_is_written(

@@ -179,9 +179,15 @@ def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
     assert "Proposed by the rule “below chance”; not yet decided" in place.exclusions.lines[0].accessibleName()
     click(qtbot, out)
     assert [place.dialog.value(name) for name in ("session", "trial", "by", "reason")] == [
-        ("P003", 1), None, "below_chance", "0 of 40"
+        ("P003", 1), None, "", "0 of 40"
     ]  # fmt: skip
-    place.dialog.reject()
+    assert any("P003 meets the rule “below chance”. " in one.text() for one in place.dialog.findChildren(QLabel))
+    place.dialog.editors["by"].show_value("AB")
+    click(qtbot, place.dialog.go_on)
+    assert place.reader.orders[-1] == LeaveOut(
+        folder=place.view.chosen, participant="P003", session=1, trial=None, by="AB", reason="0 of 40",
+        rule="below_chance",
+    )  # fmt: skip
     click(qtbot, keep)
     assert decided(qtbot, place, "CD", "left-handed") == TakeBack(
         folder=place.view.chosen, participant="P003", session=1, trial=None, by="CD", reason="left-handed",
