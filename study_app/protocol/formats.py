@@ -9,7 +9,7 @@ from typing import Any, Final
 from study_app.protocol.model import FORMAT
 from study_app.protocol.source.document import entries, names
 from study_app.protocol.source.problems import Fault
-from study_app.protocol.wording.languages import LANGUAGES, words
+from study_app.protocol.wording.languages import words_or_english
 
 _LEVEL_LIMITS: Final = {
     "level_error_percent": 2,
@@ -97,9 +97,7 @@ def _with_defaults(table: Any, **defaults: Any) -> Any:
 
 
 def _languages(document: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(
-        name for _, name in entries(document, "study.languages.*") if isinstance(name, str) and name in LANGUAGES
-    ) or ("en",)
+    return tuple(name for _, name in entries(document, "study.languages.*") if isinstance(name, str)) or ("en",)
 
 
 def _with_density(liquid: Any) -> Any:
@@ -123,7 +121,7 @@ def _with_numbers(blocks: Mapping[str, Any], tasks: tuple[str, ...], languages: 
             continue
         defaults: dict[str, Any] = {
             "title": name.replace("_", " ").capitalize(),
-            "setting_label": {language: words(language).trial for language in languages},
+            "setting_label": {language: words_or_english(language).trial for language in languages},
         }
         if len(tasks) == 1:
             defaults["task"] = tasks[0]

@@ -14,7 +14,7 @@ from contextlib import suppress
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import study_app
 from study_app.discovery import registry
@@ -44,6 +44,10 @@ FIELDS = (
 )  # fmt: skip
 
 
+ANSWER: Final = "/answer"
+"""The end of the name of a block's design question, which no questionnaire of a study can have."""
+
+
 def without_conditions(protocol: Protocol) -> dict[str, Any]:
     """Return the protocol as a JSON value without blinded parts; blocks contain their codes and compared attributes."""
     shown = protocol.model_dump(
@@ -62,7 +66,7 @@ def without_conditions(protocol: Protocol) -> dict[str, Any]:
         table["compares"] = protocol.compared_in(name)
         if block.design is not None:
             ordered = order_of(protocol, block)
-            asks = f"{name}/answer"  # a name that no questionnaire of a study can have
+            asks = f"{name}{ANSWER}"
             table |= {"order": ordered.order, "slots": list(ordered.slots), "questionnaire": asks}
             shown["questionnaires"][asks] = protocol.design_questions[name].model_dump(mode="json")
     return shown

@@ -17,7 +17,7 @@ from study_app.haptics.model.ranges import within
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import POSITIVE, Choice, Number, Option, Question, Rating
 from study_app.protocol.table import Id, Localised, Table
-from study_app.protocol.wording.languages import words
+from study_app.protocol.wording.languages import words_or_english
 from study_app.psychophysics import detection
 from study_app.psychophysics.detection import Sensitivity
 
@@ -360,13 +360,13 @@ def default_design(kind: str) -> Design:
 def question_of(design: Design, languages: Sequence[str]) -> Questionnaire:
     """Return the question of a design, with the program's own text if it has none."""
     text: Localised = design.question or {
-        language: words(language).design_questions[design.wording] for language in languages
+        language: words_or_english(language).design_questions[design.wording] for language in languages
     }
     return Questionnaire(intro=text, items=(_item(design, text, languages),))
 
 
 def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question:
-    short: Localised = {language: words(language).design_short for language in languages}
+    short: Localised = {language: words_or_english(language).design_short for language in languages}
     if design.item is not None:
         short = design.item.replace("_", " ").capitalize()
     about = {"id": design.name, "text": text, "short": short}
@@ -377,7 +377,7 @@ def _item(design: Design, text: Localised, languages: Sequence[str]) -> Question
     if design.reply == "setting":
         return Number(**about, whole=True, unit="steps")
     named = {
-        answer: {language: words(language).design_answers[answer] for language in languages}
+        answer: {language: words_or_english(language).design_answers[answer] for language in languages}
         for answer in design.answers
     }
     return Choice(**about, options=tuple(Option(id=answer, text=said) for answer, said in named.items()))

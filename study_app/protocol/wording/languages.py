@@ -17,7 +17,7 @@ from study_app.errors import StudyError
 from study_app.number_text import exact_text, readings_of
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.files import without_byte_order_mark
-from study_app.protocol.source.problems import Fault, did_you_mean
+from study_app.protocol.source.problems import Fault
 from study_app.workspace import workspace
 
 RIGHT_TO_LEFT = frozenset({"ar", "dv", "fa", "he", "ks", "ps", "sd", "ug", "ur", "yi"})
@@ -97,6 +97,8 @@ def read_language(file: File) -> Words:
     """
     try:
         table = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode("utf-8"))
+    except UnicodeDecodeError as error:
+        raise StudyError(f"{file} is not UTF-8 text: save it as UTF-8") from error
     except (OSError, ValueError, RecursionError) as error:
         raise StudyError(f"{file} cannot be read as TOML ({error}): correct the file") from error
     faults = [*_language_faults("", _ENGLISH, table)]
@@ -204,8 +206,15 @@ def missing_text(path: Path, language: str) -> Fault:
 def words(language: str) -> Words:
     """Return the texts of a language (StudyError if there are none)."""
     if language not in LANGUAGES:
-        raise StudyError(
-            f'the program does not have texts for the participant\'s pages in "{language}" '
-            f"({did_you_mean(language, LANGUAGES)})"
+        why = REFUSED.get(
+            language,
+            f"known: {', '.join(sorted(LANGUAGES))}; copy languages/{language}.toml from the workspace in which the "
+            f"study was made, or run liquid-study language {language}",
         )
+        raise StudyError(f'the program does not have texts for the participant\'s pages in "{language}" ({why})')
     return LANGUAGES[language]
+
+
+def words_or_english(language: str) -> Words:
+    """Return the texts of a language, the English ones if there are none, as for results without the lab's file."""
+    return LANGUAGES.get(language, SHIPPED["en"])

@@ -22,6 +22,7 @@ import study_app
 from study_app.errors import PlugInError, StoreError
 from study_app.number_text import counted
 from study_app.protocol.upgrade import needs_upgrade
+from study_app.protocol.wording.languages import SHIPPED
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporary_files
 from study_app.store.blinded.blinding import Key, complete_protocol, open_events, opened_key
@@ -343,7 +344,18 @@ def _is_protocol(held: Mapping[str, Any], start: events.SessionStarted, key: Key
         return True
     except (KeyError, TypeError, AttributeError, ValueError):
         return False
-    return is_earlier or parse_json(json.dumps(whole)) == held["protocol"]
+    return is_earlier or _without_own_texts(parse_json(json.dumps(whole))) == _without_own_texts(held["protocol"])
+
+
+def _without_own_texts(protocol: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a receipt's protocol without the questions of designs if a language is the lab's own.
+
+    The file of such a language may have been changed since the session, or be missing on this computer.
+    """
+    if SHIPPED.keys() >= {*protocol["study"]["languages"]}:
+        return protocol
+    asked = {name: form for name, form in protocol["questionnaires"].items() if not name.endswith(receipt.ANSWER)}
+    return {**protocol, "questionnaires": asked}
 
 
 def _unconfirmed_answers(lines: Sequence[events.Event]) -> Iterator[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from markupsafe import escape
 
-from study_app.analysis.report.questions_in_full import changed_questions
+from study_app.analysis.report.sections import changed_questions
 from study_app.analysis.report.write_report import appendix, report
 from study_app.protocol.source.files import shipped_file
 from study_app.store import receipt

@@ -11,12 +11,15 @@ from typing import NoReturn
 
 import pytest
 
-from study_app.errors import StudyError
+from study_app import api
+from study_app.errors import ProtocolError, StudyError
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.without_force import SENTENCES, without_force
 from study_app.protocol.wording import languages
 from study_app.protocol.wording.languages import LANGUAGES, words
+from study_app.store.study_runs import recorded_contents
+from study_app.store.verification.verify_study import verify_study
 
 
 def slots(text: str) -> set[str]:
@@ -71,7 +74,8 @@ def test_templates_fill():
 
 
 def test_a_language_without_words_is_refused():
-    with pytest.raises(StudyError, match=r'in "sv" \(known: ar, de, en, fr, nl\)'):
+    hint = "copy languages/sv.toml from the workspace in which the study was made, or run liquid-study language sv"
+    with pytest.raises(StudyError, match=rf'in "sv" \(known: ar, de, en, fr, nl; {hint}\)'):
         words("sv")
 
 
@@ -205,8 +209,46 @@ def test_a_study_in_the_labs_language_is_checked_and_described(tmp_path: Path) -
     done = subprocess.run(command, check=False, capture_output=True, text=True, env=environment)
     assert done.returncode == 2
     assert "es.toml: done is missing" in done.stderr
+    assert "1 problem\n" in done.stderr, "texts that the study leaves out are not missing in this language"
 
 
+@pytest.mark.parametrize("content", ['name = "Espa\u00f1ol"'.encode("latin-1"), 'name = "x"'.encode("utf-16")])
+def test_a_language_file_in_another_encoding_is_named_with_what_to_do(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "es.toml").write_bytes(content)
+    _, refused = languages.own_languages(tmp_path)
+    assert refused["es"] == f"{tmp_path / 'es.toml'} is not UTF-8 text: save it as UTF-8"
+
+
+@pytest.mark.slow
+def test_results_in_the_labs_language_are_read_where_its_file_is_missing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own, _ = languages.own_languages(spanish(tmp_path).parent)
+    study, results = tmp_path / "own.toml", tmp_path / "results"
+    study.write_text(ABX, encoding="utf-8", newline="\n")
+    with monkeypatch.context() as here:
+        here.setitem(languages.LANGUAGES, "es", own["es"])
+        with api.open_session(study, "P001", results=results, seed=1, answer=lambda _question: "like_first") as session:
+            session.run()
+    assert verify_study(results).errors == (), "without the file"
+    monkeypatch.setitem(languages.LANGUAGES, "es", words("nl"))
+    assert verify_study(results).errors == (), "with another file"
+    monkeypatch.undo()
+    (content,) = recorded_contents(results)
+    (asked,) = content.protocol["questionnaires"]["pair/answer"]["items"]
+    assert asked["text"] == {"es": own["es"].design_questions["abx"]}
+    with pytest.raises(ProtocolError, match="1 problem"):
+        load(study)
+
+
+ABX = """
+format = 2
+study = { name = "pair", languages = ["es"] }
+liquids.thin.density_kg_m3 = 1000
+liquids.thick.density_kg_m3 = 1400
+tasks.stir = { kind = "explore", min_s = 1, max_s = 1, instruction = "Mueva la bola." }
+blocks.pair = { design = "abx", conditions = ["thin", "thick"], standard = "thin" }
+"""
 STUDY = """
 format = 2
 study.name = "own"
