@@ -10,13 +10,14 @@ MAX_ID: Final = 60
 """Letters of a name that tables and windows can show whole."""
 MAX_SHORT_NAME: Final = 40
 _MONTHS: Final = (
-    "jan(uary)?|feb(ruary)?|mar(ch)?|apr(il)?|may|june?|july?|aug(ust)?|sept?(ember)?|oct(ober)?|nov(ember)?|"
-    "dec(ember)?|mrz|märz|mai|okt|dez|fev|avr|mei"
+    "jan(uar[iy]?|v(ier)?)?|feb(ruar[iy]?)?|fevr?(ier)?|mar(ch|s)?|mrz|mrt|maart|apr(il)?|avr(il)?|may|mai|mei|jun[ei]?|"
+    "juin|jul[iy]?|juil(let)?|aug(ust(us)?)?|aout|sept?(ember|embre)?|o[ck]t(ober|obre)?|nov(ember|embre)?|"
+    "de[cz](ember|embre)?"
 )
 _READ_AS: Final = {
     "a missing value": "na|nan|none|null|nil",
     "true or false": "t|f|true|false|wahr|falsch|vrai|faux|waar|onwaar",
-    "a number": r"0[0-9]+|[0-9]{16,}|[0-9]+[ed][0-9]+|0x[0-9a-f]+|inf|infinity",
+    "a number": r"0[0-9]+|[0-9]{16,}|[0-9]+(e[0-9]*|d[0-9]+|i)|0x[0-9a-f]+(p[0-9]+)?|inf|infinity",
     "a date or a time": rf"({_MONTHS})[0-9]{{1,4}}|[0-9]{{1,4}}({_MONTHS})[0-9]{{0,4}}|[0-9]{{1,2}}[ap]m",
 }
 """What spreadsheets, R, pandas and SPSS make of a text of letters and digits, in any case."""

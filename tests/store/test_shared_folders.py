@@ -15,7 +15,7 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.protocol.source.files import has_hash, protocol_hash, shipped_file
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.exclusions import exclude, include
+from study_app.store.exclusions import exclude, exclusions, include
 from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify_study
 
@@ -60,6 +60,28 @@ def test_files_of_systems_are_noted_and_leave_the_fingerprint(study: Path) -> No
     said = {one.place: one.message for one in verify_study(study).errors}
     assert all(any(place.endswith(name) for place in said) for name in added)
     assert not any("fingerprints.txt" in message for message in said.values())
+
+
+def test_copies_of_a_studys_lists_are_noted_and_their_content_is_ignored(study: Path) -> None:
+    exclude(study, "P001", 1, by="AB", reason="x")
+    copies = [
+        study / "exclusions (AB's conflicted copy 2026-01-02).csv",
+        study / "fingerprints-DESKTOP-AB12CD3.txt",
+        study / "blinding" / "key.sync-conflict-20260101-101010-ABCDEFG.sealed",
+        study / "blinding" / "reveals.jsonl~",
+        study / "data" / "study-demo_description-participants_data (1).csv",
+    ]
+    for copy in copies:
+        copy.write_bytes(b"other\n")
+    (study / ".DS_Store").write_bytes(b"\0")
+    (study / "exclusions_notes.csv").write_bytes(b"mine\n")
+    verified = verify_study(study)
+    assert verified.errors == ()
+    assert sorted(warning.place for warning in verified.warnings) == sorted(
+        copy.relative_to(study).as_posix() for copy in copies
+    )
+    assert all(warning.message.endswith("compare the two files") for warning in verified.warnings)
+    assert [row.reason for row in exclusions(study)] == ["x"]
 
 
 def test_copies_of_sessions_are_no_sessions(study: Path) -> None:

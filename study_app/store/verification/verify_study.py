@@ -137,9 +137,29 @@ def _verify_study(folder: Path, copy: tuple[Path, Proof] | None, findings: Findi
     for path in {*study.data.glob("sub-*"), *study.data.glob("sub-*/ses-*")} - places:
         if path.is_dir() and (path.name.startswith("sub-") or path.parent in places):
             findings.warning(path, "is ignored because it is not a session folder; it may be a copy of one")
+    for path, original in _copies_of_lists(study, name):
+        findings.warning(path, f"is ignored because it seems to be a copy of {original.name}: compare the two files")
     for path in (*temporary_files(folder), *temporary_files(study.data)):
         findings.warning(path, "is being written, or is an incomplete file left by a program that was killed")
     return sessions
+
+
+def _copies_of_lists(study: StudyFolder, name: str) -> Iterator[tuple[Path, Path]]:
+    """Yield each copy of a study's own file that a file-sharing program or a person made, and that file."""
+    lists = (
+        study.exclusions,
+        study.reversed_exclusions,
+        study.withdrawals,
+        study.fingerprints,
+        study.reveals,
+        study.key,
+    )
+    for path in (*lists, study.participants(name)):
+        stem, suffix = re.escape(path.stem), re.escape(path.suffix)
+        copied = re.compile(
+            rf"{stem}(([ (\[~-]|_conflict|\.sync-conflict-).*{suffix}|{suffix}(~|\.bak))", re.IGNORECASE
+        )
+        yield from ((copy, path) for copy in sorted(path.parent.glob("*")) if copied.fullmatch(copy.name))
 
 
 def _check_plug_ins(study: StudyFolder, findings: Findings) -> None:

@@ -155,8 +155,11 @@ def test_halves_of_a_killed_program_go_when_the_next_session_begins(start: Start
 CHANGED = {
     "a missing value": ("NA", "nan", "None", "NULL", "null", "na"),
     "true or false": ("TRUE", "false", "T", "F"),
-    "a number": ("1E5", "007", "00", "12e3", "inf", "Infinity", "0x1F", "1234567890123456"),
-    "a date or a time": ("MAR1", "1MAR", "dec10", "SEPT2", "May2024", "12JAN24", "12pm"),
+    "a number": ("1E5", "007", "00", "12e3", "inf", "Infinity", "0x1F", "0x1p3", "5E", "2i", "1234567890123456"),
+    "a date or a time": (
+        *("MAR1", "1MAR", "dec10", "SEPT2", "May2024", "12JAN24", "12pm"),
+        *("Mrt1", "3juin", "Juil2024", "1oktober", "Januari5"),
+    ),
 }
 
 
@@ -168,7 +171,7 @@ def test_an_id_that_other_programs_change_is_refused(tmp_path: Path, read_as: st
     assert f"read it as {read_as}; use another ID, such as P001" in str(refused.value)
 
 
-KEPT = ("P1", "P007", "7", "101", "S01", "Anna", "NA1", "E5", "1A", "March", "TRUE1", "X0")
+KEPT = ("P1", "P007", "7", "101", "S01", "Anna", "NA1", "E5", "1A", "March", "TRUE1", "X0", "Marta1", "3D", "0xG")
 
 
 @pytest.mark.parametrize("participant", KEPT)
