@@ -37,13 +37,14 @@ from study_app.store.folder_lock import lock_folder, refuse_if_open
 from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, check_name_and_reason
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import is_valid_value
-from study_app.store.merged import merged_above
+from study_app.store.merged import MANIFEST, merged_above
 from study_app.store.output_files import Output, erase_outputs
 from study_app.store.tables.study_files import described_study, write_participants
 from study_app.workspace import workspace
 
 _DATASET: Final = "dataset_description.json"
 RESULTS: Final = "results"
+_ARCHIVES: Final = {".zip", ".7z", ".rar", ".tar", ".gz", ".tgz", ".xz", ".bz2"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -166,6 +167,7 @@ def withdraw(
         for export in shared
         if any(_remaining_mentions(export, participant, export.data, export.path / RESULTS))
     ]
+    left += _mentions_beside_studies(study, participant)
     return Withdrawn(tombstone, tuple(erased), outputs, elsewhere, tuple(left))
 
 
@@ -367,15 +369,38 @@ def _outputs(study: Path) -> tuple[tuple[Path, ...], tuple[Output, ...]]:
     return erase_outputs(study, within if own.is_relative_to(within) else own)
 
 
+def _mentions_beside_studies(study: StudyFolder, participant: str) -> Iterator[str]:
+    """Yield archives in the results folder, and files outside of studies that name the study and the participant."""
+    results, name = workspace().results, (_study_name(study) or "").encode()
+    described = (path.parent for file in (_DATASET, MANIFEST) for path in results.rglob(file))
+    studies = {study.path, *described}
+    for path in paths_in(results):
+        if path.is_dir() or not studies.isdisjoint(path.parents):
+            continue
+        if path.suffix.lower() in _ARCHIVES:
+            yield f"{path} is an archive, which is not searched: delete it if it contains data from {participant}"
+            continue
+        try:
+            if name in os.fsencode(path.name) or name in read_regular(path):
+                yield from _naming(path, participant)
+        except (OSError, StoreError) as error:
+            yield f"{path} cannot be searched ({error})"
+
+
 def _remaining_mentions(study: StudyFolder, participant: str, *folders: Path) -> Iterator[str]:
     """Yield the paths that still name the participant, except tombstone, allocation entry and recordings.
 
     If ``folders`` are given, only these are searched, since an ID may occur by chance in the footage of an export.
     """
-    word = re.compile(rb"(?<![A-Za-z0-9])" + re.escape(participant.encode()) + rb"(?![A-Za-z0-9])")
     for path in (path for folder in folders or (study.path,) for path in paths_in(folder)):
-        kept = path == study.withdrawals or path.is_relative_to(study.allocated)
-        if kept or path.parent.name == "recordings" or not path.is_file():
-            continue
-        if word.search(os.fsencode(path.name)) or word.search(read_regular(path)):
-            yield f"{path} still names {participant}"
+        if path != study.withdrawals and not path.is_relative_to(study.allocated):
+            yield from _naming(path, participant)
+
+
+def _naming(path: Path, participant: str) -> Iterator[str]:
+    """Yield that a file names the participant, unless it is a recording."""
+    if path.parent.name == "recordings" or not path.is_file():
+        return
+    word = re.compile(rb"(?<![A-Za-z0-9])" + re.escape(participant.encode()) + rb"(?![A-Za-z0-9])")
+    if word.search(os.fsencode(path.name)) or word.search(read_regular(path)):
+        yield f"{path} still names {participant}"

@@ -180,13 +180,24 @@ def test_every_copy_and_output_in_the_workspace_is_erased_without_being_named(st
     for path in notes:
         path.write_text(f"{PERSON} was late\n", encoding="utf-8", newline="\n")
     report(study, results.parent / "report")
+    tables, others = results / "tables, a copy", results / "of another study"
+    shutil.copytree(results.parent / "report", tables)
+    others.mkdir()
+    (others / "answers.csv").write_text(f"study,participant\nanother,{PERSON}\n", encoding="utf-8", newline="\n")
+    archive = Path(shutil.make_archive(str(results / "before"), "zip", study))
 
     done = erase(pooled / "sites" / "A")
 
     assert set(done.folders) == {pooled / "sites" / "A", study, saved}
     assert not [path for path in results.parent.rglob(f"sub-{PERSON}") if not path.is_relative_to(other)]
     assert results.parent / "report" / "report.html" in done.outputs
-    assert (set(done.left), done.elsewhere) == ({f"{path} still names {PERSON}" for path in notes}, ())
+    copied = [path for path in tables.rglob("*") if PERSON in path.read_text("utf-8", errors="replace")]
+    assert {path.name for path in copied} >= {"report.html", "study-demo_description-responses_data.csv"}
+    assert set(done.left) == {
+        *(f"{path} still names {PERSON}" for path in (*notes, *copied)),
+        f"{archive} is an archive, which is not searched: delete it if it contains data from {PERSON}",
+    }
+    assert done.elsewhere == ()
     assert contents(other) == unrelated
     assert verify_study(pooled).is_sound
 
