@@ -95,7 +95,7 @@ def _kept_label(version: Kept, now: datetime) -> str:
 
 def _time_text(moment: str, now: datetime) -> str:
     try:
-        text = start_time_text(datetime.fromisoformat(moment).astimezone(now.tzinfo), now)
+        text = start_time_text(datetime.fromisoformat(moment), now)
     except ValueError:
         return "at an unknown time"
     return f"{text[:1].lower()}{text[1:]}"

@@ -132,7 +132,7 @@ def test_two_programs_on_one_study_lose_no_edit_silently(designer: Any) -> None:
     designer.editing.handle_request(SetValue(REPETITIONS, 4))
     other("Typed elsewhere", "leave")
     designer.saving.leave()
-    assert designer.place.banner.words.text().startswith("Another window of the program also edits this study")
+    assert designer.place.banner.words.text().startswith("This study is also being edited in another window")
     next(iter(designer.place.banner.buttons.values())).click()
     QApplication.processEvents()
     assert any("Typed elsewhere" in line for line in lines(designer))

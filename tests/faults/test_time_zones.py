@@ -10,6 +10,8 @@ from PySide6.QtCore import QLocale
 
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
+from study_app.gui.sessions.session_page import read_record
+from study_app.store.folders import StudyFolder
 from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_study import verify_study
 from tests.studies import rehearsed
@@ -61,4 +63,11 @@ def test_data_are_the_same_in_every_time_zone(tmp_path: Path, travel: Callable[[
     first, second = written.values()
     assert first == second
     assert len(first) > 4
+    session, *_ = (place.path for place in StudyFolder(study).sessions())
+    about = {}
+    for zone in ("LINT-14", "NPT-5:45"):
+        travel(zone)
+        (about[zone],) = re.findall(r"ended (\d\d):(\d\d)", read_record(session).about)
+    there, here = (60 * int(hours) + int(minutes) for hours, minutes in about.values())
+    assert (there - here) % 1440 == 14 * 60 - (5 * 60 + 45)
     assert re.search(rb",\d+\.\d+,", first["study-demo_description-trials_data.csv"])

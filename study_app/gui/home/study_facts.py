@@ -333,7 +333,7 @@ def interrupted_session(
         except StudyError:
             continue  # its errors are reported when its folder is requested
         where = _place_text(protocol, schedule, step)
-        stopped = start_time_text(datetime.fromisoformat(lines[-1].at).astimezone(now.tzinfo), now)
+        stopped = start_time_text(datetime.fromisoformat(lines[-1].at), now)
         whole = f" of {session.answers_of}" if session.answers_of is not None else ""
         kind = "Pilot " if session.pilot else ""
         return Interrupted(

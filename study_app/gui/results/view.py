@@ -335,7 +335,7 @@ class _ExclusionsCard(Card):
         what = label(exclusion_text(exclusion), "label", wraps=True, weight=600)
         why = label(exclusion.reason, "label", "text2", wraps=True, weight=400)
         now, at = datetime.now().astimezone(), time_of(exclusion.excluded_at)
-        by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at.astimezone(now.tzinfo), now)}")
+        by = exclusion.rule_or_person + ("" if at is None else f", {start_time_text(at, now)}")
         by = f"Proposed by the rule “{by.replace('_', ' ')}”; not yet decided" if proposed else by
         who = label(by, "small", "text2")
         vbox(hbox((what, 1), *buttons), why, who, spacing=0, margins=(0, 0, 6, 0), parent=made)

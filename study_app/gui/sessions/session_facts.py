@@ -175,7 +175,8 @@ def _exclusions(study: Path) -> tuple[Exclusion, ...]:
 
 
 def start_time_text(started: datetime, now: datetime) -> str:
-    """Return the start of a session as text: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
+    """Return a start in the time zone of ``now`` as text: "Today 09:31", "Yesterday 16:11", "18 Nov 15:20"."""
+    started = started.astimezone(now.tzinfo)
     days = (now.date() - started.date()).days
     day = {0: "Today", 1: "Yesterday"}.get(days, f"{started.day} {started:%b}")
     year = "" if started.year == now.year else f" {started.year}"

@@ -244,11 +244,16 @@ def _about_text(lines: Sequence[Event], happened: str) -> str:
         f"language {row['language']}",
         f"operator {start.operator}" if start.operator else "",
         f"seed {start.seed}",
-        f"ended {datetime.fromisoformat(ended):%H:%M}" if ended else "not ended",
+        f"ended {_clock_time(ended)}" if ended else "not ended",
         counted(row["resumed"], "resume") if row["resumed"] else "",
         happened,
     ]
     return capitalised("  ·  ".join(filter(None, said)))
+
+
+def _clock_time(written: str) -> str:
+    """Return a recorded time as hours and minutes of this computer's time zone."""
+    return f"{datetime.fromisoformat(written).astimezone():%H:%M}"
 
 
 def _note_texts(lines: Sequence[Event]) -> list[str]:
@@ -260,7 +265,7 @@ def _note_texts(lines: Sequence[Event]) -> list[str]:
             continue
         text = f"repeated: {line.reason}" if isinstance(line, Repeat) else line.text or "marked"
         where = "before the first trial" if trial is None else f"trial {trial}"
-        notes.append(f"{datetime.fromisoformat(line.at):%H:%M}, {where}: {text}")
+        notes.append(f"{_clock_time(line.at)}, {where}: {text}")
     return notes
 
 

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from datetime import datetime, timedelta
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
@@ -172,6 +172,9 @@ def test_times_are_said_as_people_say_them():
     assert start_time_text(now - timedelta(hours=20), now) == "Yesterday 19:00"
     assert start_time_text(datetime(2024, 11, 18, 9, 5).astimezone(), now) == "18 Nov 09:05"
     assert start_time_text(datetime(2023, 3, 1, 9, 5).astimezone(), now) == "1 Mar 2023 09:05"
+    here, tokyo = (timezone(timedelta(hours=hours)) for hours in (-5, 9))
+    recorded = datetime(2024, 11, 21, 1, 30, tzinfo=tokyo)
+    assert start_time_text(recorded, datetime(2024, 11, 20, 15, 0, tzinfo=here)) == "Today 11:30"
 
 
 def test_drafts_come_first_the_newest_of_all_and_a_copy_names_its_original(tmp_path, monkeypatch):
