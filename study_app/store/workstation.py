@@ -244,7 +244,7 @@ def save_settings(settings: MachineSettings) -> None:
     Raises
     ------
     StoreError
-        They cannot be written.
+        They cannot be written, or a path in them is not UTF-8 text.
     """
     path = settings_file()
     try:
@@ -255,7 +255,12 @@ def save_settings(settings: MachineSettings) -> None:
     except OSError as error:
         raise cannot_write(path, error) from error
     text = json.dumps(settings.model_dump(mode="json"), indent=2, ensure_ascii=False)
-    write_file(path, f"{text}\n".encode())
+    try:
+        content = f"{text}\n".encode()
+    except UnicodeEncodeError as error:
+        name = text[: error.start].rpartition('"')[2] + text[error.start :].partition('"')[0]
+        raise StoreError(f"{name!r} is not UTF-8 text, so the settings cannot store it: rename the folder") from error
+    write_file(path, content)
 
 
 def create_workspace(made: Workspace) -> None:

@@ -2,6 +2,8 @@
 
 import json
 import math
+import os
+import sys
 
 import pytest
 from hypothesis import given
@@ -50,6 +52,15 @@ def test_a_write_that_fails_leaves_the_old_settings(folder, monkeypatch):
     monkeypatch.undo()
     assert json.loads((folder / "machine.json").read_text("utf-8"))["screen"] == "DP-1"
     assert [path.name for path in folder.iterdir()] == ["machine.json"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="paths are Unicode")
+@pytest.mark.parametrize("name", ["workspace", "firmware"])
+def test_a_path_that_is_not_utf_8_is_refused_in_one_line_and_the_settings_stay(folder, name):
+    save_settings(ALL)
+    with pytest.raises(StoreError, match=r"^'/x/donn.udce9es' is not UTF-8 text, .*: rename the folder$"):
+        save_settings(ALL.model_copy(update={name: os.fsdecode(b"/x/donn\xe9es")}))
+    assert load_settings() == ALL
 
 
 def _full(_descriptor):
