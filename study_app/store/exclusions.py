@@ -54,7 +54,7 @@ class Exclusion:
         return {name: value for name, value in asdict(self).items() if (name, value) != ("key_open", None)}
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Reversal:
     """A reversed exclusion: when, by whom and why, and whether the key was open (None: not recorded)."""
 
@@ -273,7 +273,7 @@ def _parse_reversal(path: Path, number: int, line: bytes) -> Reversal:
         ):
             key_open = record.get("key_open")
             about = {name: str(record.get(name, "")) for name in ("at", "by", "reason")}
-            return Reversal(taken, key_open=key_open if isinstance(key_open, bool) else None, **about)
+            return Reversal(exclusion=taken, key_open=key_open if isinstance(key_open, bool) else None, **about)
     raise StoreError(f"{path}, line {number} is not a reversed exclusion: remove it, or restore it from a back-up")
 
 

@@ -159,7 +159,11 @@ def late_exclusions(folder: Path, rows: Sequence[Exclusion]) -> tuple[Exclusion,
         at = _moment(text)  # reveals are recorded in whole seconds
         return bool(opened_at and at and at.replace(microsecond=0) > opened_at)
 
-    by_person = (Reversal(row, row.excluded_at, row.key_open) for row in rows if row.rule_or_person not in RULES)
+    by_person = (
+        Reversal(exclusion=row, at=row.excluded_at, key_open=row.key_open)
+        for row in rows
+        if row.rule_or_person not in RULES
+    )
     return tuple(
         decision.exclusion
         for decision in (*by_person, *dated_reversals(folder))

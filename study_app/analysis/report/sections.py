@@ -403,9 +403,9 @@ def _reversed_exclusions(study: Study) -> Iterator[str]:
             exclusion = replace(reversal.exclusion, participant=f"{prefix}{reversal.exclusion.participant}")
             if exclusion.rule_or_person not in RULES or exclusion.excluded_at != reversal.at:
                 yield (
-                    f"{describe_exclusion(exclusion)}: excluded ({exclusion.rule_or_person}, "
-                    f"{exclusion.excluded_at[:10]}: {exclusion.reason}), included again ({reversal.by}, "
-                    f"{reversal.at[:10]}: {reversal.reason})"
+                    f"{describe_exclusion(exclusion)}: {exclusion.reason} ({exclusion.rule_or_person}, "
+                    f"{exclusion.excluded_at[:10]}). {reversal.by} included it again on {reversal.at[:10]} "
+                    f"({reversal.reason})."
                 )
 
 

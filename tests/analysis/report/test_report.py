@@ -106,7 +106,7 @@ def test_an_exclusion_that_was_reversed_is_told_with_both_persons_and_reasons(sm
     exclusions, _, reversed_ones = page.partition("Exclusions that were reversed")
     assert "participant P002, session 1: P002 spoke (EM, 2026-03-02" in exclusions
     assert (
-        "participant P001, session 1: excluded (DL, 2026-03-02: P001 spoke), included again (AK, 2026-03-05: only once)"
+        "participant P001, session 1: P001 spoke (DL, 2026-03-02). AK included it again on 2026-03-05 (only once)."
         in reversed_ones
     )
     assert "practised" not in page, "it was never excluded"
