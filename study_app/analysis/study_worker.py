@@ -62,13 +62,13 @@ def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
             _read(order.folder, send, stop)
         case LeaveOut():
             place = locate_participant(order.folder, order.participant)
-            who_and_why = {"by": order.by, "reason": order.reason}
+            by, reason = order.by, order.reason
             if not isinstance(order, TakeBack):
-                exclude(*place, order.session, trial=order.trial, rule=order.rule, **who_and_why)
+                exclude(*place, order.session, trial=order.trial, rule=order.rule, by=by, reason=reason)
             elif order.rule:
-                keep(*place, order.session, rule=order.rule, **who_and_why)
+                keep(*place, order.session, rule=order.rule, by=by, reason=reason)
             else:
-                include(*place, order.session, trial=order.trial, **who_and_why)
+                include(*place, order.session, trial=order.trial, by=by, reason=reason)
         case OpenKey():
             opened = unblind_folder(order.folder, by=order.by, reason=order.reason)
             return Done(warnings=tuple(line for site in opened.values() for line in site.left))
