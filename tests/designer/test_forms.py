@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, Q
 
 from study_app.designer.document.steps import AddKey, ChangeLanguage, RenameElement
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
 
 pytestmark = pytest.mark.slow
@@ -90,7 +91,7 @@ def test_the_help_is_that_of_the_row_with_the_keyboard(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids")
     for key in ("title", "conditions", "phase", "task"):
         row = designer.form_row("blocks", "liquids", key)
-        keyboard = next(part for part in row.findChildren(QWidget) if part.focusPolicy() & Qt.FocusPolicy.TabFocus)
+        keyboard = next(part for part in focus_stops(row) if part.isVisible())
         keyboard.setFocus()
         assert designer.place.form.foot.title.text() == row.row.label
     repetitions = designer.form_row("blocks", "liquids", "repetitions").row
