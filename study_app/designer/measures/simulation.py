@@ -103,7 +103,7 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
         from study_app.session.simulated.predicted_delivery import predicted_delivery  # noqa: PLC0415 - the compiler: only here
         from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
-        simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS, check).sentences)
+        simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)
         send(simulated)
 
         def show_rehearsal(words: str) -> None:

@@ -5,7 +5,7 @@ missing if each of its presentations has an interval in which more is withheld t
 trial is out of limits.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from math import prod
 from statistics import mean
 from typing import Final
@@ -35,16 +35,13 @@ _REST_S: Final = 1.0
 _READ_S: Final = 0.5
 
 
-def predicted_delivery(
-    protocol: Protocol, delay_ticks: int, check: Callable[[], None] = lambda: None
-) -> PredictedDelivery:
+def predicted_delivery(protocol: Protocol, delay_ticks: int) -> PredictedDelivery:
     """Predict the main trials that a simulated participant would lose on a device with this delay [ticks].
 
-    If sessions differ, for example between groups, the prediction is for the one that loses most trials. ``check`` is
-    called before each simulated motion; an exception from it ends the prediction.
+    If sessions differ, for example between groups, the prediction is for the one that loses most trials.
     """
     with _late_rig(protocol, delay_ticks) as rig:
-        failing = _FailingScenes(protocol, rig, check)
+        failing = _FailingScenes(protocol, rig)
         shares = {block.id: _lost_share(protocol, block, failing) for block in protocol.main_blocks}
     return max(
         (_in_session(variant.protocol, shares) for variant in variants(protocol)),
@@ -80,7 +77,7 @@ def _late_rig(protocol: Protocol, delay_ticks: int) -> Rig:
 
 
 def _withheld_shares(
-    rig: Rig, scene: Scene, task: AnyTask, workspace_m: tuple[float, float, float], check: Callable[[], None]
+    rig: Rig, scene: Scene, task: AnyTask, workspace_m: tuple[float, float, float]
 ) -> tuple[float, ...]:
     """Return the share of a scene's force that is withheld in each of `_MOTIONS` simulated motions of a task.
 
@@ -94,14 +91,11 @@ def _withheld_shares(
         The task of the simulated hand.
     workspace_m : tuple of float
         Full sizes of the tank [m, hand frame].
-    check : callable
-        Called before each motion.
     """
     servo, hand = rig.servo, hand_of(rig.device)
     assert hand is not None  # noqa: S101 - a scripted device has one
     reader, shares = servo.telemetry.reader(), list[float]()
     for seed in range(_MOTIONS):
-        check()
         path_s, path_m = task_path(task, workspace_m, min(task.expected_s, _LONGEST_S), seed)
         hand.reach_to(*path_m[0].tolist())
         servo.advance(round(_REST_S * servo.rate_hz))
@@ -123,8 +117,8 @@ def _withheld_shares(
 class _FailingScenes:
     """Cached fractions of simulated motions that violate the limit, by scene and task."""
 
-    def __init__(self, protocol: Protocol, rig: Rig, check: Callable[[], None]) -> None:
-        self._protocol, self._rig, self._check = protocol, rig, check
+    def __init__(self, protocol: Protocol, rig: Rig) -> None:
+        self._protocol, self._rig = protocol, rig
         self._known: dict[tuple[Scene, str], float] = {}
 
     def share(self, scene: Scene, task: str) -> float:
@@ -132,7 +126,7 @@ class _FailingScenes:
         if (known := self._known.get((scene, task))) is not None:
             return known
         protocol, limit = self._protocol, self._protocol.limits.withheld_percent / 100
-        shares = _withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m, self._check)
+        shares = _withheld_shares(self._rig, scene, protocol.tasks[task], protocol.device.workspace_m)
         self._known[scene, task] = mean(share > limit for share in shares)
         return self._known[scene, task]
 

@@ -20,7 +20,6 @@ from study_app.designer.measures.simulation import (
 from study_app.protocol.source.files import shipped_file
 from study_app.protocol.warnings.expected_precision import imprecise
 from study_app.workers.server import Stopped
-from tests.compiled import needs_servo
 
 BLOCK = ("blocks", "viscosity")
 SHORT = Unset((*BLOCK, "break_every")), Unset((*BLOCK, "break_page")), Unset(("pages", "rest")), Set(
@@ -87,21 +86,6 @@ def test_a_simulation_depends_on_forces_tasks_and_titles_but_on_no_other_text() 
     assert changed() != changed(Set(("blocks", "liquids", "title", "en"), "Other")), "the table of power names it"
     assert changed() != changed(Set(("liquids", "honey", "density_kg_m3"), 1300))
     assert changed() != changed(Set(("tasks", "explore", "max_s"), 61))
-
-
-@pytest.mark.slow
-@needs_servo
-def test_a_simulation_ends_between_two_motions_of_the_predicted_delivery() -> None:
-    calls: list[int] = []
-
-    def stop() -> bool:
-        calls.append(len(calls))
-        return len(calls) > 3
-
-    sent: list[Simulated] = []
-    with pytest.raises(Stopped):
-        run_simulation(order(short_study()), sent.append, stop)
-    assert (len(calls), sent) == (4, []), "asked before each motion, and ended before the prediction was complete"
 
 
 def test_an_order_is_given_up_before_its_first_number() -> None:
