@@ -13,6 +13,7 @@ from study_app.designer.form.form import form_of
 from study_app.protocol.json_schema import schema
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.problems import Fault, rule_of, shown_value
+from study_app.store.workstation import MachineSettings
 from tests.protocol.edited_studies import FAULTY, Case
 
 DEFS = schema()["$defs"]
@@ -92,8 +93,8 @@ def patterns_in(node: Any) -> Iterator[str]:
 
 
 def test_every_pattern_of_the_models_is_told_in_words() -> None:
-    patterns = {*patterns_in(schema())}
-    assert len(patterns) >= 7
+    patterns = {*patterns_in(schema()), *patterns_in(MachineSettings.model_json_schema())}
+    assert len(patterns) >= 11
     assert [pattern for pattern in patterns if rule_of(pattern) == rule_of("^$") or "^" in rule_of(pattern)] == []
 
 
