@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QMenu, QSizePolicy, QWidget
 from study_app.designer.file import FileText
 from study_app.designer.form.rows import Form
 from study_app.designer.measures.cards import INKS
+from study_app.designer.parts import KeysOpenList
 from study_app.designer.problems import ProblemRow
 from study_app.designer.version_rows import VersionChip
 from study_app.gui.kit.commands import command_tip, key_cap, keys_of, with_key
@@ -21,7 +22,7 @@ from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.accessible import announce
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Chip, Icon, chip_size, paint_chip, smooth_painter
-from study_app.gui.widgets.controls import ActionButton, Choice, IconButton, PressedByEnter
+from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted
 
@@ -264,34 +265,13 @@ def problems_chip(count: int, warnings: int) -> tuple[Tone, str, str]:
     return "ok", "check", "No problems"
 
 
-_OPENS = {
-    Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End,
-    Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space, Qt.Key.Key_F4,
-}  # fmt: skip
-
-
-class _StudyList(Choice):
-    """The studies that can be opened; keys open the list, but do not select another study."""
+class _StudyList(KeysOpenList):
+    """The studies that can be opened."""
 
     def add_study(self, study: StudyChoice, *, opened: bool) -> None:
         self.addItem(study.words, study.source)
         if opened:
             self.setItemData(self.count() - 1, f"{study.words}, open", Qt.ItemDataRole.AccessibleTextRole)
-
-    def showPopup(self) -> None:
-        super().showPopup()
-        if self.currentIndex() < 0:
-            self.view().setCurrentIndex(self.model().index(0, self.modelColumn()))
-
-    def keyPressEvent(self, event: QKeyEvent) -> None:
-        shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
-        letter = event.text().strip() if event.text().isprintable() else ""
-        if (event.key() in _OPENS or letter) and not event.modifiers() & ~shift_or_pad:
-            self.showPopup()
-            if letter:
-                self.view().keyboardSearch(letter)
-        else:
-            event.ignore()
 
 
 NEW, OPEN = "\0new", "\0open"

@@ -11,7 +11,7 @@ from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
 from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import hbox
-from study_app.gui.widgets.controls import ActionButton, PressedByEnter
+from study_app.gui.widgets.controls import ActionButton, Choice, PressedByEnter
 from study_app.gui.widgets.labels import Elided, Ink
 
 INSIDE, BETWEEN, SEGMENT_PX = 3, 4, 28
@@ -115,3 +115,28 @@ def cut_text(text: str, role: TypeRole = "small", ink: Ink = "text2", *, right: 
     if right:
         made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
     return made
+
+
+_OPENS = {
+    Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown, Qt.Key.Key_Home, Qt.Key.Key_End,
+    Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Space, Qt.Key.Key_F4,
+}  # fmt: skip
+
+
+class KeysOpenList(Choice):
+    """A closed list that arrow keys and letters only open; Enter or a click then selects an entry."""
+
+    def showPopup(self) -> None:
+        super().showPopup()
+        if self.currentIndex() < 0:
+            self.view().setCurrentIndex(self.model().index(0, self.modelColumn()))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        shift_or_pad = Qt.KeyboardModifier.KeypadModifier | Qt.KeyboardModifier.ShiftModifier
+        letter = event.text().strip() if event.text().isprintable() else ""
+        if (event.key() in _OPENS or letter) and not event.modifiers() & ~shift_or_pad:
+            self.showPopup()
+            if letter:
+                self.view().keyboardSearch(letter)
+        else:
+            event.ignore()

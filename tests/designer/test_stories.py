@@ -776,7 +776,12 @@ def asked_when(story: Story) -> None:
         story.lacks(line)
         story.play("@questionnaires.nasa_tlx")
     story.press_row("sequence")
-    steps = story.designer.field("sequence").names
+    steps, before = story.designer.field("sequence").names, story.designer.text
+    for key in ("Down", "Up", "d"):
+        story.play(f":sequence {key}")
+        assert steps.view().isVisible(), key
+        story.act("close it", steps.hidePopup)
+    assert story.designer.text == before, "keys only open the list"
     story.choose(steps, "delay")
     story.expect("1 problem", undo="Add to Session order", at="Add to Session order")
     story.has('sequence = ["welcome", "liquids", "reaching", "delays", "thanks", "delays"]')

@@ -26,11 +26,11 @@ from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_
 from study_app.designer.form.rows import FormRow
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.parts import FIELD_PX, cut_text, make_dense
+from study_app.designer.parts import FIELD_PX, KeysOpenList, cut_text, make_dense
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.themed import name_scroll_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
-from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
+from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import typed_numbers
@@ -246,7 +246,7 @@ class EntryList(Field):
             self._request_step(DuplicateElement(self.entry_path(self.chosen), stays=True), self.chosen + 1)
 
 
-class _NamesList(Choice):
+class _NamesList(KeysOpenList):
     """A list of things that can be added, without a current choice; ``chosen`` carries the value of an entry."""
 
     chosen = Signal(object)
