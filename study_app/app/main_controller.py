@@ -25,6 +25,7 @@ from study_app.gui.home.dialogs import WorkspaceDialog
 from study_app.gui.home.main_window import MainWindow, bug_sentence
 from study_app.gui.home.study_facts import DraftWords
 from study_app.gui.home.view import HomePlace
+from study_app.gui.kit.commands import add_commands
 from study_app.gui.kit.devices import device_named, screen_number, settings_here, theme_named
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.widgets.background import Background, wait_for_jobs
@@ -195,11 +196,11 @@ class MainController(QObject):
         makers: dict[str, Callable[[], Place]] = {
             "home": self._make_home_place,
             "designer": self._make_designer_place,
-            "results": self._make_results_place,
-            "lab": self._make_lab_place,
-            "devices": self._make_devices_place,
-            "machine": self._make_machine_place,
-            "help": self._make_help_place,
+            "results": partial(self._with_commands, self._make_results_place),
+            "lab": partial(self._with_commands, self._make_lab_place),
+            "devices": partial(self._with_commands, self._make_devices_place),
+            "machine": partial(self._with_commands, self._make_machine_place),
+            "help": partial(self._with_commands, self._make_help_place),
         }
         self.window = MainWindow(
             {name: _with_guarded_painting(make) for name, make in makers.items()},
@@ -365,6 +366,13 @@ class MainController(QObject):
         """Note that another study is open in the designer, so that the lab no longer offers to take changes back."""
         if self.lab is not None:
             self.lab.study = ""
+
+    def _with_commands(self, make: Callable[[], Place]) -> Place:
+        """Create a page with the keys for Home and a new study, which Home and the designer have themselves."""
+        made = make()
+        begin_new = partial(self._go_to_designer, lambda designer: designer.place.begin_new())
+        add_commands(made, {"home": partial(self.window.go, "home"), "new": begin_new})
+        return made
 
     def _make_home_place(self) -> HomePlace:
         made = HomePlace(self.results, _draft_words)

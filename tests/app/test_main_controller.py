@@ -184,6 +184,20 @@ def test_the_sidebar_has_one_width_per_size_of_window_at_every_place(visit: Main
             assert (visit.window.size().toTuple(), visit.window.rail.width()) == (size, width), name
 
 
+def test_keys_lead_from_every_place_to_home_and_to_a_new_study(visit: MainController, qtbot: Any) -> None:
+    window = visit.window
+    window.activateWindow()
+    for name in window.rail.buttons:
+        window.go(name)
+        qtbot.keyClick(window, Qt.Key.Key_N, Qt.KeyboardModifier.ControlModifier)
+        assert visit.designer is not None
+        assert (window.here, visit.designer.place.stack.currentIndex()) == ("designer", 1), name
+        visit.designer.place.close_new()
+        window.go(name)
+        qtbot.keyClick(window, Qt.Key.Key_Home, ALT)
+        assert window.here == "home", name
+
+
 def test_results_show_what_was_run_last(visit: MainController, monkeypatch: Any) -> None:
     shown: list[Path] = []
     monkeypatch.setattr(main_controller, "LiveSession", Held)
