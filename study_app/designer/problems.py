@@ -410,6 +410,11 @@ class ProblemsCard(Card):
                 line.show_repairs(repairs)
 
     @property
+    def current(self) -> ProblemRow | None:
+        """The problem that was opened last, until it is solved."""
+        return self.at if self.at in self.rows else None
+
+    @property
     def rows_after_current(self) -> tuple[ProblemRow, ...]:
         """The rows after the current one; if it was solved, from the row that replaced it."""
         at = self.rows.index(self.at) + 1 if self.at in self.rows else self._number

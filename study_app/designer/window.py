@@ -340,8 +340,11 @@ class _Arrangement(QWidget):
         self.header.study.setFocus(_SHORTCUT)
 
     def focus_form(self) -> None:
+        """Focus the field of the current problem if the form shows it, otherwise the first row."""
         self.show_side("form")
-        self.form.focus_first()
+        form, row = self.form.form, self.problems.current
+        if form is None or row is None or row.element != form.path or not self.form.focus_row(row.fault.path):
+            self.form.focus_first()
 
     def focus_field(self, path: ElementPath) -> None:
         """Focus a field of the form and select its value; without its row, the first row."""
@@ -660,7 +663,7 @@ class DesignerPlace(Place):
             self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts
 
     def open_next_problem(self) -> None:
-        """Open the next problem and focus its repair, if it has one."""
+        """Open the next problem and focus its field, or its repair if there is no field to focus."""
         if self.view.form is not None:
             self.flush()
         if not (coming := self.problems.rows_after_current):
@@ -668,8 +671,11 @@ class DesignerPlace(Place):
         row = coming[0]
         self.problems.open_problem(row)
         self.finish("repairs", row)
-        for button in (self.form.repairs_of(row) or self.problems.repairs_of(row))[:1]:
-            button.setFocus(Qt.FocusReason.ShortcutFocusReason)
+        field = self.window().focusWidget()
+        repairs = self.form.repairs_of(row) or self.problems.repairs_of(row)
+        if repairs and (field is None or not field.focusPolicy() & Qt.FocusPolicy.TabFocus):
+            repairs[0].setFocus(Qt.FocusReason.ShortcutFocusReason)
+        for button in repairs[:1]:
             for area in (self.form.area, self.problems.area):
                 if area.isAncestorOf(button):
                     area.ensureWidgetVisible(button, 0, 8)  # its field stays visible

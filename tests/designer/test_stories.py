@@ -594,7 +594,7 @@ def unreadable(story: Story) -> None:
 
 
 def repairs(story: Story) -> None:
-    """F8 leads to a repair; a letter there is typed into the field; no line moves below the pointer."""
+    """F8 leads to the field, Tab to its repair, where a letter is typed into the field; no line moves below the pointer."""
     designer, problems = story.designer, story.designer.place.problems
 
     def pointer(kind: QEvent) -> None:
@@ -618,7 +618,11 @@ def repairs(story: Story) -> None:
     story.play("ctrl+z ctrl+z ctrl+1 F8")
     story.expect("3 problems", "4 problems", selected="conditions.thin", at="Visual delay")
     story.play("Return F8")
-    story.expect(selected="conditions.thick", at='Use "thick": Condition Thick, Liquid')
+    story.expect(selected="conditions.thick", at="Liquid")
+    story.play("ctrl+1 ctrl+2")
+    story.expect(at="Liquid")
+    story.play("Tab")
+    story.expect(at='Use "thick": Condition Thick, Liquid')
     story.play("Return")
     story.expect("3 problems", undo='Use "thick"', at="Liquid")
     story.play("F8")
@@ -628,7 +632,9 @@ def repairs(story: Story) -> None:
     )
     story.ask(RetypeFile(text))
     story.play("ctrl+1 F8")
-    story.expect("26 problems", at="Use this text in every language: Task Reach, Instruction")
+    story.expect("26 problems", at="Instruction, Dutch")
+    story.play("Tab")
+    story.expect(at="Use this text in every language: Task Reach, Instruction")
     story.play("'E' 'en titel'")
     story.expect("25 problems", at="Instruction, Dutch")
     assert designer.value("tasks", "reach", "instruction", "nl") == "Een titel"

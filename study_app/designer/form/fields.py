@@ -686,8 +686,9 @@ class LanguagesField(Field):
             line.show_text(text if isinstance(text, str) else "")
 
     def take_keyboard(self) -> None:
-        first = next((line for line in self.lines.values() if not line.words()), self)
-        first.setFocus(Qt.FocusReason.OtherFocusReason)
+        copied = {text.language for text in self.row.untranslated}
+        to_write = (line for code, line in self.lines.items() if not line.words() or code in copied)
+        next(to_write, self).setFocus(Qt.FocusReason.OtherFocusReason)
 
 
 def is_stacked(row: FormRow) -> bool:

@@ -74,7 +74,7 @@ def untranslated_at(
         parts = _text_parts(texts.get(code))
         if (source := _source_language(parts, code, _shipped_texts())) is not None:
             yield UntranslatedText(path, code, source, ships=True)
-        elif parts and code != first and texts.get(code) == texts.get(first):
+        elif code != first and texts.get(code) == texts.get(first) and not _same_words(code).issuperset(parts):
             yield UntranslatedText(path, code, first, ships=False)
         else:
             sentences = [part for part in parts if len(part.split()) >= _SENTENCE_WORDS]
@@ -83,7 +83,10 @@ def untranslated_at(
 
 
 def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) -> Iterator[str]:
-    """Yield a warning for each language with untranslated texts; ``lists_places`` adds their first places."""
+    """Yield a warning for each language with untranslated texts.
+
+    With ``lists_places`` it adds their first places; otherwise it begins with the place of the first text.
+    """
     texts, only_one = untranslated_texts(document), len(languages_of(document)) == 1
     for (language, source), count in Counter((text.language, text.source) for text in texts).items():
         stated, wanted = language_name(source), language_name(language)
@@ -92,7 +95,10 @@ def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) ->
         if only_one:
             what = f"{are} still in {stated}, but the study's only language is {wanted}"
         of_these = [text for text in texts if (text.language, text.source) == (language, source)]
-        yield f"study.languages: {what}{f': {listed_places(of_these)}' if lists_places else ''}"
+        if lists_places:
+            yield f"study.languages: {what}: {listed_places(of_these)}"
+        else:
+            yield f"{_place_text(of_these[0])}: {what}{'; this is the first of them' if count > 1 else ''}"
 
 
 def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
@@ -114,9 +120,14 @@ def check_translated(document: Mapping[str, Any]) -> None:
 
 def listed_places(texts: Sequence[UntranslatedText]) -> str:
     """Return the places of the first texts in the file, and the number of others."""
-    names = [".".join(map(str, text.path)) for text in texts[:_PLACES_LISTED]]
+    names = [_place_text(text) for text in texts[:_PLACES_LISTED]]
     more = len(texts) - len(names)
     return ", ".join(names) + (f" and {more} more" if more else "")
+
+
+def _place_text(text: UntranslatedText) -> str:
+    """Return the place of a text in the file, in which entries count from 1."""
+    return ".".join(str(step + 1) if isinstance(step, int) else step for step in text.path)
 
 
 @lru_cache(maxsize=4096)  # the texts of a study are compared after each edit: 1 to 2 ms instead of 10 to 40

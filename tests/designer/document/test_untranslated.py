@@ -64,7 +64,8 @@ def test_every_english_text_of_a_study_in_another_language_alone_is_to_be_transl
 def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
     study = with_answers(template("rate-realism"), Answers("Ça fait vrai ?", ("fr",)))
     assert lines_of(study) == [
-        "study.languages: 16 texts are still in English, but the study's only language is French"
+        "tasks.explore.instruction: 16 texts are still in English, but the study's only language is French; "
+        "this is the first of them"
     ]
     study, _ = study.with_edits(Set(("pages", "welcome", "title", "fr"), "Bienvenue"))
     assert copied_texts(study) == {"fr": 15}
@@ -91,7 +92,7 @@ def test_dutch_texts_in_a_study_that_states_english_are_recognised_too() -> None
         study_named("slime").text.replace('"en", "nl"', '"nl", "en"').encode(), shipped_file("slime").parent
     )
     swapped = with_answers(with_answers(dutch, Answers(languages=("nl",))), Answers(languages=("fr",)))
-    assert lines_of(swapped)[0].endswith("texts are still in Dutch, but the study's only language is French")
+    assert "texts are still in Dutch, but the study's only language is French;" in lines_of(swapped)[0]
 
 
 def test_texts_typed_by_hand_without_a_language_are_compared_too() -> None:
@@ -111,6 +112,15 @@ def test_one_paragraph_that_is_left_in_english_is_enough() -> None:
     theirs = template("empty").document["pages"]["welcome"]["body"].split("\n\n")[1]
     study, _ = study.with_edits(Set(("pages", "welcome", "body", "de"), f"Sie bewegen eine Kugel.\n\n{theirs}"))
     assert copied_texts(study) == {"de": 1}
+
+
+@pytest.mark.parametrize(("title", "copied"), [("Effort", {}), ("Force", {"fr": 1})])
+def test_only_words_known_to_be_the_same_in_both_languages_may_be_equal(title: str, copied: dict[str, int]) -> None:
+    study = with_answers(template("empty"), Answers(languages=("en", "fr")))
+    study = translated(study.with_edits(*edits_to_fill_in(study, "fr"))[0], "fr")
+    study, _ = study.with_edits(Set(("pages", "thanks", "title"), {"en": title, "fr": title}))
+    assert copied_texts(study) == copied
+    assert [line.split(":")[0] for line in lines_of(study)] == ["pages.thanks.title"] * len(copied)
 
 
 def test_both_languages_of_a_french_and_dutch_study_are_counted() -> None:
