@@ -445,6 +445,7 @@ class MainController(QObject):
         if page:
             self.help.open_page(page)
         self.window.go("help")
+        self.help.reader.setFocus()
 
     def end(self) -> None:
         """Release everything that the pages hold, and wait for work in other threads, such as opening a device.

@@ -236,13 +236,17 @@ def test_back_leads_from_the_help_to_the_place_where_it_was_asked_for(visit: Mai
     window = visit.window
     window.go("machine")
     window.activateWindow()
+    window.place("machine").setFocus()
     window.place("machine").focusNextChild()
     asked_in = window.focusWidget()
     for by_keys in (False, True):
         qtbot.keyClick(window, Qt.Key.Key_F1)
         assert visit.help is not None
+        assert window.focusWidget() is visit.help.reader
         leave = partial(qtbot.keyClick, window, Qt.Key.Key_Left, ALT) if by_keys else visit.help.back.click
         visit.help.open_page("lab")
+        qtbot.keyClick(window.focusWidget(), Qt.Key.Key_PageDown)
+        assert visit.help.reader.verticalScrollBar().value() > 0
         leave()
         assert (window.here, visit.help.reader.page) == ("help", "this-machine")
         leave()

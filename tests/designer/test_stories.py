@@ -594,7 +594,7 @@ def unreadable(story: Story) -> None:
 
 
 def repairs(story: Story) -> None:
-    """F8 leads to the field, Tab to its repair, where a letter is typed into the field; no line moves below the pointer."""
+    """F8 leads to a field, Tab to its repair; a letter there goes to the field; no line moves below the pointer."""
     designer, problems = story.designer, story.designer.place.problems
 
     def pointer(kind: QEvent) -> None:

@@ -32,7 +32,7 @@ from PySide6.QtWidgets import QFrame, QLineEdit, QListWidget, QListWidgetItem, Q
 
 from study_app import documentation
 from study_app.documentation import anchor_of, plain
-from study_app.gui.theme.theme import SHADOW, Theme, font
+from study_app.gui.theme.theme import RADIUS_CONTROL, SHADOW, Theme, font
 from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.accessible import plain_tip
 from study_app.gui.widgets.boxes import add_parts, hbox, vbox
@@ -162,7 +162,9 @@ class _PageReader(Coloured, QTextBrowser):
             self._scroll_to(anchor)
 
     def apply_theme(self, theme: Theme) -> None:
-        self.setStyleSheet(f"QTextBrowser {{ background: {theme.surface}; color: {theme.text}; }}")
+        ring = f"border: 2px solid {theme.surface}; border-radius: {RADIUS_CONTROL}px;"
+        colours = f"QTextBrowser {{ background: {theme.surface}; color: {theme.text}; {ring} }}"
+        self.setStyleSheet(f"{colours} QTextBrowser:focus {{ border-color: {theme.accent}; }}")
         if self.page:
             self._draw_page()
 
