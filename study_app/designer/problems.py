@@ -319,6 +319,12 @@ class ProblemsCard(Card):
         add_parts(self.column, top, (self.area, 1))
         self.close_button.clicked.connect(self.close_asked)
 
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.close_asked.emit()
+        else:
+            super().keyPressEvent(event)
+
     def begin(self) -> None:
         """Reset the list for another study; it closes if there are no problems or warnings."""
         self._had = bool(self.rows)

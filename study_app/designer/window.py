@@ -7,7 +7,7 @@ from typing import Any
 
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import QApplication, QSizePolicy, QStackedWidget, QWidget
+from PySide6.QtWidgets import QAbstractScrollArea, QAbstractSlider, QApplication, QSizePolicy, QStackedWidget, QWidget
 
 from study_app.designer.document.steps import (
     Do,
@@ -82,6 +82,16 @@ class _RightPane(QWidget):
         parts = (bar, self._below, (self._stack, 1), self.facts, STRETCH)
         self._column = vbox(*parts, spacing=12 - 2 * SHADOW, margins=0, parent=self)
         self.tabs.chosen.connect(lambda name: self.show_tab(str(name)))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Scroll the page, also while the tabs have keyboard focus."""
+        body, key = self._stack.currentWidget(), event.key()
+        if isinstance(body, QAbstractScrollArea) and key in {Qt.Key.Key_PageUp, Qt.Key.Key_PageDown}:
+            step = QAbstractSlider.SliderAction
+            by = step.SliderPageStepAdd if key == Qt.Key.Key_PageDown else step.SliderPageStepSub
+            body.verticalScrollBar().triggerAction(by)
+        else:
+            super().keyPressEvent(event)
 
     def add_page(self, page: PanePage, *, first: bool = False) -> None:
         self.pages.insert(0 if first else len(self.pages), page)
@@ -398,7 +408,7 @@ class _Arrangement(QWidget):
 
     def focus_problems(self) -> None:
         self.problems.show()
-        self.problems.next.setFocus(_SHORTCUT)
+        (self.problems.next if self.problems.rows else self.problems.close_button).setFocus(_SHORTCUT)
 
     def switch_to_file(self) -> None:
         """Focus the file, and from there return to the last focus in the form."""

@@ -33,6 +33,33 @@ def test_a_key_leads_from_the_designer_to_the_home_page(designer: Any) -> None:
     assert designer.window.here == "home"
 
 
+def test_escape_closes_the_problems_and_returns_the_keyboard(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    at = designer.hit("ctrl+2")
+    designer.hit("ctrl+4")
+    assert designer.place.problems.isAncestorOf(designer.keyboard)
+    assert designer.hit("Escape") is at
+    assert not designer.place.problems.isVisible()
+
+
+def test_page_down_scrolls_the_measures_from_the_page_and_from_the_tabs(designer: Any, qtbot: Any) -> None:
+    designer.open(width=1366)
+    designer.place.show_tab("measures")
+    measures = designer.place.measures
+    bar = measures.verticalScrollBar()
+    measures.power.setMinimumHeight(3 * measures.height())
+    qtbot.waitUntil(lambda: bar.maximum() > 0)
+    designer.hit("ctrl+2")
+    for name in ("Measures", "Measures tab"):
+        at = designer.hit("ctrl+3")
+        assert (at is measures) == (name == "Measures")
+        assert designer.place.pane.isAncestorOf(at)
+        designer.hit("PageDown")
+        assert bar.value() > 0, name
+        designer.hit("PageUp")
+        assert bar.value() == 0, name
+
+
 MOST = 250
 
 
