@@ -5,6 +5,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Literal, NamedTuple, TypeAlias
@@ -420,12 +421,12 @@ class FigureCard(Card):
         self.copy_numbers.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.figure.numbers))
         self.save = ActionButton("download", "Save as …", role="plain", height=30)
         self.save.clicked.connect(self._ask_where)
-        self._buttons = (self.more, self.copy_figure, self.copy_numbers, self.save)
-        for button in self._buttons:
+        self.buttons = (self.more, self.copy_figure, self.copy_numbers, self.save)
+        for button in self.buttons:
             button.setFont(font("label"))
         self._title = label("", "card")
         self._place = QHBoxLayout()
-        foot = hbox(STRETCH, *self._buttons, spacing=4, margins=0)
+        foot = hbox(STRETCH, *self.buttons, spacing=4, margins=0)
         add_parts(self.column, hbox((self.question, 1), self._verdict), self.answer, self._title, self._place)
         add_parts(self.column, self.caption, foot)
         self.show_figure(figure, colours)
@@ -441,7 +442,7 @@ class FigureCard(Card):
         self.answer.setText(figure.answer)
         self.answer.setVisible(bool(figure.answer))
         self._show_verdict(figure.verdict)
-        for button in self._buttons:
+        for button in self.buttons:
             button.setVisible(has_figure)
             button.setAccessibleName(f"{button.text().removesuffix(' …')}: {figure.title}")
         self.copy_numbers.setVisible(bool(figure.numbers))
@@ -615,6 +616,8 @@ class FiguresPanel(QScrollArea):
             self.cards.append(card)
         for gone in kept.values():
             remove_widget(gone)
+        for before, after in pairwise(button for card in self.cards for button in card.buttons):
+            QWidget.setTabOrder(before, after)
 
     def set_whole(self, yes: bool) -> None:
         """Be as high as all figures, for a page that scrolls as a whole."""

@@ -220,7 +220,11 @@ class IconButton(Themed, PressedByEnter):
         ink = {"danger": self.theme.bad, "plain": self.theme.text3}.get(self._role, self.theme.text)
         middle, half = QRectF(self.rect()).center(), 10 if self.width() >= 40 else 8
         place = QRectF(middle.x() - half, middle.y() - half, 2 * half, 2 * half)
-        draw_icon(QPainter(self), self._icon, place, ink if self.isEnabled() else self.theme.ctl, 2.0)
+        painter = QPainter(self)
+        if not self.isEnabled():
+            ink = self.theme.ctl
+            painter.setOpacity(0.5)
+        draw_icon(painter, self._icon, place, ink, 2.0)
 
 
 class Choice(Themed, QComboBox):

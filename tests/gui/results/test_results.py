@@ -144,6 +144,13 @@ def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorde
     questions = [card.question.text() for card in shown.place.figures.cards]
     assert questions[0].endswith("Which liquids were distinguished?")
     assert b">Thick<" in shown.place.figures.cards[0].figure.svg
+    stops = [button for card in shown.place.figures.cards for button in card.buttons if button.isVisible()]
+    stops[0].setFocus()
+    passed = stops[:1]
+    while len(passed) < len(stops):
+        shown.qtbot.keyClick(passed[-1], Qt.Key.Key_Tab)
+        passed.append(shown.window.focusWidget())
+    assert passed == stops, "Tab goes through the cards from top to bottom"
     for table in (results / "demo").rglob("*trials_data.csv"):
         assert b",force_mean_n," in table.read_bytes()
 
