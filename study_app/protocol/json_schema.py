@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from functools import cache
+from itertools import chain
 from typing import Any, Final, TypeAlias
 
 from pydantic import BaseModel
@@ -14,6 +15,7 @@ from pydantic.json_schema import CoreModeRef, DefsRef, GenerateJsonSchema
 from pydantic_core import to_jsonable_python
 
 from study_app.documentation import anchor_of
+from study_app.number_text import counted
 from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
@@ -88,9 +90,11 @@ _BOUNDS: Final = {
     "exclusiveMinimum": "more than {}",
     "maximum": "at most {}",
     "exclusiveMaximum": "less than {}",
-    "minItems": "at least {} entries",
-    "maxItems": "at most {} entries",
-    "maxLength": "at most {} characters",
+}
+_LENGTHS: Final = {
+    "minItems": ("at least", "entry", "entries"),
+    "maxItems": ("at most", "entry", "entries"),
+    "maxLength": ("at most", "character", "characters"),
 }
 
 
@@ -203,7 +207,13 @@ def _list_text(node: _Node, headings: Mapping[str, str]) -> str:
 
 
 def _bound_texts(node: _Node) -> Iterator[str]:
-    return (template.format(f"{node[key]:g}") for key, template in _BOUNDS.items() if key in node)
+    numbers = (template.format(f"{node[key]:g}") for key, template in _BOUNDS.items() if key in node)
+    return chain(numbers, length_texts(node))
+
+
+def length_texts(node: _Node) -> Iterator[str]:
+    """Yield the permitted lengths of a list or text, such as "at least 1 entry"."""
+    return (f"{bound} {counted(node[key], *noun)}" for key, (bound, *noun) in _LENGTHS.items() if key in node)
 
 
 def _default_text(key: str, part: _Node, node: _Node) -> str:

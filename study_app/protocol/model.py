@@ -542,9 +542,9 @@ class ExclusionRule(Table):
 class Analysis(Table):
     """Decisions about the analysis; without this table the report calls all its results exploratory."""
 
-    alpha: Annotated[
-        float, within(0.0001, 0.2, "studies with human participants cannot show p values below 0.0001")
-    ] = Field(default=0.05, description="Largest p value that is considered significant.")
+    alpha: Annotated[float, within(0.0001, 0.2, "common significance levels are 0.001 to 0.1")] = Field(
+        default=0.05, description="Largest p value that is considered significant."
+    )
     equivalence_bound: (
         Annotated[float, within(0.05, 6, "the scale spans 6 points, and means differ by tenths of a point")] | None
     ) = Field(

@@ -8,7 +8,7 @@ import shiboken6
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
-from study_app.designer.document.steps import AddKey, ChangeLanguage, RenameElement
+from study_app.designer.document.steps import AddKey, ChangeLanguage, RemoveKey, RenameElement
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
@@ -179,3 +179,10 @@ def test_the_help_says_which_key_removes_a_field(designer: Any) -> None:
         designer.field("study", key).take_keyboard()
         form.show_help_of(designer.field("study", key))
         assert form.foot.place.whole.startswith("remove (Ctrl+Del) · ") is removable
+
+
+def test_a_default_of_one_value_is_shown_without_brackets(designer: Any) -> None:
+    designer.open("kitchen", "liquids", "thin")
+    designer.editing.handle_request(RemoveKey(("liquids", "thin", "effects")))
+    assert designer.form_row("liquids", "thin", "effects").row.default == ["drag"]
+    assert designer.field("liquids", "thin", "effects").inner.list.currentText() == "drag"

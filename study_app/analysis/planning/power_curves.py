@@ -536,6 +536,13 @@ def _bounds(plan: Plan) -> int:
     return sum(contrast.bound is not None for contrast in plan.contrasts) + plan.untested_bounds
 
 
+def _group_sizes(first: float, second: float) -> str:
+    """Return the sentence on the shares of participants in two groups."""
+    if f"{first:.0%}" == f"{second:.0%}":
+        return f"Each group has {first:.0%} of the participants."
+    return f"The two groups have {first:.0%} and {second:.0%} of the participants."
+
+
 def smallest_differences(
     contrast: Contrast,
     sizes: Sequence[int],
@@ -563,7 +570,7 @@ def smallest_differences(
     heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} divided by {members} hypotheses)"
-    both = "" if shares is None else f" The two groups contain {shares[0]:.0%} and {shares[1]:.0%} of the participants."
+    both = "" if shares is None else f" {_group_sizes(*shares)}"
     yield from ("", f"## Contrast: {contrast.described()}", "")
     at = f"{sides}, α = {strictest:.2g}{corrected}"
     within = (

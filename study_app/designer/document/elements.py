@@ -25,7 +25,7 @@ from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
 from study_app.protocol.groups import sequences_in
 from study_app.protocol.questionnaires import published_name
-from study_app.protocol.source.document import Path, entries, has, value_at
+from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.wording.languages import languages_of
 
 _TITLES: Final = ("title", "short", "text")
@@ -216,6 +216,14 @@ def kind_and_title(document: Mapping[str, Any], path: Path) -> str:
     """Return kind and title, such as "Condition Water", or only the title if it contains the kind."""
     kind, title = kind_of(path), title_of(document, path)
     return title if title.casefold().startswith(kind.casefold()) else f"{kind} {title}"
+
+
+def unique_name(document: Mapping[str, Any], path: Path) -> str:
+    """Return kind and title of an element, or kind and ID if another one has the same kind and title."""
+    name = kind_and_title(document, path)
+    others = ((*path[:1], other) for other in names(document, str(path[0]))) if len(path) == 2 else ()
+    alike = any(other != path and kind_and_title(document, other) == name for other in others)
+    return f"{kind_of(path)} {path[1]}" if alike else name
 
 
 def place_words(path: Path, line: int | None) -> str:

@@ -16,7 +16,7 @@ from study_app.haptics.model.ranges import REASON
 from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
 from study_app.number_text import counted
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
-from study_app.protocol.json_schema import schema
+from study_app.protocol.json_schema import length_texts, schema
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
@@ -403,11 +403,6 @@ _OF_NUMBERS: Final = {
 _HOLDS: Final = {
     "minimum": operator.ge, "exclusiveMinimum": operator.gt, "maximum": operator.le, "exclusiveMaximum": operator.lt,
 }  # fmt: skip
-_OF_LENGTHS: Final = {
-    "minItems": "at least {} entries",
-    "maxItems": "at most {} entries",
-    "maxLength": "at most {} characters",
-}
 _SENTENCES: Final = re.compile(r"((?:[a-z_0-9-]+, )*[a-z_0-9-]+): ([^;]+?)(?:; |\.?\Z)")
 
 
@@ -673,7 +668,7 @@ def _bound_texts(node: _Node, numbers: _Node) -> tuple[str, ...]:
     stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < NO_BOUND}
     phrases = [_OF_NUMBERS[key].format(shown_value(number)) for key, number in stated.items()]
     if "prefixItems" not in node:
-        phrases += [phrase.format(node[key]) for key, phrase in _OF_LENGTHS.items() if key in node]
+        phrases += length_texts(node)
     return (*phrases, rule_of(node["pattern"])) if "pattern" in node else tuple(phrases)
 
 

@@ -502,7 +502,7 @@ class ChoiceField(Field):
         if row.kind == "reference":
             values = [(name, f"{name} ({note})" if note else name) for name, note in row.notes]
         if shown is not None and shown not in [value for value, _ in values]:
-            values.append((shown, str(shown)))
+            values.append((shown, typed_value(shown)))
         values += [(label, label) for label, _ in row.additions]
         if [text for _, text in values] != [self.list.itemText(at) for at in range(self.list.count())]:
             self.list.clear()

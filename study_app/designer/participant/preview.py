@@ -34,7 +34,7 @@ from PySide6.QtWidgets import (
 )
 from shiboken6 import isValid
 
-from study_app.designer.document.elements import title_of
+from study_app.designer.document.elements import element_of, unique_name
 from study_app.designer.document.study import Study
 from study_app.designer.editing import Editing
 from study_app.designer.measures.study_facts import restored_part
@@ -650,15 +650,17 @@ class ParticipantPreview(Card):
         values = "only the valid parts" if self._valid is None else "the last valid values"
         own = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
         if own is None:
-            return (
-                f"There {'is' if count == 1 else 'are'} {counted(count, 'problem')} elsewhere, so {values} are shown."
-            )
+            are = f"There {'is' if count == 1 else 'are'} {counted(count, 'problem')} elsewhere"
+            if faults:
+                first_name = unique_name(study.document, element_of(study, faults[0].path))
+                are += f" ({first_name})" if count == 1 else f" (the first: {first_name})"
+            return f"{are}, so {values} are shown."
         shown = f"{values} are shown"
         if own.kind == "alike":
             shown = "the text is shown as written"
         elif own.missing_language or own.kind == "one language":
             shown = "the text is shown in another language"
-        return f"{title_of(study.document, self._selected)} has a problem ({own.message}), so {shown}."
+        return f"{unique_name(study.document, self._selected)} has a problem ({own.message}), so {shown}."
 
     def _place_ball(self, page: TaskPage, condition: str | None) -> None:
         """Move the ball to the start of its path if the tank has changed."""

@@ -170,7 +170,8 @@ def check_statements_differ(document: Document) -> Iterator[Fault]:
     """Check that a questionnaire's statements, their short names and a scale's points differ."""
     for name in names(document, "questionnaires"):
         for key in ("text", "short"):
-            yield from _repeated_texts(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item")
+            readers = "figures" if key == "short" else "participants"
+            yield from _repeated_texts(list(entries(document, f"questionnaires.{name}.items.*.{key}")), "item", readers)
     for path, labels in entries(document, "scales.*.labels.*"):
         points = [((*path, *at), label) for at, label in entries(labels, "*")]
         for _, off in entries(document, f"scales.{path[1]}.cannot_judge"):
@@ -178,7 +179,7 @@ def check_statements_differ(document: Document) -> Iterator[Fault]:
         yield from _repeated_texts(points, "label")
 
 
-def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str) -> Iterator[Fault]:
+def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str, readers: str = "participants") -> Iterator[Fault]:
     """Yield a fault for every text that looks like an earlier one; an entry may have a text per language.
 
     Readers do not distinguish texts by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
@@ -189,7 +190,7 @@ def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str) -> Iterato
         texts = entry if isinstance(entry, Mapping) else {"": entry}
         read = {(language, visible_text(text)) for language, text in texts.items() if isinstance(text, str)}
         if read & seen:
-            hint = "participants could not tell them apart: change one"
+            hint = f"{readers} could not tell them apart: change one"
             yield Fault(path, f"reads the same as an earlier {kind}", hint, kind="alike")
         seen |= read
 

@@ -13,7 +13,7 @@ from PySide6.QtGui import QCursor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.document.steps import DuplicateElement, SetText
+from study_app.designer.document.steps import DuplicateElement, SetText, SetValue
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.gui.key_presses import ignores_clicks
@@ -281,6 +281,19 @@ def test_a_copied_question_has_the_text_of_its_original_and_the_others_keep_thei
     assert tab.view.note.endswith("(reads the same as an earlier item), so the text is shown as written.")
     designer.editing.handle_request(SetText((*COPY, "text"), "en", "Another statement"))
     assert dict(statements(tab))["like_honey_2"] == "Another statement"
+
+
+def test_a_note_on_a_problem_says_which_of_two_elements_of_the_same_title_has_it(designer: Any, tab: Any) -> None:
+    for key, value in (("title", "Liquids"), ("repetitions", -1)):
+        designer.editing.handle_request(SetValue(("blocks", "delays", key), value))
+    assert "There is 1 problem elsewhere (Block delays), so the last valid values" in tab.view.note
+    designer.go_to("blocks", "delays")
+    assert tab.view.note.startswith("Block delays has a problem (")
+    designer.editing.handle_request(SetValue(("blocks", "delays", "title"), "Late"))
+    assert tab.view.note.startswith("Block Late has a problem (")
+    designer.editing.handle_request(SetValue(("device", "force_limit_n"), 60))
+    designer.go_to(*ITEM)
+    assert "There are 2 problems elsewhere (the first: " in tab.view.note
 
 
 def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:
