@@ -373,10 +373,10 @@ def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> 
     assert pd.isna(second.statistic) or second.statistic is None
 
 
-def grouped(text: str, measure: str, block: str, sequence: str) -> Protocol:
-    """Return a study that compares two groups in a measure; the first group is twice as large."""
+def grouped(text: str, measure: str, block: str, sequence: str, share: int = 2) -> Protocol:
+    """Return a study that compares two groups in a measure; the first group is ``share`` times as large."""
     contrast = f'contrasts = [{{ measure = "{measure}", blocks = ["{block}"], groups = ["a", "b"] }}]'
-    groups = f"\n[groups.a]\nshare = 2\nsequence = {sequence}\n[groups.b]\nsequence = {sequence}\n"
+    groups = f"\n[groups.a]\nshare = {share}\nsequence = {sequence}\n[groups.b]\nsequence = {sequence}\n"
     return parse((text.replace("[analysis]\n", f"[analysis]\n{contrast}\n") + groups).encode(), "grouped.toml")
 
 
@@ -404,10 +404,13 @@ def test_a_hypothesis_is_about_a_measure_that_the_design_determines(block: str, 
 
 def test_power_tells_the_smallest_difference_between_groups() -> None:
     text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
-    protocol = grouped(text, "threshold", "late", '["late", "prompt"]')
     error = math.log(1.3) / math.sqrt(2)  # the SD of the two errors is ln 1.3
     found = {("late", 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)])}
-    told = threshold_markdown(Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=found))
+    for share, sizes in (1, "Each group has 50%"), (2, "The two groups have 67% and 33%"):
+        protocol = grouped(text, "threshold", "late", '["late", "prompt"]', share)
+        precisions = Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=found)
+        told = threshold_markdown(precisions)
+        assert f"{sizes} of the participants." in told
     spread = math.hypot(math.log(1.2), math.log(1.3))
     assert f"| 20 | 3 | {spread:.0%} | – | – |" in told
     half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
