@@ -679,7 +679,10 @@ class LanguagesField(Field):
         if untranslated or "copied" in self.__dict__:
             source = language_name(untranslated[0].source) if untranslated else ""
             lacking = ", ".join(language_name(text.language) for text in untranslated)
-            self.copied.setText(f"Same text as in {source}, not yet translated into {lacking}")
+            same = f"Same text as in {source}, not yet translated into {lacking}"
+            if all(text.is_word for text in untranslated):
+                same = f"Same word as in {source}: translate it, unless {lacking} has the same word"
+            self.copied.setText(same)
             self.copied.setVisible(bool(untranslated))
         for number, (code, line) in enumerate(self.lines.items()):
             text = value.get(code, "") if isinstance(value, dict) else value if number == 0 else ""

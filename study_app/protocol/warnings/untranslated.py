@@ -41,13 +41,14 @@ class UntranslatedText(NamedTuple):
     """A text that should be in ``language`` but is in ``source``, the codes of two languages.
 
     A text that ``ships`` with the program exists there in ``source``; otherwise it equals that of another language or
-    study.
+    study. A text that ``is_word`` may be right, because a word can be the same in two languages.
     """
 
     path: Path
     language: str
     source: str
     ships: bool
+    is_word: bool
 
     @property
     def is_shown(self) -> bool:
@@ -72,14 +73,15 @@ def untranslated_at(
     texts = value if isinstance(value, Mapping) else {first: value}
     for code in languages:
         parts = _text_parts(texts.get(code))
+        is_word = len(parts) == 1 and len(parts[0].split()) == 1
         if (source := _source_language(parts, code, _shipped_texts())) is not None:
-            yield UntranslatedText(path, code, source, ships=True)
+            yield UntranslatedText(path, code, source, ships=True, is_word=is_word)
         elif code != first and texts.get(code) == texts.get(first) and not _same_words(code).issuperset(parts):
-            yield UntranslatedText(path, code, first, ships=False)
+            yield UntranslatedText(path, code, first, ships=False, is_word=is_word)
         else:
             sentences = [part for part in parts if len(part.split()) >= _SENTENCE_WORDS]
             if (source := _source_language(sentences, code, _workspace_texts(document))) is not None:
-                yield UntranslatedText(path, code, source, ships=False)
+                yield UntranslatedText(path, code, source, ships=False, is_word=False)
 
 
 def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) -> Iterator[str]:
@@ -107,9 +109,10 @@ def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText
 
 
 def check_translated(document: Mapping[str, Any]) -> None:
-    """Raise SessionError if pages would show shipped texts in another language."""
+    """Raise SessionError if pages would show shipped texts in another language, not only single words."""
     shipped = [text for text in untranslated_on_pages(document) if text.ships]
-    if texts := [text for text in shipped if text.language == shipped[0].language]:
+    wrong = next((text.language for text in shipped if not text.is_word), None)
+    if texts := [text for text in shipped if text.language == wrong]:
         language, source = language_name(texts[0].language), language_name(texts[0].source)
         count = f"{counted(len(texts), 'text')} on {language} pages {'is' if len(texts) == 1 else 'are'}"
         raise SessionError(

@@ -75,7 +75,9 @@ def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
     almost, _ = done.with_edits(Set(("pages", "thanks", "button", "fr"), "Finish"))
     told = "study.languages: 1 text is still in English, but the study's only language is French: pages.thanks.button"
     assert list(describe_untranslated(almost.document, lists_places=True)) == [told]
-    with pytest.raises(SessionError, match=r"1 text on French pages is still in English: pages\.thanks\.button;"):
+    check_translated(almost.document)  # French might have the same word
+    almost, _ = almost.with_edits(Set(("pages", "thanks", "title", "fr"), "Thank you"))
+    with pytest.raises(SessionError, match="2 texts on French pages are still in English: pages.thanks.title,"):
         check_translated(almost.document)
 
 
