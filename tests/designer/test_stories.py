@@ -870,6 +870,8 @@ def hypotheses(story: Story) -> None:
         assert [line().second.itemText(at) for at in range(line().second.count())] == [*compared]
 
     story.press("Add a hypothesis")
+    stated("feels_liquid", "thin thick")
+    story.choose(line().relation, "is higher than")
     stated("feels_liquid", "thin thick", expected="higher")
     offered("Thick in Liquids")
     story.choose(line().first, "Late in Delays")
@@ -908,10 +910,10 @@ def hypotheses(story: Story) -> None:
     story.press("Add a hypothesis")
     story.choose(line().first, "A, Prompt in Delays − Late in Delays")
     pair = {"blocks": ("delays",), "groups": ("a", "b"), "conditions": ("prompt", "late")}
-    assert designer.value(*contrasts) == ({"measure": "harder", "expected": "higher", **pair},)
     offered("B, Prompt in Delays − Late in Delays")
-    story.choose(line().relation, "is different from")
     assert designer.value(*contrasts) == ({"measure": "harder", **pair},)
+    story.choose(line().relation, "is higher than")
+    assert designer.value(*contrasts) == ({"measure": "harder", "expected": "higher", **pair},)
     assert [line().first.currentText(), line().second.currentText()] == [
         f"{group}, Prompt in Delays − Late in Delays" for group in ("A", "B")
     ]
@@ -952,7 +954,6 @@ def two_conditions(story: Story) -> None:
     story.play(":blocks.viscosity_2.title ctrl+a 'Viscosity, late' Return @sequence")
     story.act("balanced", designer.field("study", "block_order").segments.buttons[1].click)
     story.press("Add a hypothesis")
-    story.choose(designer.field("analysis", "contrasts").lines[0].relation, "is different from")
     story.play("Insert 'nasa' Return")
     story.act("ask", next(one for one in head.asks.actions() if one.text().startswith("After each block")).trigger)
     assert designer.study.faults == ()

@@ -372,7 +372,7 @@ GROUP_ASSIGNMENT: Final = SpecialEditor(
 
 _MEASURES: Final = tuple(zip(OF_LEVELS, ("Threshold", "Exponent", "Sensitivity d′", "Setting (PSE)"), strict=True))
 _RELATIONS: Final = (
-    ("higher", "is higher than"), ("lower", "is lower than"), (None, "is different from"), ("equal", "is equal to"),
+    (None, "is different from"), ("higher", "is higher than"), ("lower", "is lower than"), ("equal", "is equal to"),
 )  # fmt: skip
 BOUND, RATIO = 0.5, 1.25
 _NOTHING_TO_COMPARE: Final = (
@@ -628,9 +628,7 @@ class _HypothesesField(Field):
     def _add_hypothesis(self) -> None:
         first: Compared = self.row.facts[0]
         second = first.comparable_with(self.row.facts)[0]
-        value = _comparison_keys(first, second, first.shared_measures(second)[0][0]) | _relation_keys(
-            _RELATIONS[0][0], None
-        )
+        value = _comparison_keys(first, second, first.shared_measures(second)[0][0])
         self.asked.emit(AddEntry(self.row.path, value))
 
     def _refuse(self, why: str) -> None:

@@ -77,7 +77,7 @@ def test_the_count_goes_down_with_each_text_and_ends_at_none() -> None:
     assert list(describe_untranslated(almost.document, lists_places=True)) == [told]
     check_translated(almost.document)  # French might have the same word
     almost, _ = almost.with_edits(Set(("pages", "thanks", "title", "fr"), "Thank you"))
-    with pytest.raises(SessionError, match="2 texts on French pages are still in English: pages.thanks.title,"):
+    with pytest.raises(SessionError, match=r"2 texts on French pages .* pages\.thanks\.title,"):
         check_translated(almost.document)
 
 
