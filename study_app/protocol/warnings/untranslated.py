@@ -97,10 +97,10 @@ def describe_untranslated(document: Mapping[str, Any], *, lists_places: bool) ->
         if only_one:
             what = f"{are} still in {stated}, but the study's only language is {wanted}"
         of_these = [text for text in texts if (text.language, text.source) == (language, source)]
+        place, more = _place_text(of_these[0]), "; this is the first of them" if count > 1 else ""
         if lists_places:
-            yield f"study.languages: {what}: {listed_places(of_these)}"
-        else:
-            yield f"{_place_text(of_these[0])}: {what}{'; this is the first of them' if count > 1 else ''}"
+            place, more = "study.languages", f": {listed_places(of_these)}"
+        yield f"{place}: {what}{more}"
 
 
 def untranslated_on_pages(document: Mapping[str, Any]) -> tuple[UntranslatedText, ...]:
