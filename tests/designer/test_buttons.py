@@ -1,0 +1,165 @@
+"""Every button of a form changes what its name says and nothing else; one undo takes it back, and a redo repeats it."""
+
+import re
+from collections.abc import Callable, Iterable, Mapping
+from copy import deepcopy
+from functools import reduce
+from operator import getitem
+from typing import Any
+
+import pytest
+from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
+
+from study_app.designer.document.fields import Row, rows
+from study_app.designer.document.toml_edits import Set
+from study_app.designer.form.card import RowWidget
+from study_app.designer.form.lists import EntryRow
+from study_app.protocol.source.document import Path
+from tests.designer.support.inputs import name_of
+
+pytestmark = pytest.mark.slow
+
+OPENS_ELSEWHERE = re.compile("Open |Glossary$|Series |Feel |Delete$|Add Trial design$|.*…$")
+"""Buttons that only open something, Delete, which may ask first, and a trial design, which adds more than itself."""
+CONDITIONS = ("late", "thin", "prompt", "thick")
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items()}
+    return [_plain(inner) for inner in value] if isinstance(value, list | tuple) else value
+
+
+def _at(study: Any, path: Path) -> Any:
+    return reduce(getitem, path, study)
+
+
+def _lists(value: Any) -> list[list[Any]]:
+    """Return a list, or the lists of each language."""
+    return [value] if isinstance(value, list) else list(value.values())
+
+
+def _move(items: list[Any], at: int, name: str) -> None:
+    items.insert(at + (1 if name.endswith("down") else -1), items.pop(at))
+
+
+
+def _expected(before: Any, after: Any, path: Path, row: Row | None, at: int | None, name: str) -> Any:
+    """Return the document that a button should leave; what a new element holds is taken from ``after``."""
+    study = deepcopy(before)
+    element, parent = _at(study, path), _at(study, path[:-1])
+    is_entry = isinstance(path[-1], int)
+    order = parent if is_entry else study["sequence"]
+    match name.split():
+        case ["Move", *_]:
+            items, place = (order, order.index(element) if is_entry else order.index(path[-1])) if row is None else (_at(study, row.path), at)
+            _move(items, place, name)
+        case ["Duplicate"] if is_entry:
+            parent.insert(path[-1] + 1, element | {"id": _at(after, (*path[:-1], path[-1] + 1))["id"]})
+        case ["Duplicate"]:
+            ids = list(_at(after, path[:-1]))
+            copy = ids[ids.index(path[-1]) + 1]
+            assert copy not in parent
+            own = {key: _at(after, (*path[:-1], copy))[key] for key in ("code_prefix",) if key in element}
+            assert all(own[key] != element[key] for key in own)
+            parent[copy] = element | own
+            if path[-1] in order:
+                order.insert(order.index(path[-1]) + 1, copy)
+        case ["Remove", "Point", number] if row is not None:
+            for labels in _lists(_at(study, row.path)):
+                del labels[int(number) - 1]
+        case ["Remove", *_] if at is not None and row is not None:
+            del _at(study, row.path)[at]
+        case ["Remove", *label, "from", "the", "file"]:
+            gone = next(one.path for one in rows(before, path) if one.label == " ".join(label)) if row is None else row.path
+            assert row is None or row.label == " ".join(label)
+            del _at(study, gone[:-1])[gone[-1]]
+        case ["Add", *_] if row is not None and row.value is None:
+            assert len(_at(after, row.path)) == 1
+            return _with(study, row.path, _at(after, row.path))
+        case ["Add", *_] if row is not None:
+            for labels, more in zip(_lists(_at(study, row.path)), _lists(_at(after, row.path)), strict=True):
+                labels.append(more[-1])
+        case ["Add", *label]:
+            key = next(one.path[-1] for one in rows(before, path) if one.label == " ".join(label))
+            assert key not in element
+            element[key] = _at(after, (*path, key))
+        case _ if row is not None and row.instead and row.label != name:
+            key = next(one.path[-1] for one in rows(before, path) if one.label == name)
+            del element[row.path[-1]]
+            element[key] = _at(after, (*path, key))
+        case _ if row is not None and row.label != name and row.choices:
+            chosen = str(_at(after, row.path))
+            assert re.sub(r"\W", "", name).lower().startswith(re.sub(r"\W", "", chosen))
+            holder = path if row.path[: len(path)] == path else row.path[:-1]
+            return _with(study, holder, _at(after, holder))
+        case _ if row is not None and row.label == name:
+            return _with(study, row.path, not (row.default if row.value is None else row.value))
+        case _:
+            pytest.fail(f"no rule for the button {name!r} of {path}")
+    return study
+
+
+def _with(study: Any, path: Path, value: Any) -> Any:
+    parent = study if len(path) == 1 else study.setdefault(path[0], {}) if len(path) == 2 else _at(study, path[:-1])
+    parent[path[-1]] = value
+    return study
+
+
+def _ancestor(part: Any, kind: type[QWidget]) -> Any:
+    while part is not None and not isinstance(part, kind):
+        part = part.parentWidget()
+    return part
+
+
+def _usable_buttons(designer: Any) -> dict[tuple[Any, Any, str], QAbstractButton]:
+    """Return the buttons of the form that can be pressed, by path of the row, number of the entry, and name."""
+    buttons = {}
+    for button in designer.place.form.findChildren(QAbstractButton):
+        if button.isVisible() and button.isEnabled() and name_of(button) and not button.isChecked():
+            row, entry = _ancestor(button, RowWidget), _ancestor(button, EntryRow)
+            at = row.field.rows.index(entry) if entry is not None else None
+            buttons[None if row is None else row.row.path, at, name_of(button)] = button
+    return buttons
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        ("blocks", "liquids"),
+        ("conditions", "thin"),
+        ("limits",),
+        ("pages", "reaching"),
+        ("questionnaires", "liquid"),
+        ("questionnaires", "liquid", "items", 1),
+        ("scales", "agreement"),
+        ("tasks", "explore"),
+    ],
+    ids=str,
+)
+def test_each_button_of_a_form_changes_what_its_name_says(designer: Any, path: Path) -> None:
+    designer.open("kitchen")
+    designer.editing.make_step("Change", Set(("blocks", "liquids", "conditions"), CONDITIONS))
+    designer.go_to(*path)
+    before, text, editing = _plain(designer.study.document), designer.text, designer.editing
+    repeated: set[str] = set()
+    for of_row, at, name in _usable_buttons(designer):
+        if OPENS_ELSEWHERE.match(name):
+            continue
+        designer.go_to(*path)
+        row = None if of_row is None else designer.form_row(*of_row).row
+        _usable_buttons(designer)[of_row, at, name].click()
+        QApplication.processEvents()
+        changed, after = designer.text, _plain(designer.study.document)
+        if changed == text:
+            assert designer.messages or designer.form_row(*of_row).wrong.isVisible(), (of_row, name)
+            continue
+        assert after == _expected(before, after, path, row, at, name), (of_row, at, name)
+        editing.undo()
+        assert designer.text == text, (of_row, at, name)
+        if name.split()[0] not in repeated:
+            repeated.add(name.split()[0])
+            editing.redo()
+            assert designer.text == changed, (of_row, at, name)
+            editing.undo()
+    assert repeated
