@@ -18,6 +18,7 @@ from study_app.designer.controller import DesignerController
 from study_app.designer.document.steps import SetValue
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.protocol.source.files import protocol_hash, shipped_file
+from study_app.store.drafts import draft_of
 from study_app.store.study_versions import kept_content, kept_versions
 from tests.designer.support.designer import Designer
 from tests.designer.support.runs import run
@@ -216,3 +217,14 @@ def test_the_version_of_a_session_in_results_leads_to_what_changed(
     visit.window.deleteLater()
     designer.window.deleteLater()
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def test_a_text_that_is_being_typed_is_in_the_draft_when_the_designer_is_left(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    line = designer.field("study", "version").line
+    designer.fill(line, "3.7", keys="")
+    designer.saving.leave()
+    draft = draft_of(designer.file)
+    assert draft is not None
+    assert draft.text == designer.text
+    assert designer.value("study", "version") == "3.7"

@@ -8,7 +8,9 @@ from study_app.protocol.load import parse
 from study_app.protocol.streams import stream
 from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
+from study_app.store.progress import Progress
 from study_app.store.receipt import without_conditions
+from tests.journal_lines import event_of
 from tests.protocol.trials.level_studies import text_of
 
 
@@ -42,3 +44,22 @@ def test_sessions_are_listed_while_a_participant_is_withdrawn(tmp_path: Path, mo
 
     monkeypatch.setattr(Path, "glob", folder_that_goes)
     assert study.ids() == ("P002",)
+
+
+def test_each_step_lasts_from_its_first_page_to_the_next_without_the_time_of_a_gap() -> None:
+    progress = Progress()
+    for line in (
+        event_of("page_shown", t_s=2.0, page="welcome"),
+        event_of("page_left", t_s=9.0, page="welcome"),
+        event_of("trial_started", t_s=10.0, trial=1, attempt=1),
+        event_of("trial_started", t_s=13.0, trial=1, attempt=2),
+        event_of("session_resumed", t_s=113.0),
+        event_of("trial_started", t_s=115.0, trial=1, attempt=3),
+        event_of("responses", t_s=120.0, trial=1, attempt=3),
+        event_of("form_shown", t_s=121.5, form="end"),
+    ):
+        progress.process_line(line)
+    assert (progress.here, progress.here_since_s, progress.away_s) == (2, 121.5, 100.0)
+    assert progress.durations_s == {0: 10.0 - 2.0, 1: 121.5 - 10.0 - 100.0}
+    progress.process_line(event_of("session_ended", t_s=125.0, status="completed"))
+    assert progress.durations_s[2] == 125.0 - 121.5

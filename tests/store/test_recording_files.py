@@ -208,3 +208,34 @@ def test_frames_that_do_not_fit_leave_nothing(tmp_path: Path) -> None:
     with files_up_to(10_000), pytest.raises(StoreError, match="File too large"):
         write_frames(tmp_path / "frames.parquet", shown, FACTS)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"first_device_force_n": [1.0, 2.0]},
+        {"first_device_force_n": [1.0, 2.0, "3"]},
+        {"first_command_n": [1.0]},
+        {"first_command_n": 7},
+        {"crc32": {"rows": 1.5, "device_force": [1], "effect_force": [2]}},
+        {"crc32": {"rows": 1, "device_force": [1.5], "effect_force": [2]}},
+        {"crc32": {"rows": 1, "device_force": [1], "effect_force": ["2"]}},
+        {"crc32": {"rows": 1, "device_force": [1]}},
+        {"first_device_force_n": None},
+    ],
+    ids=str,
+)
+def test_a_wrong_fact_of_samples_is_told_before_they_are_read(
+    tmp_path: Path, samples_of: Make, changed: dict[str, Any]
+) -> None:
+    path = write(tmp_path / "trial-003.parquet", samples_of(10)).path
+    whole, facts = parquet.read_table(path), json.loads(parquet.read_metadata(path).metadata[b"liquid_study"])
+    for told, is_wrong in ((facts | {"first_device_force_n": [1, None, 0.5]}, False), (facts | changed, True)):
+        with parquet.ParquetWriter(path, whole.schema) as writer:
+            writer.write_table(whole)
+            writer.add_key_value_metadata({b"liquid_study": json.dumps(told)})
+        if is_wrong:
+            with pytest.raises(StoreError, match=r"trial-003\.parquet is not a recording made by this program"):
+                read_facts(path)
+        else:
+            assert read_facts(path)["rows"] == 10

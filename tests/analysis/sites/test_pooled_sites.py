@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from study_app.analysis.data import study_tables
+from study_app.analysis.data.blocks import OtherQuestions, PlacedQuestion, PlacedScore, QuestionPlace, Setting
 from study_app.analysis.data.study_tables import load_study, pool_sites
 from study_app.analysis.export_study import export
 from study_app.analysis.planning.preregistration import FILE, Commitment, commitment_lines, deviations
@@ -201,3 +203,23 @@ def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) 
 
 def site_folders(root: Path) -> list[Path]:
     return [root / "pooled/sites" / site for site in "AB"]
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_questions_of_sites_are_pooled_with_the_settings_of_every_site(is_open: bool) -> None:
+    def asked(site: str, codes: str) -> OtherQuestions:
+        settings = tuple(Setting(code=code, condition=f"c{code}" if is_open else None) for code in codes)
+        placed = [
+            PlacedQuestion(QuestionPlace(f"q{number}", f"Title {number} of {site}", number == 1, settings[number:]), *2 * [None])
+            for number in range(2)
+        ]
+        return OtherQuestions(tuple(placed), (PlacedScore(placed[1].where, "total", None, None, (placed[0],)),))
+
+    pooled = study_tables._pooled_questions({"A": asked("A", "xy"), "B": asked("B", "yz")})
+    codes = (["cx", "cy", "cz"], ["cy", "cz"]) if is_open else (["A-x", "A-y", "B-y", "B-z"], ["A-y", "B-z"])
+    places = [one.where for one in (*pooled.questions, *pooled.scores, *pooled.scores[0].questions)]
+    assert [[setting.code for setting in where.settings] for where in places] == [*codes, codes[1], codes[0]]
+    assert [(where.id, where.title, where.is_form) for where in places[:2]] == [
+        ("q0", "Title 0 of A", False),
+        ("q1", "Title 1 of A", True),
+    ]

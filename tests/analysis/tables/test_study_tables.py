@@ -9,7 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from study_app.analysis.data.study_tables import Study, load_study
+from study_app.analysis.data.study_tables import Study, group_counts, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
@@ -251,3 +251,11 @@ def test_an_opened_key_that_was_changed_is_refused(rek: Results) -> None:
     (rek.folder / "blinding" / "key.sealed").write_bytes(b"e30=")
     with pytest.raises(StoreError, match=r"key\.sealed"):
         load_study(rek.folder)
+
+
+def test_groups_are_counted_by_participant_in_the_order_of_their_names() -> None:
+    settings = made_up.liquids(2)
+    found = made_up.study(settings, list(made_up.everybody(settings, 6, lambda *_: 4, sessions=2)))
+    groups = pd.array([name for name in ("zeta", "alpha", "mid", "alpha", "mid", "alpha") for _ in range(2)], "string")
+    study = replace(found, participants=found.participants.assign(group=groups))
+    assert list(group_counts(study).items()) == [("alpha", 3), ("mid", 2), ("zeta", 1)]

@@ -26,11 +26,13 @@ from study_app.designer.document.fields import (
     named_at,
     orphaned_keys,
     references_to,
+    rows,
     with_references,
 )
 from study_app.designer.document.steps import DuplicateElement, MakeSeries, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
+from study_app.designer.form import special
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
 from study_app.designer.templates import FOLDER
 from study_app.errors import StudyError
@@ -294,3 +296,21 @@ def with_question(text: str, short: str) -> Study:
 def test_a_short_text_that_says_what_the_text_says_follows_it(text: str, short: str, found: dict[Any, str]) -> None:
     edits = short_text_edits(with_question(text, short), (*ITEM, "text"), "en", "Was it cold?")
     assert {edit.path[len(ITEM) :]: edit.value for edit in edits} == found  # type: ignore[union-attr]
+
+
+def test_the_id_of_a_copy_with_a_long_number_is_as_long_as_permitted() -> None:
+    path = ("conditions", "d" * MAX_ID)
+    study, _ = DEMO.with_edits(*edits_to_rename(DEMO.document, ("conditions", "late"), path[1]))
+    row = number_row(study.document, path, (*path, "delay_ms"))
+    for value, ending in ((7, "_7"), (12.25, "_12_25"), (125, "_125")):
+        copy = edits_to_copy_with(study, path, row, value)[1]
+        assert copy == ("conditions", "d" * (MAX_ID - len(ending)) + ending)
+
+
+def test_points_of_a_scale_are_listed_language_by_language_and_those_of_the_study_first() -> None:
+    labels = {"fr": ["non", "oui"], "en": ["no", "maybe", "yes"], "nl": ["nee"]}
+    study, _ = DEMO.with_edits(Set(("study", "languages"), ["nl", "en"]), Set(("scales", "agreement", "labels"), labels))
+    row = next(row for row in rows(study.document, ("scales", "agreement")) if row.path[-1] == "labels")
+    points = special._scale_points(study, row)
+    assert points.languages == (("nl", "Dutch"), ("en", "English"), ("fr", "French"))
+    assert points.points == (("nee", "no", "non"), ("", "maybe", "oui"), ("", "yes", ""))

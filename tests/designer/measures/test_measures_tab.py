@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QLabel, QWidget
 from study_app.analysis.planning.preregistration import preregistration_of
 from study_app.designer.document.steps import RetypeFile
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.measures.cards import CardGrid, MeasureCard
 from study_app.designer.measures.simulation import Simulated
 from study_app.workers.server import Crashed
 from tests.designer.measures.conftest import Worker, open_viscosity_block
@@ -147,3 +148,18 @@ def test_trials_that_would_be_lost_are_shown_above_the_power(qtbot: Any, designe
     worker.given.append((1, Simulated(lost=("4 of 4 trials would not be delivered",), waiting=WAITING)))
     qtbot.waitUntil(lost.isVisible)
     assert lost.text() == "4 of 4 trials would not be delivered."
+
+
+def test_cards_fill_two_columns_and_a_wide_or_last_one_takes_both(qtbot: Any) -> None:
+    grid = CardGrid(lambda _path: None)
+    qtbot.addWidget(grid)
+    for titles, places in (
+        ("abCd", {"a": (0, 0, 1, 1), "b": (0, 1, 1, 1), "C": (1, 0, 1, 2), "d": (2, 0, 1, 2)}),
+        ("aCbD", {"C": (0, 0, 1, 2), "a": (1, 0, 1, 1), "b": (1, 1, 1, 1), "D": (2, 0, 1, 2)}),
+    ):
+        before = {part.shown.title: part for part in grid.parts}
+        grid.show_cards(tuple(MeasureCard(title, wide=title.isupper()) for title in titles))
+        shown = {part.shown.title: part for part in grid.parts}
+        assert {title: grid.grid.getItemPosition(grid.grid.indexOf(part)) for title, part in shown.items()} == places
+        assert [grid.grid.rowStretch(row) for row in range(5)] == [0, 0, 0, 1, 0]
+    assert (shown["a"], shown["C"] is before["C"]) == (before["a"], False), "the same card at the same place is kept"

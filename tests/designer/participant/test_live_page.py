@@ -1,6 +1,7 @@
 """The tab Participant: which page and texts it shows, and how keys, mouse and edits reach it."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -302,3 +303,14 @@ def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainte
     field.retract_answer()
     designer.editing.handle_request(SetText((*ITEM, "text"), "en", "Was it like honey?"))
     assert answers(live) == {}
+
+
+def test_the_page_has_the_size_of_the_chosen_screen(designer: Any, live: Any) -> None:
+    preview = designer.controller.preview
+    names = [preview.screens.itemText(at) for at in range(preview.screens.count())]
+    assert len(set(names)) == len(names) >= 2
+    for at in (*range(len(names)), 0):
+        preview.screens.setCurrentIndex(at)
+        preview.screens.activated.emit(at)
+        width, height = (int(number) for number in re.findall(r"(\d+) × (\d+)", names[at])[-1])
+        assert (live.page_size.width(), live.page_size.height()) == (width, height)

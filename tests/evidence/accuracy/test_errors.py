@@ -6,7 +6,10 @@ from collections import namedtuple
 import numpy as np
 import pytest
 
-from study_app.evidence.accuracy.comparison import Row, Time, pareto_front
+from matplotlib.figure import Figure
+
+from study_app.evidence.accuracy import accuracy_report
+from study_app.evidence.accuracy.comparison import Accuracy, ActingError, Row, Time, pareto_front
 from study_app.evidence.reference_solutions import Case, Error, Truth, error_of
 from study_app.haptics.model.motion import Motion
 
@@ -60,3 +63,20 @@ def test_the_front_takes_rounding_errors_and_times_within_a_twentieth_as_equal()
     assert [candidate.name for candidate in pareto_front(points)] == ["quick", "sums"]
     alike = dict([row("quick", 100, 0.5), row("truer", 104, 0.1), row("truest", 150, 0.01)])
     assert [candidate.name for candidate in pareto_front(alike)] == ["truer", "truest"]
+
+
+def test_each_estimator_is_drawn_at_its_time_and_errors_with_their_axes_named() -> None:
+    errors = [("ewma", 1, 21.0, 40.0, 11.0), ("ewma", 3, 25.0, 90.0, 30.0), ("kalman", 2, 63.0, 17.0, 13.0)]
+    acting = tuple(ActingError(*row) for row in errors)
+    found = Accuracy(rows=(), truths=(), notes=(), machine="", motion="", acting=acting, acting_liquid="Water")
+    figure = Figure(figsize=(6, 4))
+    accuracy_report._draw_acting(figure, found, 288.0)
+    (axes,) = figure.axes
+    assert (axes.get_xlabel(), axes.get_title()) == ("Computation time per tick [ns]", "Error [% of the force]")
+    places = [tuple(part.get_offsets()[0]) for part in axes.collections]
+    assert places == [(23, 40), (23, 11), (23, 90), (23, 30), (63, 17), (63, 13)]
+    texts = {text.get_text(): text.xy for text in axes.texts}
+    assert texts == {"1": (23, 40), "3": (23, 90), "2": (63, 17), "ewma": (23, 60), "kalman": (63, 17)}
+    (low, high), (left, right) = axes.get_ylim(), axes.get_xlim()
+    assert low < 11 < 90 < high
+    assert left < 21 < 63 < right

@@ -1,6 +1,7 @@
 """The operator's window draws a view and says what the operator asks for."""
 
 import sys
+from dataclasses import replace
 
 import pytest
 from PySide6.QtCore import Qt, QTimer
@@ -112,3 +113,38 @@ def test_an_ended_session_that_waits_for_the_disk_says_that_the_window_stays_ope
     assert "leave this window open" in running.banner.then.text()
     running.show_view(told.view(health, trouble="the device stopped responding", force_on=False))
     assert running.banner.then.text().startswith("The session is closed")
+
+
+STATES = {
+    "preparing": ("neutral", "clock"),
+    "running": ("accent", "play"),
+    "paused": ("warn", "pause"),
+    "force off": ("warn", "stop"),
+    "trouble": ("bad", "warning"),
+    "ended": ("neutral", "cross"),
+}
+
+
+def test_each_chip_of_the_header_shows_its_own_state(window, told, health):
+    header, view = window.header, told.view(health)
+    for state, sign in STATES.items():
+        window.show_view(replace(view, state=state, state_word=f"Word of {state}"))
+        assert (header.state.tone, header.state.icon, header.state.word) == (*sign, f"Word of {state}")
+    window.show_view(replace(view, state="ended", state_word="Complete"))
+    assert (header.state.tone, header.state.icon) == ("ok", "check")
+    for blinding, icon, word in (("single", "eye", "Single-blind"), ("double", "lock", "Double-blind")):
+        window.show_view(replace(view, blinding=blinding))
+        assert (header.blind.icon, header.blind.word) == (icon, word)
+    for saved_ago_s, over, icon, word in (
+        (None, False, "ring", "Nothing to save yet"),
+        (1.9, False, "check", "Just saved to disk"),
+        (2.1, False, "check", "All saved to disk"),
+        (1.9, True, "check", "All saved to disk"),
+    ):
+        window.show_view(replace(view, saved_ago_s=saved_ago_s, over=over))
+        assert (header.saved.icon, header.saved.word) == (icon, word)
+    window.show_view(
+        replace(view, study="Study", who="P7", elapsed_s=61, expected_s=770, main_trials=(3, 8), trials_line="3 of 8")
+    )
+    assert [part.text() for part in (header.clock, header.expected, header.trials)] == ["1:01", "of about 13 min", "3 of 8"]
+    assert (header.study.accessibleName(), header.who.accessibleName()) == ("Study", "P7")

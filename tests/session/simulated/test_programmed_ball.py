@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
+from study_app.session.simulated import observers
 from study_app.session.simulated.observers import ProgrammedBall
 
 TANK_M = (0.12, 0.1, 0.08)
@@ -51,3 +52,17 @@ def test_a_hidden_ball_is_drawn_during_the_lead_alone() -> None:
     assert not ball.view(0.5).ball_hidden
     assert ball.view(1.5).ball_hidden
     assert ball.view(0.5).position_m == pytest.approx(task.target_m(0.5), abs=1e-4)
+
+
+def test_a_stroke_goes_straight_from_rest_to_rest_at_its_mean_pace() -> None:
+    begin_m, end_m, pace_mps = np.array([0.01, -0.02, 0.03]), np.array([0.05, 0.01, 0.03]), 0.1
+    places_m = np.vstack([begin_m, observers._stroke(begin_m, end_m, pace_mps)])
+    assert places_m[-1] == pytest.approx(end_m, abs=1e-15)
+    done = (places_m - begin_m) @ (end_m - begin_m) / 0.05**2
+    assert places_m == pytest.approx(begin_m + done[:, None] * (end_m - begin_m), abs=1e-15)
+    steps = np.diff(done)
+    assert (steps > 0).all()
+    assert steps == pytest.approx(steps[::-1], abs=1e-12)
+    assert steps.max() * len(steps) == pytest.approx(1.875, rel=0.01)
+    assert steps[0] * len(steps) < 0.01
+    assert len(steps) == observers._rows(0.05 / pace_mps)
