@@ -161,5 +161,5 @@ def test_cards_fill_two_columns_and_a_wide_or_last_one_takes_both(qtbot: Any) ->
         grid.show_cards(tuple(MeasureCard(title, wide=title.isupper()) for title in titles))
         shown = {part.shown.title: part for part in grid.parts}
         assert {title: grid.grid.getItemPosition(grid.grid.indexOf(part)) for title, part in shown.items()} == places
-        assert [grid.grid.rowStretch(row) for row in range(5)] == [0, 0, 0, 1, 0]
+        assert not any(grid.grid.rowStretch(row) for row, *_ in places.values())
     assert (shown["a"], shown["C"] is before["C"]) == (before["a"], False), "the same card at the same place is kept"

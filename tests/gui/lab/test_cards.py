@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PySide6.QtGui import QColor
 
 from study_app.gui.lab.lab_state import LabView
 from study_app.lab.shadow import Trace
@@ -41,6 +42,6 @@ def test_each_name_in_a_legend_is_that_of_the_curve_in_its_colour(place: Any, st
             (place.speed, {"body": 1.0, "wake of A": 2.0, "wake of B": 3.0}),
             (place.force, {force_a: 4.0, force_b: 5.0}),
         ):
-            colours = {style.colour(card.plot.theme): text for style, text in card.legend._entries}
+            colours = {QColor(style.colour(card.plot.theme)).name(): text for style, text in card.legend._entries}
             curves = {colours[curve.opts["pen"].color().name()]: curve.getData()[1] for curve in card.plot.curves}
             assert {name: set(values) for name, values in curves.items()} == {name: {v} for name, v in names.items()}
