@@ -1,19 +1,17 @@
 """Every button of a form changes what its name says and nothing else; one undo takes it back, and a redo repeats it."""
 
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from functools import reduce
 from operator import getitem
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QAbstractButton, QApplication, QWidget
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel
 
 from study_app.designer.document.fields import Row, rows
 from study_app.designer.document.toml_edits import Set
-from study_app.designer.form.card import RowWidget
-from study_app.designer.form.lists import EntryRow
 from study_app.protocol.source.document import Path
 from tests.designer.support.inputs import name_of
 
@@ -43,7 +41,6 @@ def _move(items: list[Any], at: int, name: str) -> None:
     items.insert(at + (1 if name.endswith("down") else -1), items.pop(at))
 
 
-
 def _expected(before: Any, after: Any, path: Path, row: Row | None, at: int | None, name: str) -> Any:
     """Return the document that a button should leave; what a new element holds is taken from ``after``."""
     study = deepcopy(before)
@@ -51,9 +48,10 @@ def _expected(before: Any, after: Any, path: Path, row: Row | None, at: int | No
     is_entry = isinstance(path[-1], int)
     order = parent if is_entry else study["sequence"]
     match name.split():
+        case ["Move", *_] if row is not None:
+            _move(_at(study, row.path), at, name)
         case ["Move", *_]:
-            items, place = (order, order.index(element) if is_entry else order.index(path[-1])) if row is None else (_at(study, row.path), at)
-            _move(items, place, name)
+            _move(order, path[-1] if is_entry else order.index(path[-1]), name)
         case ["Duplicate"] if is_entry:
             parent.insert(path[-1] + 1, element | {"id": _at(after, (*path[:-1], path[-1] + 1))["id"]})
         case ["Duplicate"]:
@@ -71,7 +69,8 @@ def _expected(before: Any, after: Any, path: Path, row: Row | None, at: int | No
         case ["Remove", *_] if at is not None and row is not None:
             del _at(study, row.path)[at]
         case ["Remove", *label, "from", "the", "file"]:
-            gone = next(one.path for one in rows(before, path) if one.label == " ".join(label)) if row is None else row.path
+            sections = (section.path for section in rows(before, path) if section.label == " ".join(label))
+            gone = next(sections) if row is None else row.path
             assert row is None or row.label == " ".join(label)
             del _at(study, gone[:-1])[gone[-1]]
         case ["Add", *_] if row is not None and row.value is None:
@@ -106,19 +105,16 @@ def _with(study: Any, path: Path, value: Any) -> Any:
     return study
 
 
-def _ancestor(part: Any, kind: type[QWidget]) -> Any:
-    while part is not None and not isinstance(part, kind):
-        part = part.parentWidget()
-    return part
-
-
 def _usable_buttons(designer: Any) -> dict[tuple[Any, Any, str], QAbstractButton]:
     """Return the buttons of the form that can be pressed, by path of the row, number of the entry, and name."""
     buttons = {}
     for button in designer.place.form.findChildren(QAbstractButton):
         if button.isVisible() and button.isEnabled() and name_of(button) and not button.isChecked():
-            row, entry = _ancestor(button, RowWidget), _ancestor(button, EntryRow)
-            at = row.field.rows.index(entry) if entry is not None else None
+            row = next((row for row in designer.place.form.rows if row.isAncestorOf(button)), None)
+            entries = getattr(getattr(row, "field", None), "rows", None)
+            at = None
+            if isinstance(entries, list):
+                at = next((place for place, entry in enumerate(entries) if entry.isAncestorOf(button)), None)
             buttons[None if row is None else row.row.path, at, name_of(button)] = button
     return buttons
 
@@ -133,7 +129,6 @@ def _usable_buttons(designer: Any) -> dict[tuple[Any, Any, str], QAbstractButton
         ("questionnaires", "liquid"),
         ("questionnaires", "liquid", "items", 1),
         ("scales", "agreement"),
-        ("tasks", "explore"),
     ],
     ids=str,
 )
@@ -163,3 +158,39 @@ def test_each_button_of_a_form_changes_what_its_name_says(designer: Any, path: P
             assert designer.text == changed, (of_row, at, name)
             editing.undo()
     assert repeated
+
+
+def test_each_entry_of_a_questionnaires_menu_asks_it_where_the_entry_says(designer: Any) -> None:
+    designer.open("kitchen", "questionnaires", "liquid")
+    text, block, places = designer.text, ("blocks", "delays", "questionnaire"), {}
+    for at, words in enumerate([entry.text() for entry in designer.place.form.head.asks.actions()]):
+        designer.place.form.head.asks.actions()[at].trigger()
+        places[words.partition("\t")[0]] = " ".join(designer.value("sequence")), designer.value(*block)
+        designer.editing.undo()
+        assert designer.text == text
+    assert places == {
+        "Before the first block": ("welcome liquid liquids reaching delays thanks", "delay"),
+        "After each trial of Delays": ("welcome liquids reaching delays thanks", "liquid"),
+        "After Liquids": ("welcome liquids liquid reaching delays thanks", "delay"),
+        "After Delays": ("welcome liquids reaching delays liquid thanks", "delay"),
+        "After each block": ("welcome liquids liquid reaching delays liquid thanks", "delay"),
+        "At the end": ("welcome liquids reaching delays liquid thanks", "delay"),
+    }
+
+
+UNITS = {"mm": "mm", "s": "s", "ms": "ms", "n": "N", "hz": "Hz", "percent": "%", "nspm": "N·s/m", "kg_m3": "kg/m³"}
+
+
+def test_each_number_of_a_form_has_the_unit_of_its_key_beside_it(designer: Any) -> None:
+    designer.open("kitchen")
+    units = set()
+    for path in (("device",), ("limits",), ("liquids", "thin"), ("conditions", "late"), ("tasks", "reach")):
+        designer.go_to(*path)
+        for part in designer.place.form.rows:
+            key = str(part.row.path[-1])
+            unit = next((unit for suffix, unit in UNITS.items() if key.endswith(f"_{suffix}")), "")
+            texts = {shown.text() for shown in part.findChildren(QLabel) if not shown.isHidden()}
+            if part.row.kind in {"number", "whole number"}:
+                assert texts & {*UNITS.values()} == {unit} - {""}, part.row.path
+                units.add(unit)
+    assert units == {"", "mm", "s", "ms", "N", "Hz", "%", "kg/m³"}

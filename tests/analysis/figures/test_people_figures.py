@@ -1,14 +1,20 @@
 """Figures of people: every number is a point, means stand beside them, and no text covers another."""
 
+from collections.abc import Callable, Iterable
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 
 from study_app import figure_style as style
+from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.people_figures import Column, Panel, draw_people, mean_of, numbers_of_panels
 from study_app.analysis.page_layout import Look
+from tests.analysis.made_up import liquids, study
 
 pytestmark = pytest.mark.slow
 
@@ -109,3 +115,41 @@ def test_a_wide_bound_is_within_the_scale() -> None:
     low, high = axes.get_ylim()
     assert low < -7
     assert high > 8
+
+
+def _left_of(text: Text, parts: Iterable[Any], left_of: Callable[[Any], float]) -> Any:
+    """Return the part of a legend that is nearest to the left of a text."""
+    right = text.get_window_extent().x0
+    return min((part for part in parts if left_of(part) < right), key=lambda part: right - left_of(part))
+
+
+def test_the_legend_names_each_group_beside_the_marker_and_in_the_colour_of_its_participants() -> None:
+    members = {"A": "experts", "B": "novices", "C": "others", "D": "novices"}
+    figure = draw_people([Panel(columns=columns(2))], LOOK, above="Points", members=members).figure
+    (axes,) = figure.axes
+    points = {str(line.get_gid()).removeprefix("person-"): line for line in axes.lines}
+    texts = {text.get_text(): text for text in figure.texts}
+    keys = [line for line in figure.artists if isinstance(line, Line2D)]
+    for person, group in members.items():
+        key = _left_of(texts[group], keys, lambda line: line.get_window_extent().x0)
+        assert texts[group].get_color() == key.get_color() == points[person].get_color(), (person, group)
+        assert key.get_marker() == points[person].get_marker(), (person, group)
+
+
+def test_the_legend_of_levels_has_the_colours_of_the_bars() -> None:
+    settings = liquids(1)
+    given = [level for level in range(1, 8) for _ in range(level)]
+    made = study(settings, [(f"P{place:03d}", 1, "L1", (level, 4)) for place, level in enumerate(given)])
+    figure = answer_figures.draw_block(made, made.blocks[0], {}, LOOK).figure
+    figure.canvas.draw()
+    labels = [text for text in figure.texts if text.get_text() in set("1234567")]
+    colours = {
+        to_hex(
+            _left_of(label, figure.artists, lambda part: part.get_window_extent().x0).get_facecolor()
+        ): label.get_text()
+        for label in labels
+    }
+    bars = [bar for bar in figure.axes[0].patches if "row1" in bar.get_gid()]
+    assert {colours[to_hex(bar.get_facecolor())]: bar.get_width() for bar in bars} == {
+        str(level): level for level in range(1, 8)
+    }

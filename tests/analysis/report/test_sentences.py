@@ -90,7 +90,7 @@ def test_each_sentence_is_true_of_its_numbers(number: int) -> None:
         ({"drag": {"law": "linear", "damping_nspm": 6.5}, "viscosity_pa_s": None, "effects": ["drag"]},
          "damping 6.5 N·s/m at the hand, drag law: linear"),
         ({"effects": "auto"}, "1234 kg/m³, 0.5 Pa·s, effects selected automatically by size"),
-        ({"wake": {"scaling": 5}, "effects": ["added_mass", "wake"]}, "1234 kg/m³, 0.5 Pa·s, added mass, wake (scaling 5)"),
+        ({"wake": {"scaling": 5}, "effects": ["history", "wake"]}, "1234 kg/m³, 0.5 Pa·s, history, wake (scaling 5)"),
     ],
 )  # fmt: skip
 def test_each_number_of_a_liquid_has_its_own_unit(changed: dict[str, Any], text: str) -> None:

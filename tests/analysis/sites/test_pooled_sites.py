@@ -210,7 +210,9 @@ def test_questions_of_sites_are_pooled_with_the_settings_of_every_site(is_open: 
     def asked(site: str, codes: str) -> OtherQuestions:
         settings = tuple(Setting(code=code, condition=f"c{code}" if is_open else None) for code in codes)
         placed = [
-            PlacedQuestion(QuestionPlace(f"q{number}", f"Title {number} of {site}", number == 1, settings[number:]), *2 * [None])
+            PlacedQuestion(
+                QuestionPlace(f"q{number}", f"Title {number} of {site}", number == 1, settings[number:]), *2 * [None]
+            )
             for number in range(2)
         ]
         return OtherQuestions(tuple(placed), (PlacedScore(placed[1].where, "total", None, None, (placed[0],)),))

@@ -26,13 +26,12 @@ from study_app.designer.document.fields import (
     named_at,
     orphaned_keys,
     references_to,
-    rows,
     with_references,
 )
 from study_app.designer.document.steps import DuplicateElement, MakeSeries, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.form import special
+from study_app.designer.form.form import form_of
 from study_app.designer.measures.study_facts import copied_texts, facts, missing_texts
 from study_app.designer.templates import FOLDER
 from study_app.errors import StudyError
@@ -309,8 +308,10 @@ def test_the_id_of_a_copy_with_a_long_number_is_as_long_as_permitted() -> None:
 
 def test_points_of_a_scale_are_listed_language_by_language_and_those_of_the_study_first() -> None:
     labels = {"fr": ["non", "oui"], "en": ["no", "maybe", "yes"], "nl": ["nee"]}
-    study, _ = DEMO.with_edits(Set(("study", "languages"), ["nl", "en"]), Set(("scales", "agreement", "labels"), labels))
-    row = next(row for row in rows(study.document, ("scales", "agreement")) if row.path[-1] == "labels")
-    points = special._scale_points(study, row)
+    study, _ = DEMO.with_edits(
+        Set(("study", "languages"), ["nl", "en"]), Set(("scales", "agreement", "labels"), labels)
+    )
+    form = form_of(study, ("scales", "agreement"))
+    points = next(row for section in form.sections for row in section.rows if row.path[-1] == "labels").facts
     assert points.languages == (("nl", "Dutch"), ("en", "English"), ("fr", "French"))
     assert points.points == (("nee", "no", "non"), ("", "maybe", "oui"), ("", "yes", ""))

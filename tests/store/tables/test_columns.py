@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,17 @@ from study_app.store.tables.study_files import check_study, columns_of, descript
 )
 def test_a_line_says_kind_unit_range_and_meaning(line: str) -> None:
     assert line in dictionary_markdown().splitlines()
+
+
+UNITS = {"s": "s", "ms": "ms", "ns": "ns", "mps": "m/s", "n": "N", "hz": "Hz", "m": "m", "kg": "kg"}
+
+
+def test_the_unit_of_every_column_is_the_one_at_the_end_of_its_name() -> None:
+    rows = re.findall(r"^\| `(\w+)` \| ([^|]*?)(?: \[([^]]+)\])? \| ", dictionary_markdown(), re.M)
+    assert {unit for _, _, unit in rows} == {"", *UNITS.values()}
+    for name, _, unit in rows:
+        _, has_suffix, suffix = name.rpartition("_")
+        assert unit == (UNITS.get(suffix, "") if has_suffix else ""), name
 
 
 @pytest.mark.parametrize(
