@@ -80,11 +80,11 @@ def _expected(before: Any, after: Any, path: Path, row: Row | None, at: int | No
             for labels, more in zip(_lists(_at(study, row.path)), _lists(_at(after, row.path)), strict=True):
                 labels.append(more[-1])
         case ["Add", *label]:
-            key = next(one.path[-1] for one in rows(before, path) if one.label == " ".join(label))
+            key = next(field.path[-1] for field in rows(before, path) if field.label == " ".join(label))
             assert key not in element
             element[key] = _at(after, (*path, key))
         case _ if row is not None and row.instead and row.label != name:
-            key = next(one.path[-1] for one in rows(before, path) if one.label == name)
+            key = next(field.path[-1] for field in rows(before, path) if field.label == name)
             del element[row.path[-1]]
             element[key] = _at(after, (*path, key))
         case _ if row is not None and row.label != name and row.choices:

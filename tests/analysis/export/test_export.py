@@ -112,13 +112,6 @@ def test_a_text_is_no_formula_in_a_spreadsheet_and_a_negative_number_a_number(re
     assert table_bytes(Delivered("numbers", columns, frame)) == b"text,number\n'-1,-1.5\n"
 
 
-def test_a_delay_that_was_not_measured_is_not_claimed(rek: Results, to: Path) -> None:
-    rek.add("P001", lambda *_: 6, changes={"delay_error_mean_ms": None})
-    rek.open()
-    export(rek.folder, to)
-    assert {row["delay_achieved_ms"] for row in rows(to, "responses")} == {"n/a"}
-
-
 def test_an_export_replaces_the_one_before_it_and_leaves_other_files(rek: Results, to: Path) -> None:
     rek.add("P001", lambda *_: 6)
     export(rek.folder, to)

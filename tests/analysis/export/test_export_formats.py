@@ -124,14 +124,6 @@ def test_the_wide_table_for_spss_tells_why_an_answer_is_missing(small: Results, 
     assert hidden["smooth__heavyzembla"].isna().tolist() == [False, True, True]
 
 
-def test_the_wide_table_says_who_is_simulated(small: Results, to: Path) -> None:
-    for participant, small.simulated in (("A", True), ("B", False)):
-        small.add(participant, lambda *_: 5)
-    export(small.folder, to, extras=["wide"])
-    told = [(row["participant"], row["simulated"]) for row in cells(table(to, "small", "wide", "csv"))]
-    assert told == [("A", "true"), ("B", "false")]
-
-
 def test_without_its_library_sav_is_refused_in_one_line_before_anything_is_read(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -80,7 +80,9 @@ def stored(tmp_path: Path) -> tuple[Results, dict[str, Rows]]:
             file = getattr(results, name)(participant)
             table = read_table(file.read_bytes(), columns)
             for row in table:
-                row |= {one.name: _drawn(one, draw) for one in columns if one.name not in {*PLACES, *ANSWERS}}
+                row |= {
+                    column.name: _drawn(column, draw) for column in columns if column.name not in {*PLACES, *ANSWERS}
+                }
             file.write_bytes(csv_bytes(columns, table))
             rows[name] += table
     for participant, reason in EXCLUDED.items():
@@ -192,6 +194,7 @@ def _sorted(rows: Rows) -> Rows:
 def test_every_cell_of_every_format_is_the_stored_one(stored: tuple[Results, dict[str, Rows]], tmp_path: Path) -> None:
     results, rows = stored
     expected = _expected(results, rows)
+    assert {row["delay_achieved_ms"] is None for row in expected["trials"]} == {True, False}
     to = tmp_path / "out"
     written = export(results.folder, to, extras=["wide", "parquet", "sav", "psych-ds"])
     files = [
@@ -229,9 +232,9 @@ def _described(path: Path) -> dict[str, dict[str, str]]:
         return stated
     if path.parent.name == "data":
         variables = json.loads(path.with_suffix(".json").read_bytes())["variableMeasured"]
-        return {one["name"]: one | {"unit": one.get("unitText", "")} for one in variables}
+        return {variable["name"]: variable | {"unit": variable.get("unitText", "")} for variable in variables}
     files = json.loads((path.parent / "codebook.json").read_bytes())["files"]
-    return {one["name"]: one for one in files[path.name]}
+    return {column["name"]: column for column in files[path.name]}
 
 
 def test_every_format_has_the_unit_and_the_description_of_each_column(

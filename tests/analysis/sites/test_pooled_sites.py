@@ -219,7 +219,7 @@ def test_questions_of_sites_are_pooled_with_the_settings_of_every_site(is_open: 
 
     pooled = study_tables._pooled_questions({"A": asked("A", "xy"), "B": asked("B", "yz")})
     codes = (["cx", "cy", "cz"], ["cy", "cz"]) if is_open else (["A-x", "A-y", "B-y", "B-z"], ["A-y", "B-z"])
-    places = [one.where for one in (*pooled.questions, *pooled.scores, *pooled.scores[0].questions)]
+    places = [question.where for question in (*pooled.questions, *pooled.scores, *pooled.scores[0].questions)]
     assert [[setting.code for setting in where.settings] for where in places] == [*codes, codes[1], codes[0]]
     assert [(where.id, where.title, where.is_form) for where in places[:2]] == [
         ("q0", "Title 0 of A", False),
