@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study_app.analysis.data.blocks import Setting, setting_name
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import codebook_bytes
@@ -86,3 +87,17 @@ def said_of(made: Study) -> Iterator[str]:
 def test_what_is_said(pytestconfig: pytest.Config) -> None:
     lines = (line for name, made in STUDIES.items() for line in (f"== {name}", *said_of(made())))
     compare(GOLDEN / "wording.txt", each_once(lines), pytestconfig, mask=CHANGING)
+
+
+@pytest.mark.parametrize(
+    ("conditions", "names"),
+    [
+        (["8/1", "8/2", "12/1"], ["Standard 8, track 1", "Standard 8, track 2", "Standard 12"]),
+        (["calm", "stirred"], ["Honey (calm)", "Honey (stirred)"]),
+    ],
+)
+def test_settings_with_one_name_are_told_apart(conditions: list[str], names: list[str]) -> None:
+    is_track = "/" in conditions[0]
+    honey: dict[str, Any] = {} if is_track else {"liquid": "honey", "delay_ms": 0.0}
+    settings = [Setting(code=f"L{place}", condition=name, **honey) for place, name in enumerate(conditions, start=1)]
+    assert [setting_name(setting, settings) for setting in settings] == names

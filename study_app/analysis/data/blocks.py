@@ -4,6 +4,7 @@ While the key is sealed a setting is its code and nothing else. Texts are in Eng
 in its first language.
 """
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self, TypeAlias, get_args
@@ -154,7 +155,7 @@ def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ..
     """Return the main blocks with questions, in session order, from the protocol in a receipt."""
     asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
     return tuple(
-        _block(protocol, block, display_language(protocol), key)
+        _block(protocol, block, block_titles(protocol)[block["id"]], key)
         for block in asked
         if block["phase"] == "main" and block["questionnaire"] is not None and _statements(protocol, block)
     )
@@ -171,7 +172,16 @@ def display_language(protocol: Mapping[str, Any]) -> str:
     return "en" if "en" in languages else str(languages[0])
 
 
-def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str, key: Key | None) -> Block:
+def block_titles(protocol: Mapping[str, Any]) -> dict[str, str]:
+    """Return the title of each block by ID; the ID follows a title that several blocks share."""
+    language = display_language(protocol)
+    titles = {name: text_in(block["title"], language) for name, block in protocol["blocks"].items()}
+    counts = Counter(titles.values())
+    return {name: title if counts[title] == 1 else f"{title} ({name})" for name, title in titles.items()}
+
+
+def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, key: Key | None) -> Block:
+    language = display_language(protocol)
     questionnaire = protocol["questionnaires"][block["questionnaire"]]
     scale = protocol["scales"][questionnaire["scale"]]
     off_scale = scale["cannot_judge"]
@@ -181,7 +191,7 @@ def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], language: str,
         kind = _opened(key, block["id"], block["codes"], block.get("compares"))[1]
     return Block(
         id=block["id"],
-        title=text_in(block["title"], language),
+        title=title,
         kind=kind,
         settings=settings,
         items=tuple(
@@ -202,7 +212,17 @@ def _settings_in(protocol: Mapping[str, Any], block: str, key: Key | None) -> tu
 
 
 def setting_name(setting: Setting, others: Sequence[Setting]) -> str:
-    """Return the name of a setting in figures: its code, or its liquid with view and delay where these differ."""
+    """Return the name of a setting: its code, or its liquid with view and delay if these differ.
+
+    The track or the condition's ID follows a name that several settings share.
+    """
+    name, (_, is_track, track) = _presented_name(setting, others), (setting.condition or "").partition("/")
+    if sum(_presented_name(other, others) == name for other in others) < 2:
+        return name
+    return f"{name}, track {track}" if is_track else f"{name} ({setting.condition})"
+
+
+def _presented_name(setting: Setting, others: Sequence[Setting]) -> str:
     if setting.liquid is None or setting.delay_ms is None:
         return setting.code if setting.standard is None else f"Standard {setting.standard}"
     liquid = setting.liquid.replace("_", " ")
@@ -342,9 +362,9 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
         design = DESIGN_KINDS[written["kind"]].model_validate(written)
     else:
         design = default_design(table["design"])
-    title = text_in(table["title"], display_language(protocol))
+    title, settings = block_titles(protocol)[step], _settings_in(protocol, step, key)
     return LevelBlock(
-        step, title, table["phase"], design, stimulus, _settings_in(protocol, step, key), method, published,
+        step, title, table["phase"], design, stimulus, settings, method, published,
         (table.get("catch") or {}).get("wrong_most"), reference,
     )  # fmt: skip
 
@@ -593,20 +613,18 @@ def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuesti
 
 
 def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tuple[QuestionPlace, Mapping[str, Any]]]:
-    language = display_language(protocol)
+    language, titles = display_language(protocol), block_titles(protocol)
     for step in every_step_of(protocol):
         if step in protocol["blocks"]:
             block = protocol["blocks"][step]
             if block["phase"] == "main" and block["questionnaire"] is not None:
-                title = text_in(block["title"], language)
-                where = QuestionPlace(step, title, False, _settings_in(protocol, step, key))
+                where = QuestionPlace(step, titles[step], False, _settings_in(protocol, step, key))
                 yield where, protocol["questionnaires"][block["questionnaire"]]
         elif step in protocol["questionnaires"]:
             table = protocol["questionnaires"][step]
             titled = table["title"] is not None
             title = text_in(table["title"], language) if titled else step.replace("_", " ").capitalize()
             after = follows_in(protocol, step)
-            titles = {name: text_in(block["title"], language) for name, block in protocol["blocks"].items()}
             labels = ((START, "At the start") if name is None else (name, f"{AFTER}{titles[name]}") for name in after)
             settings = tuple(Setting(code=name, condition=name, label=label) for name, label in labels)
             yield QuestionPlace(step, title, True, settings), table

@@ -43,7 +43,7 @@ class Estimates(NamedTuple):
 
 
 class Numbers(NamedTuple):
-    """A score or a question: each participant's number by the name of each setting.
+    """A score or a question: the name of each setting with each participant's number.
 
     ``bounds`` are the ends of its answer scale.
     """
@@ -51,7 +51,7 @@ class Numbers(NamedTuple):
     title: str
     bounds: tuple[float, float] | None
     is_score: bool
-    by_setting: dict[str, dict[str, float]]
+    by_setting: tuple[tuple[str, dict[str, float]], ...]
 
 
 def estimates_of(result: LevelsResult) -> Estimates | None:
@@ -241,13 +241,13 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
     numbers = []
     for title, bounds, place, rows in tables:
         settings: list[tuple[str | None, str]] = [(it.code, place.name(it)) for it in place.settings]
-        by_setting = {}
+        by_setting = []
         for code, words in settings or [(None, "")]:
             here = (rows if code is None else rows[rows["code"] == code]).dropna(subset=["value"])
             means = here.astype({"value": float}).groupby("participant")["value"].mean()
-            by_setting[words] = {str(who): float(value) for who, value in means.items()}
-        if any(by_setting.values()):
-            numbers.append(Numbers(title, bounds, bool(scores), by_setting))
+            by_setting.append((words, {str(who): float(value) for who, value in means.items()}))
+        if any(values for _, values in by_setting):
+            numbers.append(Numbers(title, bounds, bool(scores), tuple(by_setting)))
     return numbers
 
 
@@ -269,8 +269,7 @@ def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence
         Panel(
             title=numbers.title,
             columns=tuple(
-                Column(name=words, values=values, mean=mean_of(values.values()))
-                for words, values in numbers.by_setting.items()
+                Column(name=words, values=values, mean=mean_of(values.values())) for words, values in numbers.by_setting
             ),
             ends=None if numbers.bounds is None else _with_room(*numbers.bounds),
         )

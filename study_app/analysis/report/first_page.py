@@ -181,7 +181,7 @@ def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) ->
 def _number_words(numbers: Numbers) -> str:
     """Return the means of a score or question by setting, and for two settings the mean difference."""
     what = f"The mean {numbers.title} score" if numbers.is_score else f"The mean of “{numbers.title}”"
-    means = [(name, mean, len(held)) for name, held in numbers.by_setting.items() if (mean := mean_of(held.values()))]
+    means = [(name, mean, len(held)) for name, held in numbers.by_setting if (mean := mean_of(held.values()))]
     parts = [
         f"{number(mean.value)}{f' {_setting_words(name)}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
     ]
@@ -189,7 +189,7 @@ def _number_words(numbers: Numbers) -> str:
     text = f"{what} was {listed(parts)} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
     if len(means) != 2:
         return text
-    (first, second), (one, other) = numbers.by_setting, numbers.by_setting.values()
+    (first, one), (second, other) = numbers.by_setting
     away = mean_of(np.array([other[who] - one[who] for who in one if who in other]))
     if away is None or away.low is None:
         return text

@@ -52,6 +52,7 @@ def warnings(protocol: Protocol, *, simulates: bool = True, without_force: str =
         *_tasks_without_target(protocol),
         *_recalled_instruments(protocol),
         *_untitled_forms(protocol),
+        *dict.fromkeys(_shared_titles(protocol)),
     )
 
 
@@ -418,3 +419,17 @@ def _untitled_forms(protocol: Protocol) -> Iterator[str]:
                 f"questionnaires.{name}.title: is missing, so participants see the ID as the heading; add a title "
                 f"in {others[0]}"
             )
+
+
+def _shared_titles(protocol: Protocol) -> Iterator[str]:
+    """Yield the main blocks whose title is that of an earlier main block in some language."""
+    for language in protocol.study.languages:
+        titled: dict[str, str] = {}
+        for block in protocol.main_blocks:
+            title = protocol.text(block.title, language)
+            other = titled.setdefault(title, block.id)
+            if other != block.id:
+                yield (
+                    f"blocks.{block.id}.title: block {other} has the same title, “{title}”, so the report adds the "
+                    "IDs to both; give each block its own title"
+                )

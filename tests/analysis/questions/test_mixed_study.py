@@ -1,5 +1,7 @@
 """A study with every kind of question, from its rehearsal to tables, verification, export, SPSS and report."""
 
+import json
+import re
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -10,6 +12,8 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.tables import wide_table
 from study_app.analysis.report.write_report import report
+from study_app.protocol.load import load
+from study_app.protocol.warnings.study_warnings import warnings
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
@@ -100,6 +104,32 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     assert "usability__sus1" in table.frame
     report(folder, tmp_path / "report", failed=pytest.fail)
     assert "After Again" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.usefixtures("figures_of_the_page")
+def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path) -> None:
+    again = '[blocks.again]\ntitle = "Stir"\nconditions = ["thin", "thick"]'
+    last = 'conditions = ["thin", "thick"]'
+    sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'
+    protocol = mixed_file(
+        tmp_path, (sequence, 'sequence = ["stir", "load", "again", "load"]'), (last, f"{last}\n{again}")
+    )
+    assert [line for line in warnings(load(protocol), simulates=False) if "same title" in line] == [
+        "blocks.again.title: block stir has the same title, “Stir”, so the report adds the IDs to both; give each "
+        "block its own title"
+    ]
+    folder = rehearse_answers(
+        protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=made_up(protocol)
+    )
+    report(folder, tmp_path / "report", failed=pytest.fail)
+    content = json.loads((tmp_path / "report" / "report.json").read_bytes())
+    (score,) = (score for score in content["results"]["scores"] if score["where"] == "load")
+    means = {group["name"]: format(group["numbers"]["mean"], "#.3g") for group in score["groups"]}
+    assert list(means) == ["After Stir (stir)", "After Stir (again)"]
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
+    for name, mean in means.items():
+        assert re.search(rf"score was [^.]*{re.escape(mean)}\b.* {re.escape(name.replace('After', 'after'))}", page)
+    assert "The mean difference (after Stir (again) − after Stir (stir)) was" in page
 
 
 @pytest.mark.parametrize("order", ["balanced", "random"])
