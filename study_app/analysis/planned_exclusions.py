@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Any, Final
@@ -12,10 +13,13 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.levels.tracks import below_chance, tracks
 from study_app.analysis.results import Results
-from study_app.analysis.wording import number, p_equals, percent
+from study_app.analysis.wording import counted, number, p_equals, percent
+from study_app.number_text import capitalised
 from study_app.protocol.model import RULES
 from study_app.store.exclusions import Exclusion
 
+_NEED_KEY: Final = {"below_chance", "threshold_beyond_levels"}
+"""The rules that cannot be applied while the key is sealed."""
 _TABLES: Final = ("responses", "trials", "participants", "answered", "intervals")
 SESSION: Final = ["participant", "session"]
 
@@ -65,7 +69,7 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
 
     Without ``results`` no threshold is known.
     """
-    planned = {rule["rule"]: rule.get("limit") for rule in (study.protocol.get("analysis") or {}).get("exclusions", ())}
+    planned = _planned_limits(study)
     excluded = (
         Proposal(
             participant=exclusion.participant,
@@ -101,6 +105,32 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
         for proposal in met
     )
     return tuple(sorted((*excluded, *decided), key=lambda one: (*one.what, one.rule)))
+
+
+def _planned_limits(study: Study) -> dict[str, float | None]:
+    """Return the planned rules with their limits, None for a rule without one."""
+    return {rule["rule"]: rule.get("limit") for rule in (study.protocol.get("analysis") or {}).get("exclusions", ())}
+
+
+def rule_conditions(study: Study) -> dict[str, str]:
+    """Return the condition of each planned rule as text."""
+    return {rule: RULES[rule].format(limit=limit) for rule, limit in _planned_limits(study).items()}
+
+
+def rule_sentences(study: Study, results: Results | None) -> tuple[str, ...]:
+    """Return each planned rule and how many sessions met it, as in `proposals`."""
+    conditions = rule_conditions(study)
+    met = Counter(proposal.rule for proposal in proposals(study, results)) if conditions else Counter()
+    return tuple(
+        f"Planned rule: {condition}. {_met_words(met[rule], is_known=study.revealed or rule not in _NEED_KEY)}"
+        for rule, condition in conditions.items()
+    )
+
+
+def _met_words(sessions: int, *, is_known: bool) -> str:
+    if not is_known:
+        return "It is applied after unblinding."
+    return f"{capitalised(counted(sessions, 'session')) if sessions else 'No session'} met it."
 
 
 _Rows = Iterator[tuple[Any, str]]

@@ -132,9 +132,7 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
     if study.revealed and study.n:
         _evaluate(study, drawn, send, stop)
         return
-    from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
-
-    send(Proposed(undecided(study, None)))
+    _send_proposed(study, None, send)
     for part in _split(study):
         answers = (
             answer_figures.answers_picture(part, block, block_name(study, block), ("svg",))
@@ -223,6 +221,13 @@ def _study_found(study: Study) -> StudyFound:
     )
 
 
+def _send_proposed(study: Study, results: Results | None, send: Send) -> None:
+    """Send the proposed exclusions and what became of each planned rule."""
+    from study_app.analysis.planned_exclusions import rule_sentences, undecided  # noqa: PLC0415
+
+    send(Proposed(undecided(study, results), rule_sentences(study, results)))
+
+
 def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[], bool]) -> None:
     """Run all tests, then redraw the figures that depend on them, the first page first.
 
@@ -230,14 +235,13 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     """
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
     from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures  # noqa: PLC0415
-    from study_app.analysis.planned_exclusions import undecided  # noqa: PLC0415
     from study_app.analysis.report.first_page import cards  # noqa: PLC0415
     from study_app.analysis.report.study_figures import pictures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
     results = evaluate(study, progress=lambda what, share: going(what, _EVALUATION * share))
-    send(Proposed(undecided(study, results)))
+    _send_proposed(study, results, send)
     numbers = numbers_of(study)
     found = chain(pictures(study, results, ("svg",)), summary_pictures(study, results, numbers, ("svg",)))
     for number, picture in enumerate(found, start=1):

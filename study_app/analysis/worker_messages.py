@@ -122,9 +122,13 @@ class StudyFound:
 
 @dataclass(frozen=True, slots=True)
 class Proposed:
-    """The exclusions that rules propose and that await a decision; they have no time yet."""
+    """The exclusions that rules propose and that await a decision; they have no time yet.
+
+    ``rules`` are sentences: each planned rule, and how many sessions met it.
+    """
 
     exclusions: tuple[Exclusion, ...]
+    rules: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

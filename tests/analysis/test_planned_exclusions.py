@@ -11,8 +11,9 @@ import pytest
 from study_app import api
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.planned_exclusions import planned_exclusions, proposals
+from study_app.analysis.planned_exclusions import planned_exclusions, proposals, rule_sentences
 from study_app.analysis.planning.preregistration import commitment, preregistration
+from study_app.analysis.report.sections import conduct
 from study_app.analysis.report.write_report import report
 from study_app.errors import ProtocolError, StoreError
 from study_app.protocol.load import load
@@ -51,12 +52,24 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
     study = replace(study, responses=responses, answered=answered)
     constant, fast = {"rule": "constant_answers", "limit": 95.0}, {"rule": "fast_answers", "limit": 0.5}
     results = evaluate(study, recordings=False)
+    assert rule_sentences(with_rules(study), results) == ()
     assert proposals(with_rules(study), results) == (), "rules that are not planned propose nothing"
     found = proposals(with_rules(study, constant, fast), results)
     assert [(one.participant, one.rule, one.decision) for one in found] == [
         (first, "constant_answers", "undecided"),
         (second, "fast_answers", "undecided"),
     ]
+    lenient, chance = {"rule": "fast_answers", "limit": 0.2}, {"rule": "below_chance"}
+    sealed = replace(with_rules(study, constant, lenient, chance), settings={})
+    assert rule_sentences(sealed, results) == (
+        "Planned rule: more than 95 % of the answers to statements are identical. 1 session met it.",
+        "Planned rule: the median response time is below 0.2 s. No session met it.",
+        "Planned rule: a block has fewer correct answers than expected by chance (binomial p below 0.001). It is "
+        "applied after unblinding.",
+    )
+    page = "".join(conduct(with_rules(study, lenient), results))
+    assert "There are no exclusions." in page
+    assert "the median response time is below 0.2 s. No session met it." in page
     assert found[0].why == f"100 % of the {int((own & responses['counted']).sum())} answers to statements are identical"
     assert found[1].why == f"half of the {int((hurried & answered['counted']).sum())} answers were given within 0.30 s"
 

@@ -23,7 +23,7 @@ from study_app.analysis.findings.finding import Answer, Finding
 from study_app.analysis.html_page import bullets, drawn_figure, heading, paragraph, table, table_of, try_part
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_section
 from study_app.analysis.page_layout import Picture
-from study_app.analysis.planned_exclusions import PlannedExclusions
+from study_app.analysis.planned_exclusions import PlannedExclusions, rule_sentences
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.questions import MEASURES
 from study_app.analysis.report.methods import late_exclusions
@@ -445,6 +445,8 @@ def conduct(study: Study, results: Results) -> Iterator[str]:
         were = "was" if study.left_out == 1 else "were"
         gone.append(f"{counted(study.left_out, 'session')} {were} not completed and therefore not analysed")
     yield bullets(_first(gone)) if gone else paragraph("There are no exclusions.")
+    if rules := rule_sentences(study, results):
+        yield bullets(rules)
     if reversed_ones := [*_reversed_exclusions(study)]:
         yield heading(3, "Exclusions that were reversed")
         yield bullets(_first(reversed_ones))

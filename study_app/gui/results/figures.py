@@ -96,9 +96,10 @@ class ResultsView:
 
     ``trials`` are the main trials of each session (participant, number), with their labels. ``colours`` are the
     figures' print colours, by the theme role that replaces them. ``sealed`` is None while unknown, ``opened`` describes
-    how the key was opened; ``listed`` tells whether the study's sessions are read. ``drawing`` is the activity while
-    there are no figures yet, ``testing`` while there are; ``untested`` means that it was stopped. ``groups`` are the
-    groups by which figures can be split, ``split`` is the one shown, `EACH_GROUP` if all are compared, or "".
+    how the key was opened; ``rules`` are sentences on the planned exclusion rules; ``listed`` tells whether the study's
+    sessions are read. ``drawing`` is the activity while there are no figures yet, ``testing`` while there are;
+    ``untested`` means that it was stopped. ``groups`` are the groups by which figures can be split, ``split`` is the
+    one shown, `EACH_GROUP` if all are compared, or "".
     """
 
     studies: tuple[StudyAt, ...] = ()
@@ -109,6 +110,7 @@ class ResultsView:
     opened: str = ""
     left_out: tuple[Exclusion, ...] = ()
     proposed: tuple[Exclusion, ...] = ()
+    rules: tuple[str, ...] = ()
     exclusions_file: Path | None = None
     trials: Mapping[tuple[str, int], tuple[tuple[int, str], ...]] = field(default_factory=lambda: _NOTHING)
     doubts: tuple[str, ...] = ()

@@ -289,7 +289,7 @@ class _ExclusionsCard(Card):
     def __init__(self) -> None:
         self.leave_out = ActionButton("minus", "Exclude …", height=36)
         super().__init__("Excluded", self.leave_out, padding=14, gap=6)
-        self.none = label("Nothing is excluded from the analysis.", "label", "text2", wraps=True, weight=400)
+        self.summary = label("", "label", "text2", wraps=True, weight=400)
         self.open = ActionButton("file", "Open the list", role="plain", height=30)
         inside = QWidget()
         self._rows = vbox(STRETCH, spacing=8, margins=0, parent=inside)
@@ -299,11 +299,16 @@ class _ExclusionsCard(Card):
         self.area.setAccessibleName("Excluded")
         self.area.setMinimumHeight(96)
         self.lines: list[QWidget] = []
-        add_parts(self.column, self.none, (self.area, 1), hbox(STRETCH, self.open))
+        add_parts(self.column, self.summary, (self.area, 1), hbox(STRETCH, self.open))
         self.show_left_out(())
 
-    def show_left_out(self, listed: Sequence[Exclusion], proposed: Sequence[Exclusion] = ()) -> None:
-        """Show the exclusions, proposed ones first, then the latest; the focus survives a removed line."""
+    def show_left_out(
+        self, listed: Sequence[Exclusion], proposed: Sequence[Exclusion] = (), rules: Sequence[str] = ()
+    ) -> None:
+        """Show the exclusions, proposed ones first, then the latest, below the sentences on planned rules.
+
+        The focus survives a removed line.
+        """
         self.open.setVisible(bool(listed))
         listed = (*listed, *reversed(proposed))
         at = self.window().focusWidget()
@@ -314,7 +319,9 @@ class _ExclusionsCard(Card):
         self.lines = [self._exclusion_row(exclusion) for exclusion in reversed(listed)]
         for place, line in enumerate(self.lines):
             self._rows.insertWidget(place, line)
-        self.none.setVisible(not listed)
+        none = () if listed else ("Nothing is excluded from the analysis.",)
+        self.summary.setText("\n".join((*none, *rules)))
+        self.summary.setVisible(bool(self.summary.text()))
         self.area.setVisible(bool(listed))
         grows = QSizePolicy.Policy.Preferred if listed else QSizePolicy.Policy.Maximum
         self.setSizePolicy(QSizePolicy.Policy.Preferred, grows)
@@ -508,8 +515,8 @@ class ResultsPlace(Place):
             self._show_studies()
         if (view.sessions, view.without_sessions) != (before.sessions, before.without_sessions):
             self.sessions.show_sessions(view.sessions, view.without_sessions)
-        if (view.left_out, view.proposed) != (before.left_out, before.proposed):
-            self.exclusions.show_left_out(view.left_out, view.proposed)
+        if (view.left_out, view.proposed, view.rules) != (before.left_out, before.proposed, before.rules):
+            self.exclusions.show_left_out(view.left_out, view.proposed, view.rules)
         if view.groups != before.groups:
             self._show_groups()
         self.hidden.setVisible(view.sealed is True and bool(view.figures))
@@ -760,7 +767,7 @@ class ResultsPlace(Place):
             case SessionsFound() if newest:
                 self._take_sessions(answer)
             case Proposed() if newest:
-                self._update_view(proposed=answer.exclusions)
+                self._update_view(proposed=answer.exclusions, rules=answer.rules)
             case StudyFound() if newest:
                 self._blocks = answer.blocks
                 trouble = None if answer.n else _NONE_COMPLETE
@@ -820,6 +827,7 @@ class ResultsPlace(Place):
             listed=True,
             left_out=answer.exclusions,
             proposed=(),
+            rules=(),
             exclusions_file=_exclusions_at(answer.folder),
             sealed=reveal is None,
             opened="" if reveal is None else unblinding_text(reveal),
