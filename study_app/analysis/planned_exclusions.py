@@ -18,7 +18,7 @@ from study_app.number_text import capitalised
 from study_app.protocol.model import RULES
 from study_app.store.exclusions import Exclusion
 
-_NEED_KEY: Final = {"below_chance", "threshold_beyond_levels"}
+NEED_KEY: Final = {"below_chance", "threshold_beyond_levels"}
 """The rules that cannot be applied while the key is sealed."""
 _TABLES: Final = ("responses", "trials", "participants", "answered", "intervals")
 SESSION: Final = ["participant", "session"]
@@ -122,7 +122,7 @@ def rule_sentences(study: Study, results: Results | None) -> tuple[str, ...]:
     conditions = rule_conditions(study)
     met = Counter(proposal.rule for proposal in proposals(study, results)) if conditions else Counter()
     return tuple(
-        f"Planned rule: {condition}. {_met_words(met[rule], is_known=study.revealed or rule not in _NEED_KEY)}"
+        f"Planned rule: {condition}. {_met_words(met[rule], is_known=study.revealed or rule not in NEED_KEY)}"
         for rule, condition in conditions.items()
     )
 
@@ -161,9 +161,9 @@ def _beyond_levels(study: Study, results: Results | None) -> _Rows:
 def _constant(study: Study, limit: float | None) -> _Rows:
     answers = study.responses[study.responses["counted"] & study.responses["response"].notna()]
     for session, rows in answers.groupby(SESSION):
-        share = rows["response"].value_counts(normalize=True).max()
-        if limit is not None and len(rows) > 1 and 100 * share > limit:
-            yield session, f"{percent(share)} of the {len(rows)} answers to statements are identical"
+        most = int(rows["response"].value_counts().max())
+        if limit is not None and len(rows) > 1 and 100 * most > limit * len(rows):
+            yield session, f"{percent(most / len(rows))} of the {len(rows)} answers to statements are identical"
 
 
 def _fast(study: Study, limit: float | None) -> _Rows:

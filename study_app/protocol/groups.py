@@ -131,17 +131,27 @@ def follows(
     """
     preceding: dict[str | None, None] = {}
     again = False
-    for group in protocol.groups or (None,):
-        for steps in _sequences(protocol, group) or (steps_of(protocol, group, 1),):
-            again |= steps.count(form) > 1
-            before: str | None = None
-            for step in steps:
-                if step == form and before in exchanged:
-                    preceding |= dict.fromkeys(block for block in steps if block in exchanged)
-                elif step == form:
-                    preceding[before] = None
-                before = step if step in blocks else before
+    for steps in session_steps(protocol):
+        again |= steps.count(form) > 1
+        for before in blocks_before(steps, form, blocks):
+            exchange = [block for block in steps if block in exchanged] if before in exchanged else [before]
+            preceding |= dict.fromkeys(exchange)
     return tuple(preceding) if again else ()
+
+
+def blocks_before(steps: Steps, form: str, blocks: Container[str]) -> Iterator[str | None]:
+    """Yield the last block before each use of a form in a session, None before the first block."""
+    before: str | None = None
+    for step in steps:
+        if step == form:
+            yield before
+        before = step if step in blocks else before
+
+
+def session_steps(protocol: HasSteps) -> Iterator[Steps]:
+    """Yield the steps of each session of each group."""
+    for group in protocol.groups or (None,):
+        yield from _sequences(protocol, group) or (steps_of(protocol, group, 1),)
 
 
 def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:

@@ -1,11 +1,12 @@
 """The methods paragraph: participants, apparatus, design, hypotheses, tests and exclusions, as the study has them."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import contrast_methods
-from study_app.analysis.data.blocks import SPENDINGS, Block
+from study_app.analysis.data.blocks import SPENDINGS, Block, block_titles
 from study_app.analysis.data.measures import QUARTILES
 from study_app.analysis.data.study_tables import Study, group_assignment, group_counts
 from study_app.analysis.figures.answer_figures import people_a_setting
@@ -13,8 +14,11 @@ from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import ContrastsWithControl
 from study_app.analysis.findings.statement_tests import DelayTrend, Effects, MeanTests, OverAll
 from study_app.analysis.levels.evaluate import level_methods
+from study_app.analysis.planned_exclusions import NEED_KEY, proposals, rule_conditions
 from study_app.analysis.results import BlockResult, Results, lead_phrase, said_of_presentations
 from study_app.analysis.wording import counted, listed, ms, number, significant
+from study_app.protocol.groups import blocks_before
+from study_app.protocol.orders.block_orders import session_steps_of
 from study_app.store.unblinding import RULES
 
 _WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
@@ -45,12 +49,14 @@ def _sentences(study: Study, results: Results) -> Iterator[str]:
     yield _groups(study)
     yield _planned(study, results)
     yield _exclusions(study)
+    yield _exclusion_rules(study, results)
     yield _apparatus(study)
     yield _liquids(study)
     yield from _design(study, results)
     yield from _delays(study, results)
     yield from level_methods(study.levels, results.levels)
     yield _missing_trials(study)
+    yield from _questionnaires(study)
     yield from contrast_methods(results)
     if blocks:
         yield from _of_statements(study, results, blocks)
@@ -131,6 +137,21 @@ def _exclusions(study: Study) -> str:
     elif study.revealed and any(exclusion.rule_or_person not in RULES for exclusion in study.exclusions):
         sentences.append("All exclusions were decided while the key was sealed.")
     return " ".join(sentences)
+
+
+def _exclusion_rules(study: Study, results: Results) -> str:
+    """Return a sentence on the planned exclusion rules and the sessions that met them; "" if no rules are planned."""
+    conditions = rule_conditions(study)
+    if not conditions:
+        return ""
+    met = len({proposal.what for proposal in proposals(study, results) if proposal.rule in conditions})
+    rules = "this rule" if len(conditions) == 1 else "one of these rules"
+    is_known = study.revealed or not NEED_KEY & conditions.keys()
+    number_met = f"; {counted(met, 'session') if met else 'no session'} met {rules}" if is_known else ""
+    return (
+        "According to the protocol, a session was considered for exclusion if "
+        f"{', or if '.join(conditions.values())}{number_met}."
+    )
 
 
 def late_exclusions(study: Study) -> str:
@@ -281,6 +302,42 @@ def _missing_trials(study: Study) -> str:
         return "All interval trials in the main blocks met the limits for valid trials."
     lost = f"{count} of {number_text.counted(asked, 'main trial')} {'was' if count == 1 else 'were'} lost"
     return f"{lost} because no presentation met the limits for valid trials."
+
+
+def _questionnaires(study: Study) -> Iterator[str]:
+    """Yield each form with its questions and its position in the session."""
+    asked_in = (question.where for question in study.others.questions if question.where.is_form)
+    forms = Counter((where.id, where.title) for where in asked_in)
+    for (form, title), questions in forms.items():
+        sessions = list(session_steps_of(study.protocol))
+        times = list(dict.fromkeys(_form_times(study, steps, form) for steps in sessions if form in steps))
+        differ = ", depending on the group or session" * (len(times) > 1 or not all(form in one for one in sessions))
+        yield (
+            f"Participants completed the questionnaire “{title}” ({counted(questions, 'question')}) "
+            f"{' or '.join(times)}{differ}."
+        )
+
+
+def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:
+    """Return when a form is completed in a session with these steps."""
+    titles = block_titles(study.protocol)
+    blocks = [step for step in steps if step in titles]
+    main = {block for block in blocks if study.protocol["blocks"][block].get("phase", "main") == "main"}
+    exchanged = main if study.protocol["study"].get("block_order", "fixed") != "fixed" else set()
+    uses = list(blocks_before(steps, form, titles))
+    if len(uses) > 1 and set(uses) == main:
+        return "after each main block"
+    times = [
+        "before the first block"
+        if block is None
+        else "after the last block"
+        if block == blocks[-1]
+        else "between the blocks"
+        if block in exchanged
+        else f"after “{titles[block]}”"
+        for block in uses
+    ]
+    return listed(list(dict.fromkeys(times)))
 
 
 def _of_statements(study: Study, results: Results, blocks: list[BlockResult]) -> Iterator[str]:

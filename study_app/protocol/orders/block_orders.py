@@ -1,13 +1,13 @@
 """Exactly what scheduling needs to know of a study: no conditions, no texts, no tasks."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 from pydantic import BaseModel, ConfigDict
 
 from study_app.protocol.blocks import Block, Order, OrderOfBlocks, Phase
-from study_app.protocol.groups import Group, every_step, follows
+from study_app.protocol.groups import Group, every_step, follows, session_steps
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.tracks import method_of, tracks_of
 from study_app.protocol.trials.methods import TrackOrder
@@ -123,6 +123,11 @@ class _KeptSteps(BaseModel):
 def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the unique steps of all groups and sessions in a receipt's protocol (ValueError: it has none)."""
     return tuple(dict.fromkeys(every_step(_KeptSteps.model_validate(protocol))))
+
+
+def session_steps_of(protocol: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Yield the steps of each session of each group in a receipt's protocol."""
+    return session_steps(_KeptSteps.model_validate(protocol))
 
 
 def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]:

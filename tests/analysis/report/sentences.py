@@ -9,6 +9,7 @@ import io
 import json
 import math
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -660,6 +661,53 @@ def decided_beforehand(match: re.Match[str], told: Told) -> bool:
 Check = Callable[[re.Match[str], Told], bool]
 
 
+def form_times(match: re.Match[str], told: Told) -> bool:
+    """Check the number of questions and the times of a form: each use is named, and no other time."""
+    form, protocol = match["form"].lower(), told.study.protocol
+    steps = next(iter(protocol["groups"].values()))["sequence"] if "groups" in protocol else protocol["sequence"]
+    sides = [
+        [step for step in part if step in protocol["blocks"]]
+        for place, step in enumerate(steps)
+        if step == form
+        for part in (steps[:place], steps[place:])
+    ]
+    uses = list(zip(sides[::2], sides[1::2], strict=True))
+    exchanged = protocol["study"]["block_order"] != "fixed"
+    between = {"b": "after “Block”", "other": "after “Other”"}
+    times = {
+        "before the first block"
+        if not before
+        else "after the last block"
+        if not after
+        else "between the blocks"
+        if exchanged
+        else between[before[-1]]
+        for before, after in uses
+    }
+    blocks = [step for step in steps if step in protocol["blocks"]]
+    if len(uses) > 1 and all(before for before, _ in uses) and {before[-1] for before, _ in uses} == set(blocks):
+        times = {"after each main block"}
+    asked = len(protocol["questionnaires"][form]["items"])
+    return count(match["n"]) == asked and set(re.split(" and |, ", match["times"])) == times
+
+
+def rules_met(match: re.Match[str], told: Told) -> bool:
+    """Check the planned rules, and count the sessions that meet one of them in the tables of answers."""
+    rules = {rule["rule"]: rule["limit"] for rule in told.study.protocol["analysis"]["exclusions"]}
+    identical = re.search(rf"more than {R} % of the answers to statements are identical", match["rules"])
+    fast = re.search(rf"the median response time is below {R} s", match["rules"])
+    quoted = {"constant_answers": identical, "fast_answers": fast}
+    met = 0
+    answers = told.study.responses.dropna(subset=["response"])
+    for _, rows in answers.groupby(["participant", "session"]):
+        most = max(Counter(map(str, rows["response"])).values())
+        met += len(rows) > 1 and 100 * most > rules.get("constant_answers", 100) * len(rows)
+    return (
+        count(match["met"]) == met
+        and {rule: float(limit[1]) for rule, limit in quoted.items() if limit is not None} == rules
+    )
+
+
 def always(_match: re.Match[str], _told: Told) -> bool:
     """A sentence that states no number of the study."""
     return True
@@ -750,6 +798,11 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf"would be {R} % instead of {R} %\.", lambda match, told: float(match[1]) >= float(match[2])),
     (r"At the planned looks, adjusted p values of up to (.*) are significant \((O'Brien–Fleming|Pocock) alpha spending "
      r"with alpha = [\d.]+, Lan & DeMets 1983\)\.", alphas_of_looks),
+    # Questionnaires and planned exclusions
+    (rf"Participants completed the questionnaire “(?P<form>\w+)” \((?P<n>{N}) questions?\) (?P<times>.*)\.",
+     form_times),
+    (rf"According to the protocol, a session was considered for exclusion if (?P<rules>.*); (?P<met>{N}) sessions? met "
+     r"(?:this rule|one of these rules)\.", rules_met),
     # Limits
     (rf"In (\d+) simulated studies with (\d+) participants, three liquids, seven delays and no true effect, {R} % of "
      rf"the reports claimed a difference or a noticed delay \((\d+) reports, 95 % confidence interval {R} to {R} %; "

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from study_app.analysis.contrasts import answer
+from study_app.analysis.data.blocks import other_questions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.report import methods as methods_module
@@ -52,7 +53,33 @@ def with_plan(rng: np.random.Generator) -> Study:
     if made.decided.made and rng.random() < 0.4:
         made = replace(made, decided=replace(made.decided, looks=(5, 12, 20), alpha=0.05))
         made = replace(made, decided=made.decided.at(made.n))
-    return replace(made, contrasts=tuple(contrasts))
+    return with_forms(replace(made, contrasts=tuple(contrasts)), rng)
+
+
+def with_forms(made: Study, rng: np.random.Generator) -> Study:
+    """Return the study with forms at drawn positions and planned exclusion rules."""
+    steps = ["b", *rng.choice(["other", "start", "load", "load", "end"], int(rng.integers(0, 6)), replace=False)]
+    rng.shuffle(steps)
+    limits = {"constant_answers": float(rng.integers(40, 100)), "fast_answers": float(rng.integers(1, 9)) / 10}
+    rules = [{"rule": rule, "limit": limit} for rule, limit in limits.items() if rng.random() < 0.4]
+    block = {"title": {"en": "Block"}, "phase": "main", "questionnaire": None}
+    question = {"kind": "text", "text": {"en": "Why?"}, "short": {"en": "Why"}}
+    forms = {
+        form: {"title": None, "items": [{**question, "id": f"q{place}"} for place in range(rng.integers(1, 5))]}
+        for form in ("start", "load", "end")
+    }
+    order = rng.choice(["fixed", "random"])
+    kept = made.protocol | {
+        "format": 2,
+        "study": {"languages": ["en"], "block_order": str(order)},
+        "blocks": {"b": made.protocol["blocks"]["b"] | block, "other": block | {"title": {"en": "Other"}}},
+        "questionnaires": forms,
+        "scales": {},
+        "analysis": {"exclusions": rules},
+    }
+    groups = {name: {**group, "sequence": steps} for name, group in kept.get("groups", {}).items()}
+    kept |= {"groups": groups} if groups else {"sequence": [str(step) for step in steps]}
+    return replace(made, protocol=kept, others=other_questions(kept, None))
 
 
 def check_report(made: Study) -> None:
