@@ -490,7 +490,7 @@ def _difference_words(contrast: ContrastResult) -> str:
         said = f"{what} did not differ significantly between {first} and {second}"
     else:
         said = f"{what} was not significantly {expected} in {first} than in {second}"
-    means = listed([number(side.mean) for side in contrast.sides if side.mean is not None])
+    means = listed([_mean_words(side) for side in contrast.sides if side.mean is not None])
     higher = (
         ""
         if contrast.higher is None
@@ -500,8 +500,14 @@ def _difference_words(contrast: ContrastResult) -> str:
     size = "" if contrast.standardised is None else f", {_size_words(contrast.standardised)}"
     return (
         f"{said} (means {means}; {effect}, 95 % confidence interval {interval(contrast.interval)}{size}, "
-        f"{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n}).{higher}{_bayes_words(contrast)}"
+        f"{'adjusted ' * (contrast.members > 1)}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n})."
+        f"{higher}{_bayes_words(contrast)}"
     )
+
+
+def _mean_words(side: ContrastSide) -> str:
+    ends = "" if side.low is None or side.high is None else f" [{number(side.low)}, {number(side.high)}]"
+    return f"{number(side.mean)}{ends}"
 
 
 def _size_words(size: EffectSize | None) -> str:
@@ -526,6 +532,10 @@ def t_test_name(contrast: Contrast, *, ratio: bool) -> str:
     return f"two-sample t test{values} with unequal variances" if contrast.groups else f"paired t test{values}"
 
 
+def _holm_words(contrasts: Sequence[ContrastResult]) -> str:
+    return f", Holm-adjusted across {len(contrasts)} hypotheses" if len(contrasts) > 1 else ""
+
+
 def contrast_methods(results: Results) -> Iterator[str]:
     """Yield the sentences about hypotheses for the methods paragraph."""
     contrasts = results.contrasts
@@ -538,11 +548,10 @@ def contrast_methods(results: Results) -> Iterator[str]:
         yield f"{label} ({contrast.hypothesis}) was tested with a {sides} {test}."
     if any(contrast.contrast.groups for contrast in contrasts):
         yield "Comparisons between groups used the degrees of freedom of the smaller group (Hsu 1938)."
-    holm_words = f", Holm-adjusted across {len(contrasts)} hypotheses"
     yield (
         "Each participant contributed one value to each comparison. In addition to the t test, we used a bootstrap "
         "that adds a participant as extreme as the most extreme one (Gaffke 2005) and a t test corrected for skewness "
-        f"(Hall 1992). The reported p value is the largest of the three{holm_words * (len(contrasts) > 1)}."
+        f"(Hall 1992). The reported p value is the largest of the three{_holm_words(contrasts)}."
     )
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
@@ -599,10 +608,10 @@ def contrast_section(results: Results) -> Iterator[str]:
     yield paragraph(
         "These hypotheses are stated in the study file. Each was tested on one value per participant, using a t test, "
         "a bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
-        "The adjusted p value is the largest of the three, Holm-adjusted across "
-        f"{number_text.counted(len(results.contrasts), 'test')}. “Equivalent” means that the sample is large enough "
-        "and that both the t tests and the bootstrap show that the mean difference (or ratio) lies "
-        f"within the stated bounds (Holm-adjusted across the bounds). {_WEIGHTED if weighted else ''}{LEFT_OUT}",
+        f"The adjusted p value is the largest of the three{_holm_words(results.contrasts)}. “Equivalent” means "
+        "that the sample is large enough and that both the t tests and the bootstrap show that the mean difference "
+        "(or ratio) lies within the stated bounds (Holm-adjusted across the bounds). "
+        f"{_WEIGHTED if weighted else ''}{LEFT_OUT}",
         "soft",
     )
     yield paragraph(

@@ -163,7 +163,8 @@ def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
     measure = contrast.measure_name or contrast.contrast.measure_words
     if contrast.contrast.is_interaction:
-        return f"{'Ratio' if contrast.ratio else 'Difference'}, {measure}"
+        symbol = {"d_prime": "d′"}.get(contrast.contrast.measure, measure)
+        return f"{'Ratio' if contrast.ratio else 'Difference'} in {symbol}"
     if contrast.contrast.form is not None:
         return measure
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:

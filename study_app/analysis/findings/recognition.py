@@ -31,6 +31,7 @@ from study_app.analysis.wording import interval, listed, number, p_equals, p_val
 from study_app.protocol.groups import EACH_GROUP
 
 _NONE_RECOGNISED: Final = "We could not show that participants recognised any liquid above chance."
+_NO_SINGLE_LIQUID: Final = "We could not show for any single liquid that it was recognised above chance."
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +180,16 @@ def _undecided_words(outcome: Recognition) -> str:
     )
 
 
+def _hits_words(named: RecognitionResult) -> str:
+    """Return how many liquids were named correctly, and how many are expected by chance; the test was possible."""
+    tested = named.found
+    hits = f"named {number(tested.statistic, 0)} of {sum(rate.n for rate in tested.rates)} liquids correctly"
+    chance = f"given how often each name was used; {p_equals(tested.p or 0.0)}"
+    if named.verdict in FOUND:
+        return f"Overall, participants {hits}, more than expected by chance ({number(tested.expected, 1)}, {chance})."
+    return f"Participants {hits} ({number(tested.expected, 1)} expected by chance, {chance})."
+
+
 def recognised(named: RecognitionResult, alpha: float) -> tuple[int, ...]:
     """Return the indices of the settings that were recognised.
 
@@ -231,14 +242,11 @@ class Distinguished(Finding[None]):
         text += self._largest_words({test.item for test in differing if test.verdict == verdict})
         if named is not None and named.found.p is not None:
             names = listed([result.names[place].lower() for place in known])
-            hits = (
-                f"Participants named {number(named.found.statistic, 0)} of {sum(rate.n for rate in named.found.rates)} "
-                f"liquids correctly ({number(named.found.expected, 1)} expected by chance, {p_equals(named.found.p)})."
-            )
-            if known or not verdicts:
-                text = f"{f'Recognised above chance: {names}.' if names else _NONE_RECOGNISED} {hits} {text}"
-            else:  # what was shown comes first
-                text = f"{text} {_NONE_RECOGNISED} {hits}"
+            single = f"Recognised above chance: {names}." if names else _NO_SINGLE_LIQUID
+            if named.verdict not in FOUND:
+                single = _NONE_RECOGNISED
+            hits = f"{_hits_words(named)} {single}"
+            text = f"{hits} {text}" if known or not verdicts else f"{text} {hits}"  # what was shown comes first
         if not verdicts:
             return self.answered("not shown", f"{text} {NO_EVIDENCE}")
         return self.answered(verdict, text, claims=True)

@@ -59,7 +59,8 @@ def table_of_tests(
     reasons = dict.fromkeys(outcome.no_interval for outcome in outcomes if outcome.no_interval)
     methods = dict.fromkeys(outcome.method for outcome in outcomes if outcome.p is not None)
     family = dict.fromkeys(
-        f"p adjusted ({test.correction}) across {number_text.counted(test.members, 'test')} (“{test.family}”)"
+        (f"p adjusted ({test.correction}) across {test.members} tests" if test.members > 1 else "p not adjusted")
+        + f" (“{test.family}”)"
         for test in tests
     )
     two = isinstance(first.outcome, Paired) and len(compared) == 2

@@ -183,7 +183,7 @@ def _number_words(numbers: Numbers) -> str:
     what = f"The mean {numbers.title} score" if numbers.is_score else f"The mean of “{numbers.title}”"
     means = [(name, mean, len(held)) for name, held in numbers.by_setting if (mean := mean_of(held.values()))]
     parts = [
-        f"{number(mean.value)}{f' {_setting_words(name)}' if name else ''}{_mean_ends(mean)}" for name, mean, _ in means
+        f"{number(mean.value)}{_mean_ends(mean)}{f' {_setting_words(name)}' if name else ''}" for name, mean, _ in means
     ]
     n = max(count for *_, count in means)
     text = f"{what} was {listed(parts)} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."

@@ -311,7 +311,9 @@ def _questionnaires(study: Study) -> Iterator[str]:
     for (form, title), questions in forms.items():
         sessions = list(session_steps_of(study.protocol))
         times = list(dict.fromkeys(_form_times(study, steps, form) for steps in sessions if form in steps))
-        differ = ", depending on the group or session" * (len(times) > 1 or not all(form in one for one in sessions))
+        differ = ", depending on the group or session" if len(times) > 1 else ""
+        if not differ and not all(form in steps for steps in sessions):
+            differ = ", in some groups or sessions"
         yield (
             f"Participants completed the questionnaire “{title}” ({counted(questions, 'question')}) "
             f"{' or '.join(times)}{differ}."

@@ -368,7 +368,8 @@ def question_section(where: str, study: Study, results: Results, drawn_: Sequenc
                 yield bullets(group.numbers["texts"])
             continue
         rows = [(group.name, measure.cells(asked[where, result.item], group.numbers)) for group in result.groups]
-        yield table(("Answers", *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
+        first = "Answers" if result.is_form else "Setting"
+        yield table((first, *rows[0][1]), [[name, *cells.values()] for name, cells in rows])
         yield from drawn_figure({picture.name: picture for picture in drawn_}, f"question-{where}-{result.item}")
     for level in levels:
         yield from level_section(level, drawn_, study.estimator)

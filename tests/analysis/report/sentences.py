@@ -17,6 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 from scipy.stats import binom, binomtest
+from scipy.stats import t as t_distribution
 
 from study_app import __version__
 from study_app.analysis.data.study_tables import Study
@@ -260,10 +261,12 @@ def recognised(told: Told) -> set[str]:
 
 def names_are_counted(match: re.Match[str], told: Told) -> bool:
     """Check how many names are right, and how many would be by chance."""
-    hits, n, expected, p = match.groups()
+    overall, hits, n, more, expected, p = match.groups()
+    is_shown = told.block["named"]["verdict"] in DECIDED
     rates, found = told.block["named"]["found"]["rates"], told.block["named"]["found"]
     return (
-        int(hits) == sum(rate["hits"] for rate in rates)
+        (overall, more) == (("Overall, p", ", more than expected by chance (") if is_shown else ("P", " ("))
+        and int(hits) == sum(rate["hits"] for rate in rates)
         and int(n) == sum(rate["n"] for rate in rates)
         and is_number(expected, found["expected"])
         and is_p(p, found["p"])
@@ -361,7 +364,8 @@ def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
         f"“{short_of(told, one['contrast']['measure'])}”" in match[0]
         and all(name in match[0] for name in one["compared"])
         and (not within or np.allclose(np.sort(sides[0] - sides[1]), np.sort(differences)))
-        and all(is_number(text, side.mean()) for text, side in zip(means.split(" and "), sides, strict=True))
+        and all(mean_holds(text, side) for text, side in zip(means.split(" and "), sides, strict=True))
+        and (match["adjusted"] is not None) == (len(told.results["contrasts"]) > 1)
         and is_number(effect, one["effect"])
         and is_number(effect, mean)
         and is_number(match["low"], one["interval"]["low"])
@@ -375,6 +379,14 @@ def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
         and (shown is None or (shown == "higher") == (mean > 0))
         and (shown is not None or lower == one["contrast"]["expected"])
     )
+
+
+def mean_holds(text: str, values: np.ndarray) -> bool:
+    """Return whether a text is the mean of values, and Student's interval if it gives one."""
+    mean, *ends = re.findall(R, text)
+    half = t_distribution.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values))
+    expected = (values.mean() - half, values.mean() + half)
+    return is_number(mean, values.mean()) and all(map(is_number, ends, expected[: len(ends)]))
 
 
 def hedges_g(first: np.ndarray, second: np.ndarray) -> float:
@@ -743,10 +755,13 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"The largest mean difference is {R} points \(({ITEM}) at {R} ms, (?:> )?{R} % confidence interval {ENDS}, "
      r"n = (\d+)\)\.", largest_difference),
     # First page: liquids
-    (rf"Participants named (\d+) of (\d+) liquids correctly \({R} expected by chance, {P}\)\.", names_are_counted),
+    (rf"(P|Overall, p)articipants named (\d+) of (\d+) liquids correctly(, more than expected by chance \(| \(){R}"
+     rf"(?: expected by chance)?, given how often each name was used; {P}\)\.", names_are_counted),
+    (r"We could not show for any single liquid that it was recognised above chance\.",
+     when(lambda told: not recognised(told) and told.block["named"]["verdict"] in DECIDED)),
     (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
     (r"We could not show that participants recognised any liquid above "
-     r"chance\.", when(lambda told: not recognised(told))),
+     r"chance\.", when(lambda told: told.block["named"]["verdict"] not in DECIDED)),
     (r"Participants rated these pairs differently: (.*)\.", pairs_differ),
     (rf"The largest mean difference from (.*) is {R} points \(({ITEM}) for (.*), 95 % confidence interval {ENDS}, "
      r"n = (\d+)\)\.", largest_of_settings),
@@ -758,9 +773,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # Hypotheses
     (rf"Agreement with {ITEM} (?:was (?P<shown>higher|lower) in .* than in .*|did not differ significantly between .*"
      r" and .*|was not significantly (?P<lower>higher|lower) in .* than in .*)"
-     rf" \(means (?P<means>{R} and {R}); mean difference (?P<effect>{R})"
+     rf" \(means (?P<means>{R}(?: {ENDS})? and {R}(?: {ENDS})?); mean difference (?P<effect>{R})"
      rf", 95 % confidence interval \[(?P<low>{R}), (?P<high>{R})\], (?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
-     r"p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
+     r"(?P<adjusted>adjusted )?p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
     (r"It was higher in (\S+) for (\d+) of (\d+) participants\.", higher_for_so_many),
     (r"The data are ([\d.]+) times as likely if there is (a|no) difference as if there is (one|none) \(JZS Bayes "
      r"factor, Cauchy prior with scale 0\.707\)\.", bayes_factor),
