@@ -15,7 +15,7 @@ from study_app.analysis.levels.tracks import below_chance, tracks
 from study_app.analysis.results import Results
 from study_app.analysis.wording import counted, number, p_equals, percent
 from study_app.number_text import capitalised
-from study_app.protocol.model import RULES
+from study_app.protocol.model import RULES, ExclusionRule
 from study_app.store.exclusions import Exclusion
 
 NEED_KEY: Final = {"below_chance", "threshold_beyond_levels"}
@@ -107,14 +107,15 @@ def proposals(study: Study, results: Results | None) -> tuple[Proposal, ...]:
     return tuple(sorted((*excluded, *decided), key=lambda one: (*one.what, one.rule)))
 
 
-def _planned_limits(study: Study) -> dict[str, float | None]:
+def _planned_limits(study: Study) -> dict[Any, float | None]:
     """Return the planned rules with their limits, None for a rule without one."""
     return {rule["rule"]: rule.get("limit") for rule in (study.protocol.get("analysis") or {}).get("exclusions", ())}
 
 
 def rule_conditions(study: Study) -> dict[str, str]:
     """Return the condition of each planned rule as text."""
-    return {rule: RULES[rule].format(limit=limit) for rule, limit in _planned_limits(study).items()}
+    rules = (ExclusionRule(rule=rule, limit=limit) for rule, limit in _planned_limits(study).items())
+    return {rule.rule: rule.words for rule in rules}
 
 
 def rule_sentences(study: Study, results: Results | None) -> tuple[str, ...]:

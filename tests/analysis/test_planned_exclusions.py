@@ -21,6 +21,8 @@ from study_app.protocol.source.files import shipped_file
 from study_app.store.exclusions import exclude, keep
 from study_app.store.unblinding import unblind
 from tests.analysis.conftest import SAMPLE
+from tests.analysis.made_up import liquids
+from tests.analysis.made_up import study as made_up_study
 from tests.compiled import needs_servo
 
 PAIRS = """
@@ -72,6 +74,15 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
     assert "the median response time is below 0.2 s. No session met it." in page
     assert found[0].why == f"100 % of the {int((own & responses['counted']).sum())} answers to statements are identical"
     assert found[1].why == f"half of the {int((hurried & answered['counted']).sum())} answers were given within 0.30 s"
+
+
+@pytest.mark.parametrize(("limit", "met"), [(54.0, True), (55.0, False)])
+def test_a_percentage_that_is_exactly_the_limit_is_permitted(limit: float, met: bool) -> None:
+    """Eleven of 20 answers are 4, which is 55 %; in floating point 100 * (11 / 20) is more."""
+    given = [4] * 11 + [1, 2, 3, 5, 6, 7, 1, 2, 3]
+    trials = [("P001", 1, f"L{place % 2 + 1}", given[2 * place : 2 * place + 2]) for place in range(10)]
+    constant = {"rule": "constant_answers", "limit": limit}
+    assert bool(proposals(with_rules(made_up_study(liquids(2), trials), constant), None)) == met
 
 
 @pytest.fixture(scope="module")
