@@ -257,7 +257,8 @@ def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_
     dutch = count - 1  # "baseline" is Dutch, too
     assert (translated.faults, copied_texts(translated)) == ((), {"nl": dutch, "de": count})
     assert words(translated) == [
-        f"study.title: {copies} texts are still in English and must be translated into {name}; this is the first of them"
+        f"study.title: {copies} texts are still in English and must be translated into {name}; this is the first of "
+        "them"
         for name, copies in (("Dutch", dutch), ("German", count))
     ]
     assert (copied_texts(DEMO), words(DEMO)) == ({}, [])
