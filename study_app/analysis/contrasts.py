@@ -53,11 +53,6 @@ _STATISTICS: Final[Mapping[str, tuple[type[LevelStatistic[Any]], str]]] = {
 RATIOS: Final = ("threshold", "pse")
 """Measures that are compared as ratios where the levels of all blocks are spaced by ratios."""
 
-LEFT_OUT: Final = (
-    "Participants are included if both of their values are available, even if a threshold lies outside the range of "
-    "levels. The report lists the excluded participants and the reasons."
-)
-"""Who is compared, in power, preregistration and report."""
 _WEIGHTED: Final = (
     "Thresholds are weighted as in the group mean. If two blocks have the same levels and design, their thresholds "
     "are estimated with a common width of the psychometric function, so their ratio may differ from the ratio of the "
@@ -423,6 +418,16 @@ def _measure_name(study: Study, contrast: Contrast) -> str:
     return "" if item is None else f"agreement with “{item.short}”"
 
 
+def inclusion_words(contrasts: Iterable[Contrast]) -> str:
+    """Return who is compared, for power, preregistration and report."""
+    beyond = any(contrast.measure == "threshold" for contrast in contrasts)
+    return (
+        "Participants are included if both of their values are available"
+        f"{', even if a threshold lies outside the range of levels' * beyond}. The report lists the excluded "
+        "participants and the reasons."
+    )
+
+
 def equality_limits(contrast: Contrast, bound: float, *, ratio: bool) -> tuple[float, float | None]:
     """Return the bound on the scale of the test, and the largest possible difference (None: unlimited)."""
     is_statement = contrast.measure not in _STATISTICS and contrast.form is None
@@ -605,13 +610,14 @@ def contrast_section(results: Results) -> Iterator[str]:
         last=1,
     )
     weighted = any(contrast.contrast.measure == "threshold" for contrast in results.contrasts)
+    compared = inclusion_words(contrast.contrast for contrast in results.contrasts)
     yield paragraph(
         "These hypotheses are stated in the study file. Each was tested on one value per participant, using a t test, "
         "a bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
         f"The adjusted p value is the largest of the three{_holm_words(results.contrasts)}. “Equivalent” means "
         "that the sample is large enough and that both the t tests and the bootstrap show that the mean difference "
         "(or ratio) lies within the stated bounds (Holm-adjusted across the bounds). "
-        f"{_WEIGHTED if weighted else ''}{LEFT_OUT}",
+        f"{_WEIGHTED if weighted else ''}{compared}",
         "soft",
     )
     yield paragraph(

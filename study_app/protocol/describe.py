@@ -34,7 +34,7 @@ from study_app.protocol.tracks import (
     tracks_of,
 )
 from study_app.protocol.trials.methods import Adjustment
-from study_app.protocol.trials.stimuli import DELAY, OF_LINK
+from study_app.protocol.trials.stimuli import DELAY, DELAYS, OF_CONDITION, OF_LINK
 from study_app.protocol.trials.tasks import Follow
 from study_app.protocol.warnings.expected_precision import precision_rows
 from study_app.protocol.warnings.study_warnings import warnings
@@ -65,7 +65,8 @@ def describe(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS, without_force
     decided = [("nothing", "there is no [analysis] table, so the report will label all findings as exploratory")]
     if protocol.analysis is not None:
         named = [f"{name} by {condition.label}" for name, condition in protocol.conditions.items() if condition.label]
-        decided = list(protocol.analysis.described(named))
+        statements = any(block.design is None and block.questionnaire is not None for block in protocol.main_blocks)
+        decided = list(protocol.analysis.described(named, statements=statements))
     people = protocol.simulated_participants
     sections = (
         _head_lines(protocol, language),
@@ -357,9 +358,20 @@ def _question_kind(item: Question, context: Context) -> str:
 
 
 def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
-    """Return the limits of a valid trial: each value with its meaning."""
+    """Return the limits of a valid trial that the study's blocks can exceed: each value with its meaning."""
     units, rows = {"ms": " ms", "percent": " %"}, []
+    with_intervals = [block for block in protocol.blocks_in_order if block.design is not None]
+    varied = {stimulus_of(protocol, block).vary for block in with_intervals if block.stimulus is not None}
+    applies = {
+        "level_error_percent": bool(varied - {*OF_CONDITION}),
+        "level_error_ms": bool(varied & {*DELAYS}),
+        "pace_error_percent": any(isinstance(protocol.tasks[block.task], Follow) for block in with_intervals),
+        "attempts": bool(with_intervals),
+        "missing_percent": bool(with_intervals),
+    }
     for key, field in Limits.model_fields.items():
+        if not applies.get(key, True):
+            continue
         label = re.sub(r" \[.*|; .*|\.$", "", field.description or "")
         if (value := getattr(protocol.limits, key)) is not None:
             rows.append((f"{value:g}{units.get(key.rpartition('_')[2], '')}", label[:1].lower() + label[1:]))

@@ -603,22 +603,14 @@ class Analysis(Table):
             raise invalid("each look needs more participants than the previous look", "looks")
         return self
 
-    def described(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """Yield a row for each decision; ``named_by`` maps conditions to the items that name them."""
-        bound = self.equivalence_bound
-        points = "point" if bound == 1 else "points"
+    def described(self, named_by: Sequence[str], *, statements: bool) -> Iterator[tuple[str, str]]:
+        """Yield a row for each decision; ``named_by`` maps conditions to the items that name them.
+
+        Decisions about statements are omitted unless the study tests ``statements``.
+        """
         yield "Significance level", f"{self.alpha:g}"
-        yield (
-            "Equivalent",
-            "not tested" if bound is None else f"mean answers within {bound:g} {points} of those without delay",
-        )
-        yield "Primary", ", ".join(self.primary) or "all statements"
-        yield "Recognition", ", ".join(self.names) or "none"
-        if named_by:
-            yield "Recognised", ", ".join(named_by)
-        yield "Increase with delay", ", ".join(self.rising) or "none"
-        yield "Decrease with delay", ", ".join(self.falling) or "none"
-        yield "Detection", "not asked" if self.noticed is None else f"agreement with {self.noticed} (5 to 7)"
+        if statements:
+            yield from self._statement_decisions(named_by)
         if self.participants is not None:
             yield "Participants", f"{self.participants} planned"
         if self.looks:
@@ -630,6 +622,21 @@ class Analysis(Table):
         yield from (("Proposes exclusion", rule.words) for rule in self.exclusions)
         yield from (("Hypothesis", contrast.described()) for contrast in self.contrasts)
         yield from (("Published", value.described()) for value in self.published)
+
+    def _statement_decisions(self, named_by: Sequence[str]) -> Iterator[tuple[str, str]]:
+        bound = self.equivalence_bound
+        points = "point" if bound == 1 else "points"
+        yield (
+            "Equivalent",
+            "not tested" if bound is None else f"mean answers within {bound:g} {points} of those without delay",
+        )
+        yield "Primary", ", ".join(self.primary) or "all statements"
+        yield "Recognition", ", ".join(self.names) or "none"
+        if named_by:
+            yield "Recognised", ", ".join(named_by)
+        yield "Increase with delay", ", ".join(self.rising) or "none"
+        yield "Decrease with delay", ", ".join(self.falling) or "none"
+        yield "Detection", "not asked" if self.noticed is None else f"agreement with {self.noticed} (5 to 7)"
 
 
 T = TypeVar("T")

@@ -21,7 +21,7 @@ from scipy.stats import t as student
 
 from study_app import __version__
 from study_app import figure_style as style
-from study_app.analysis.contrasts import LEFT_OUT, equality_limits
+from study_app.analysis.contrasts import equality_limits, inclusion_words
 from study_app.analysis.data.blocks import TRENDS
 from study_app.analysis.data.measures import Array
 from study_app.analysis.page_layout import SMALL, Style
@@ -581,7 +581,7 @@ def smallest_differences(
     )
     yield (
         f"{said}{both} The “smallest difference” is the difference that {WANTED:.0%} of studies detect ({at}).{within} "
-        f"{LEFT_OUT}"
+        f"{inclusion_words([contrast])}"
     )
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
@@ -678,7 +678,7 @@ def _explained(question: Question, found: Powers) -> list[str]:
             return [
                 "Hypotheses are tested with paired t tests on each participant's mean answers, Holm-corrected across "
                 "the hypotheses; the bootstrap and the t test corrected for skewness must also be significant. "
-                f"Equivalence is tested in the same way as in the report. {LEFT_OUT}"
+                f"Equivalence is tested in the same way as in the report. {inclusion_words([])}"
             ]
 
 

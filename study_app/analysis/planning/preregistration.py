@@ -10,7 +10,7 @@ from typing import Final
 from pydantic import TypeAdapter
 
 from study_app import __version__, number_text
-from study_app.analysis.contrasts import LEFT_OUT, RATIOS, equality_limits, t_test_name
+from study_app.analysis.contrasts import RATIOS, equality_limits, inclusion_words, t_test_name
 from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions, display_language
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
@@ -31,7 +31,13 @@ from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.table import text_in
 from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
 from study_app.protocol.trials.stimuli import assumed_for
-from study_app.protocol.warnings.expected_precision import expected_of, precision_plan, precision_rows, threshold_plan
+from study_app.protocol.warnings.expected_precision import (
+    PRECISION,
+    expected_of,
+    precision_plan,
+    precision_rows,
+    threshold_plan,
+)
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.store.exclusions import MISSING_RULE, describe_exclusion
 from study_app.store.merged import DASH, folders_of
@@ -112,7 +118,7 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
             f"three, Holm-adjusted across all hypotheses of this kind.{_equality_of(protocol, contrast)}"
         )
     if protocol.analysis is not None and protocol.analysis.contrasts:
-        yield LEFT_OUT
+        yield inclusion_words(protocol.analysis.contrasts)
     for block in protocol.main_blocks:
         if block.design is not None:
             yield from _of_intervals(protocol, block)
@@ -139,7 +145,8 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
 def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
     design = design_of(protocol, block)
     if block.stimulus is None:
-        yield f"Block {block.id}: how well can {listed(block.conditions)} be discriminated from {block.standard} (d′)?"
+        others = [name for name in block.conditions if name != block.standard]
+        yield f"Block {block.id}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
         return
     stimulus = stimulus_of(protocol, block)
     what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit
@@ -234,6 +241,14 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                 "correction."
             )
     asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]
+    if protocol.forms:
+        contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
+        hypotheses = " except in the hypotheses above" * any(contrast.form is not None for contrast in contrasts)
+        yield (
+            f"Questions in {listed(list(protocol.forms))}: we describe the answers and do not test them{hypotheses}. "
+            "We report means across participants with 95 % confidence intervals (Student's t): of the scores or, if a "
+            "form has no scores, of the ratings and numbers. Chosen options are counted."
+        )
     if not asked:
         return
     decided = decisions(protocol)
@@ -317,7 +332,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
         "## The protocol in words",
         "",
         "```text",
-        describe(protocol),
+        *(line for line in describe(protocol).splitlines() if not line.startswith(f"  {PRECISION}")),
         "```",
         "",
         "## Values that the report checks",
@@ -353,11 +368,8 @@ def _design(protocol: Protocol) -> Iterator[str]:
         yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
     yield ("Each participant's trial orders are generated from the session's seed, as described below for each block.")
     for block in protocol.main_blocks:
-        rows = dict(precision_rows(protocol, block))
         kind = "levels" if block.stimulus is not None else "conditions"
-        yield f"Block {block.id} compares {kind} (described below)." + (
-            f" Expected precision: {rows['Expected precision']}." if rows else ""
-        )
+        yield f"Block {block.id} compares {kind} (described below)."
 
 
 def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
@@ -381,24 +393,9 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
         else f" The goal is a 95 % interval for the group mean no wider than ±{percent(one.precision)}."
     )
     yield planned + wanted
-    reasons = []
-    for block in protocol.main_blocks:
-        plan = precision_plan(protocol, block)
-        if plan is None or not (expected := expected_of(plan)).measured:
-            continue
-        reached = ""
-        if one.participants is not None:
-            half = 100 * expected.of_group(one.participants)
-            people = number_text.counted(one.participants, "participant")
-            reached = f" With {people}, the expected precision is ±{half:.0f} %."
-        needed = None if one.precision is None else expected.participants_for(one.precision)
-        enough = "" if needed is None else f" The goal requires at least {number_text.counted(needed, 'participant')}."
-        reasons.append(
-            f"- Block {block.id}: we simulated {expected.trials} trials{plan.per}, with thresholds that differ between "
-            f"people by a factor of {BETWEEN_PEOPLE:g}.{reached}{enough}"
-        )
-    if reasons:
-        yield from ("", *reasons)
+    if power is None or not power.startswith(f"# {PRECISION}"):  # otherwise the tables state the precision
+        reasons = [f"- {line}" for block in protocol.main_blocks for line in _precision_of(protocol, block)]
+        yield from ("", *reasons) if reasons else ()
     if power is not None:
         yield from ("", *(f"##{line}" if line.startswith("#") else line for line in power.rstrip().splitlines()))
     elif compares_statements(protocol):
@@ -407,6 +404,21 @@ def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Ite
             f"Power was not computed for this text: `liquid-study power {protocol.study.name} --to DIR` computes it, "
             "and `--power DIR` includes it here."
         )
+
+
+def _precision_of(protocol: Protocol, block: Block) -> Iterator[str]:
+    """Yield the expected precision of a block's estimates and how many participants the goal requires."""
+    if (plan := precision_plan(protocol, block)) is None:
+        return
+    ((label, reached),) = precision_rows(protocol, block)
+    expected, enough = expected_of(plan), ""
+    goal = None if protocol.analysis is None else protocol.analysis.precision
+    if goal is not None and expected.measured and (needed := expected.participants_for(goal)) is not None:
+        enough = f" The goal requires at least {number_text.counted(needed, 'participant')}."
+    yield (
+        f"Block {block.id}: we simulated {expected.trials} trials{plan.per}, with {plan.estimated} that differ between "
+        f"people by a factor of {BETWEEN_PEOPLE:g}. {label}{', ' if plan.words else ': '}{reached}.{enough}"
+    )
 
 
 def _exclusions(protocol: Protocol) -> Iterator[str]:

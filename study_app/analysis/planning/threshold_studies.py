@@ -31,6 +31,7 @@ from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
 from study_app.protocol.tracks import stimulus_of, tracks_of
 from study_app.protocol.warnings.expected_precision import (
+    PRECISION,
     EstimationPlan,
     MeanPlan,
     RatingPlan,
@@ -312,7 +313,7 @@ def threshold_markdown(precisions: Precisions) -> str:
     study, precision = precisions.protocol.study, precisions.precision
     language = display_language({"study": {"languages": study.languages}})
     lines = [
-        f"# Expected precision for {text_in(study.title, language)} ({study.name} {study.version})",
+        f"# {PRECISION} for {text_in(study.title, language)} ({study.name} {study.version})",
         "",
         f"**SIMULATED.** Each row summarises {precisions.studies} studies (seed {precisions.seed}, liquid-study "
         f"{__version__}). True values differ between people by a factor of {BETWEEN_PEOPLE:g} (one standard "

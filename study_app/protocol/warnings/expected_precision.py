@@ -31,6 +31,8 @@ from study_app.psychophysics.families import Floats
 from study_app.psychophysics.grid import Z_95, Posterior, group_priors
 from study_app.psychophysics.people import ALONE, ASSUMED, ESTIMATE_NOISE, KINDS, Estimates, Expected, Person
 
+PRECISION: Final = "Expected precision"
+"""The label of `precision_rows` and the head of the tables of ``power``."""
 _D_PRIME: Final = 1.0
 """Of simulated participants. [choice]"""
 _EXPONENT: Final = 0.5
@@ -53,6 +55,8 @@ class SensitivityPlan:
     of_each: str
     value: ClassVar[float] = _D_PRIME
     unit: ClassVar[str] = ""
+    estimated: ClassVar[str] = "values of d′"
+    """What participants differ in, as a plural noun."""
     words: ClassVar[str] = f"at d′ = {_D_PRIME:g}: "
     """What is assumed, in words."""
     per = property(lambda self: f" per {self.of_each}")
@@ -91,6 +95,7 @@ class EstimationPlan:
     value: float
     per: ClassVar[str] = ""
     unit: ClassVar[str] = ""
+    estimated: ClassVar[str] = "exponents"
     words = property(lambda self: f"exponent of {self.value:g}: ")
     trials = property(lambda self: len(self.levels) * self.repetitions)
 
@@ -113,6 +118,7 @@ class RatingPlan:
     per: ClassVar[str] = " per level"
     unit: ClassVar[str] = ""
     value: ClassVar[float] = _D_PRIME
+    estimated: ClassVar[str] = "values of d_a"
     words: ClassVar[str] = f"at d_a = {_D_PRIME:g}: "
 
     def with_trials(self, trials: int) -> RatingPlan:  # noqa: D102 - as above
@@ -224,6 +230,7 @@ class ThresholdPlan:
     clipping: Clipping | None = None
 
     per: ClassVar[str] = " per standard"
+    estimated: ClassVar[str] = "thresholds"
     words: ClassVar[str] = ""
     trials = property(lambda self: self.method.presentations(self.stimulus) * self.method.tracks)
     """Comparisons of each standard, at most."""
@@ -429,7 +436,7 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
     if plan is None:
         return
     if not (found := expected_of(plan)).measured:
-        yield "Expected precision", "not available, because the levels for most thresholds are clipped"
+        yield PRECISION, "not available, because the levels for most thresholds are clipped"
         return
     log = found.spacing == "log"
     kind, most = found.worst
@@ -442,7 +449,7 @@ def precision_rows(protocol: Protocol, block: Block) -> Iterator[tuple[str, str]
         group = f"; ±{100 * found.of_group(people):.0f} %{over} for {people} participants"
     elif precision is not None and (needed := found.participants_for(precision)) is not None:
         group = f"; ±{100 * precision:g} %{over} requires {needed} participants"
-    yield "Expected precision", f"{plan.words}{one} for one participant{group} (95 % intervals)"
+    yield PRECISION, f"{plan.words}{one} for one participant{group} (95 % intervals)"
 
 
 def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:

@@ -6,9 +6,11 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.planning.preregistration import FILE, commitment, preregistration, read_commitment
+from study_app.analysis.planning.threshold_studies import BATCH, threshold_markdown
 from study_app.cli import commands
-from study_app.protocol.load import load
+from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped, source_bytes
+from tests.analysis.power.test_threshold_power import swept
 from tests.protocol.trials.level_studies import FIVE_POINTS, study
 
 HEADS = (
@@ -109,3 +111,53 @@ def test_it_is_written_into_a_folder(tmp_path: Path) -> None:
     to = tmp_path / "results" / "demo"
     assert written("demo", "--to", str(to)).strip() == str(to / FILE)
     assert (to / FILE).read_text(encoding="utf-8") == written("demo")
+
+
+DISCRIMINATION = """
+format = 2
+sequence = ["prompt", "after", "late", "after"]
+study.name = "discrimination"
+liquids.water = { density_kg_m3 = 998, viscosity_pa_s = 0.001 }
+liquids.slime = { density_kg_m3 = 1030, viscosity_pa_s = 0.2 }
+conditions.water.liquid = "water"
+conditions.slime.liquid = "slime"
+conditions.late_water = { liquid = "water", delay_ms = 70 }
+conditions.late_slime = { liquid = "slime", delay_ms = 70 }
+tasks.stir = { kind = "explore", min_s = 2, max_s = 6, instruction.en = "Stir." }
+blocks.prompt = { design = "abx", conditions = ["water", "slime"], standard = "water", task = "stir", repetitions = 18 }
+scales.seven.labels.en = ["1", "2", "3", "4", "5", "6", "7"]
+analysis = { participants = 14, contrasts = [{ measure = "d_prime", blocks = ["prompt", "late"] }] }
+[questionnaires.after]
+scale = "seven"
+intro.en = "Do you agree?"
+items = [{ id = "easy", text.en = "It was easy.", short.en = "Easy" }]
+[blocks.late]
+design = "abx"
+conditions = ["late_slime", "late_water"]
+standard = "late_water"
+task = "stir"
+repetitions = 18
+"""
+
+
+def test_a_study_of_d_prime_states_only_what_applies_to_it_and_its_precision_once() -> None:
+    protocol = parse(DISCRIMINATION.encode(), "discrimination.toml")
+    text = preregistration(protocol, "0" * 64)
+    assert "- Block prompt: how well can slime be discriminated from water (d′)?" in text
+    assert "- Block late: how well can late_slime be discriminated from late_water (d′)?" in text
+    assert "- Questions in after: we describe the answers and do not test them. We report means" in text
+    assert "maximum number of attempts to deliver an interval trial (3)" in text
+    for other in ("threshold", "speed of the target", "delivered level", "delay difference", "Primary"):
+        assert other not in text
+    assert text.count("for 14 participants") == 2  # once for each block
+    found = swept(protocol, (), (14,), BATCH)
+    tables = preregistration(protocol, "0" * 64, threshold_markdown(found))
+    assert "for 14 participants" not in tables
+    assert f"| ±{found.found['late', 18].half(0):.0%} |" in tables
+
+
+def test_limits_of_levels_are_stated_if_levels_vary() -> None:
+    text = preregistration(load("viscosityjnd"), "0" * 64)
+    assert "speed of the target it follows (40 %)" in text
+    assert "interval's delivered level (2 %)" in text
+    assert "delay difference" not in text
