@@ -17,7 +17,14 @@ from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.levels.thresholds import Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.planning.power_curves import Powers, detectable, power_markdown, powers, shown_equal
+from study_app.analysis.planning.power_curves import (
+    Powers,
+    detectable,
+    power_markdown,
+    powers,
+    shown_equal,
+    smallest_differences,
+)
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import count_findings, draw_opinions, plan, stacked_answers
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
@@ -412,7 +419,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
         told = threshold_markdown(precisions)
         assert f"{sizes} of the participants." in told
     spread = math.hypot(math.log(1.2), math.log(1.3))
-    assert f"| 20 | 3 | {spread:.0%} | – | – |" in told
+    assert f"| 20 | 3 | {spread:.0%} | too few | too few |" in told
     half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
     root = spread * math.sqrt(1 / 12 + 1 / 6)
     assert half == pytest.approx(math.exp(student.ppf(0.975, 5) * root))
@@ -428,6 +435,28 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
     t = ttest_ind(draw[:, :12] + float(smallest), draw[:, 12:], axis=1, equal_var=False).statistic
     shown = 2 * student.sf(abs(t), 5) <= 0.05
     assert shown.mean() == pytest.approx(0.8, abs=0.03)
+
+
+def test_power_says_whether_the_planned_participants_suffice() -> None:
+    contrast = Contrast(measure="d_prime", blocks=("late", "prompt"), groups=("a", "b"))
+
+    def told(planned: int, mean: float) -> str:
+        lines = smallest_differences(
+            contrast, (5, 16, 26), 0.06, 2, [("20", "90%", 0.9)], "trials", "SD.", "±{:.2f}".format, (0.5, 0.5),
+            planned=planned, assumed=("d′", mean),
+        )  # fmt: skip
+        return "\n".join(lines)
+
+    half, least = (0.9 * end for end in detectable(8, 8, tail=0.015))
+    assert 1.3 < least < 1.7
+    few = told(16, 1.3)
+    assert f"**The planned 16 participants are too few to find a difference smaller than ±{least:.2f} with 80%" in few
+    assert "would find even a fall of d′ from 1.3 to 0 in one block of one group (a difference of 1.3)." in few
+    assert f"| 20 | 16 (planned) | 90% | ±{half:.2f} | ±{least:.2f} |" in few
+    assert "| 20 | 5 | 90% | too few | too few |" in few  # a t test of groups of 2 has one degree of freedom
+    assert "“Too few” means that fewer studies would detect even a difference of 3 SD." in few
+    assert "even a fall" not in told(16, 1.7)
+    assert "**The planned 5 participants are too few to find a difference of 3 SD with 80% power.**" in told(5, 1.3)
 
 
 def test_the_smallest_difference_is_that_of_published_tables() -> None:

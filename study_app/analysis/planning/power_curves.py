@@ -54,6 +54,8 @@ WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
 
 _SPREADS: Final = 1000
+_MOST_SD: Final = 3.0
+"""Sample sizes that only find a larger difference, in standard deviations, are too few. [choice]"""
 
 _OVER_ALL: Final = "all statements at once"
 
@@ -506,15 +508,21 @@ def _between(power: Powers) -> Iterator[str]:
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
             said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan),
-            largest=equality_limits(contrast, 1.0, ratio=False)[1],
+            largest=equality_limits(contrast, 1.0, ratio=False)[1], planned=plan.participants,
         )  # fmt: skip
     for contrast, of_groups in plan.of_forms:
         members = len(plan.contrasts) + plan.untested
-        yield from form_differences(contrast, power.sizes, plan.decided.alphas[-1], members, of_groups)
+        alpha, planned = plan.decided.alphas[-1], plan.participants
+        yield from form_differences(contrast, power.sizes, alpha, members, of_groups, planned)
 
 
 def form_differences(
-    contrast: Contrast, sizes: Sequence[int], alpha: float, members: int, shares: tuple[float, float] | None
+    contrast: Contrast,
+    sizes: Sequence[int],
+    alpha: float,
+    members: int,
+    shares: tuple[float, float] | None,
+    planned: int | None,
 ) -> Iterator[str]:
     """Yield the table of a contrast of a form in standard deviations, which no answer model predicts.
 
@@ -527,7 +535,7 @@ def form_differences(
     )
     rows = [(contrast.measure, "1", 1.0)]
     yield from smallest_differences(
-        contrast, sizes, alpha, members, rows, "question or score", said, "±{:.2f} SD".format, shares
+        contrast, sizes, alpha, members, rows, "question or score", said, "±{:.2f} SD".format, shares, planned=planned
     )
 
 
@@ -557,6 +565,8 @@ def smallest_differences(
     *,
     bounds: int = 1,
     largest: float | None = None,
+    planned: int | None = None,
+    assumed: tuple[str, float] | None = None,
 ) -> Iterator[str]:
     """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies show.
 
@@ -564,8 +574,19 @@ def smallest_differences(
     below the heading ``first``, and the standard deviation as text and as a number; ``said`` describes it. ``shares``
     are the shares of participants in the two groups; None: within participants. ``bound`` is the equivalence bound, on
     the scale of the standard deviation, which ``bounds`` hypotheses state; ``largest`` is the largest difference of a
-    participant that the scale permits, None without a limit.
+    participant that the scale permits, None without a limit. ``planned`` participants have a verdict before the table;
+    ``assumed`` is a measure that can fall to 0 with its simulated mean.
     """
+
+    def groups_of(n: int) -> list[int]:
+        return [n] if shares is None else [int(n * share + 1e-9) for share in shares]
+
+    def differences(n: int, spread: float) -> tuple[float, float] | None:
+        if min(groups := groups_of(n)) < 2:
+            return None
+        half, least = detectable(*groups, tail=strictest / (2 if contrast.expected is None else 1))
+        return None if least > _MOST_SD else (half * spread, least * spread)
+
     equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
     heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
@@ -576,26 +597,58 @@ def smallest_differences(
     within = (
         ""
         if bound is None
-        else f" Equivalence requires at least {fewest_participants(alpha / bounds, bound, largest)} "
-        f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}."
+        else f"Equivalence requires at least {fewest_participants(alpha / bounds, bound, largest)} "
+        f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}. "
     )
+    has_too_few = any(differences(n, spread) is None for n in sizes for *_, spread in rows)
+    unusable = f"“Too few” means that fewer studies would detect even a difference of {_MOST_SD:g} SD. " * has_too_few
     yield (
-        f"{said}{both} The “smallest difference” is the difference that {WANTED:.0%} of studies detect ({at}).{within} "
-        f"{inclusion_words([contrast])}"
+        f"{said}{both} The “smallest difference” is the difference that {WANTED:.0%} of studies detect ({at}). "
+        f"{unusable}{within}{inclusion_words([contrast])}"
     )
+    if planned is not None:
+        name, _, spread = rows[0]
+        given = f" ({first}: {name})" if len(rows) > 1 else ""
+        yield from ("", _verdict(contrast, planned, given, differences(planned, spread), written, assumed))
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
         for n in sizes:
-            groups = [n] if shares is None else [int(n * share + 1e-9) for share in shares]
-            ends = ["–"] * (2 + len(equal))
-            if min(groups) > 1:
-                reached = detectable(*groups, tail=strictest / (2 if contrast.expected is None else 1))
-                ends = [written(end * spread) for end in reached]
-                if bound is not None:
-                    enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
-                    share = shown_equal(bound / spread, *groups, alpha=alpha / bounds) if enough_people else 0.0
-                    ends.append(f"{share:.0%}")
-            yield f"| {name} | {n} | {words} | {' | '.join(ends)} |"
+            reached, groups = differences(n, spread), groups_of(n)
+            ends = ["too few", "too few"] if reached is None else [written(end) for end in reached]
+            if bound is not None:
+                enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
+                share = shown_equal(bound / spread, *groups, alpha=alpha / bounds) if enough_people else 0.0
+                ends.append(f"{share:.0%}")
+            yield f"| {name} | {size_text(n, planned)} | {words} | {' | '.join(ends)} |"
+
+
+def _verdict(
+    contrast: Contrast,
+    planned: int,
+    given: str,
+    reached: tuple[float, float] | None,
+    written: Callable[[float], str],
+    assumed: tuple[str, float] | None,
+) -> str:
+    """Return the smallest difference that the planned sample finds, compared with a measure that falls to 0."""
+    too_few = f"The planned {planned} participants{given} are too few to find a difference"
+    if reached is None:
+        return f"**{too_few} of {_MOST_SD:g} SD with {WANTED:.0%} power.**"
+    _, least = reached
+    verdict = f"**{too_few} smaller than {written(least)} with {WANTED:.0%} power.**"
+    if assumed is None or least <= assumed[1]:
+        return verdict
+    measure, mean = assumed
+    where = "one group" if contrast.within is None else "one block of one group" if contrast.groups else "one block"
+    return (
+        f"{verdict} Fewer than {WANTED:.0%} of studies would find even a fall of {measure} from {mean:g} to 0 in "
+        f"{where} (a difference of {mean:g})."
+    )
+
+
+def size_text(n: int, planned: int | None) -> str:
+    """Return a number of participants in a table, marked if it is the planned one."""
+    return f"{n} (planned)" if n == planned else str(n)
 
 
 def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float, float]:
@@ -690,7 +743,8 @@ def _markdown_table(
     A cell has the range over all kinds of participants in parentheses; ``needed`` adds the size from which the power is
     at least 80 %.
     """
-    heads = [first, *(f"n = {size}" for size in found.sizes), *(["80 % from"] if needed else [])]
+    planned = found.plan.participants
+    heads = [first, *(f"n = {size_text(size, planned)}" for size in found.sizes), *(["80 % from"] if needed else [])]
     lines = [f"| {' | '.join(heads)} |", f"|---|{'---:|' * (len(heads) - 1)}"]
     for curve in curves:
         kinds = found.among_kinds(curve)

@@ -21,6 +21,7 @@ from study_app.analysis.planning.power_curves import (
     OF_STUDIES,
     form_differences,
     interval,
+    size_text,
     smallest_differences,
 )
 from study_app.analysis.planning.simulated_studies import group_shares
@@ -321,6 +322,7 @@ def threshold_markdown(precisions: Precisions) -> str:
     ]
     if precisions.studies < precisions.asked:
         lines += ["", f"**Ended early, after {precisions.studies} of {precisions.asked} studies.**"]
+    participants = None if precisions.protocol.analysis is None else precisions.protocol.analysis.participants
     wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
     heads = ["participants", "SD for one participant", "half-width of the group's 95 % interval", *wanted]
     planned = plans(precisions.protocol, ())
@@ -336,7 +338,12 @@ def threshold_markdown(precisions: Precisions) -> str:
                 half = found.half(place)
                 share = "–" if math.isnan(half) else f"{found.within(place, precision or 0.0):.0%}"
                 spread = f"{found.spread:.0%}" if math.isfinite(found.spread) else "–"
-                cells = (str(trials), str(size), spread, f"±{half:.0%}" if math.isfinite(half) else "–")
+                cells = (
+                    str(trials),
+                    size_text(size, participants),
+                    spread,
+                    f"±{half:.0%}" if math.isfinite(half) else "–",
+                )
                 lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
         lines += _of_kinds(precisions, block)
     lines += _contrasts(precisions)
@@ -373,18 +380,19 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
     for contrast in decided.contrasts:
         if contrast.form is not None:
             shares = group_shares(precisions.protocol, contrast)
-            yield from form_differences(contrast, precisions.sizes, alpha, members, shares)
+            yield from form_differences(contrast, precisions.sizes, alpha, members, shares, decided.participants)
             continue
         firsts = [next(iter(planned[block].values())) for block in contrast.blocks if block in planned]
         if len(firsts) < len(contrast.blocks) or any(_MEASURED.get(type(it)) != contrast.measure for it in firsts):
             continue
         first, ratio = firsts[0], contrast.measure == "threshold"
-        mean = 1.0 if isinstance(first, ThresholdPlan) else first.value
+        what = contrast.measure.replace("d_prime", "d′")
+        assumed = None if isinstance(first, ThresholdPlan) else (what, first.value)
+        mean = 1.0 if assumed is None else assumed[1]
         rows = [(name, words, mean * spread) for name, words, spread in _spreads(precisions, contrast)]
         if not rows:
             continue
-        what = contrast.measure.replace("d_prime", "d′")
-        share = "" if isinstance(first, ThresholdPlan) else f", relative to a mean {what} of {first.value:g}"
+        share = "" if assumed is None else f", relative to a mean {what} of {mean:g}"
         whose = f"of one participant's {what}, due to estimation error and differences between people"
         if contrast.within is not None:
             whose = "of one participant's difference, due to the two estimation errors and differences between people"
@@ -396,6 +404,7 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
             group_shares(precisions.protocol, contrast),
             log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
             bounds=sum(each.bound is not None for each in decided.contrasts),
+            planned=decided.participants, assumed=assumed,
         )  # fmt: skip
 
 
