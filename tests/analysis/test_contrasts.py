@@ -31,6 +31,7 @@ from study_app.analysis.planning.threshold_studies import PrecisionResult, Preci
 from study_app.analysis.report import write_report
 from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
+from study_app.analysis.report.sections import limits
 from study_app.analysis.report.write_report import report
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import group_mean
@@ -276,6 +277,37 @@ def test_two_groups_are_compared_with_unequal_variances() -> None:
     t = ttest_ind(one, two, equal_var=False).statistic
     assert (found.statistic, found.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
     assert found.effect == pytest.approx(one.mean() - two.mean())
+
+
+def test_limits_of_the_study_are_the_power_of_its_hypotheses_and_groups_that_existed() -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), groups=("one", "two"))
+    paired = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c3", "c1"), expected="higher")
+    made = replace(statements(contrast, 2.0), contrasts=(contrast, paired))
+    people = sorted(made.trials["participant"].unique())
+    members = {person: "one" if number % 3 else "two" for number, person in enumerate(people)}
+    groups = {"groups": {"one": {}, "two": {}}, "study": {"group_assignment": "pre-existing"}}
+    made = replace(
+        made,
+        protocol={**made.protocol, **groups},
+        trials=made.trials.assign(group=made.trials["participant"].map(members).astype("string")),
+    )
+    told = limits(made, results := evaluate(made))
+    assert [result.verdict for result in results.contrasts] == ["not shown", "not shown"]
+    rows = made.responses[made.responses["item"] == ITEMS[0]].assign(value=lambda it: it["response"].astype(float))
+    means = rows.groupby("participant")["value"].mean()
+    one, two = (means[[person for person in people if members[person] == group]] for group in ("one", "two"))
+    pooled = math.sqrt(((len(one) - 1) * one.var() + (len(two) - 1) * two.var()) / (len(people) - 2))
+    settings = rows.pivot_table("value", "participant", "code")
+    spread = (settings["L3"] - settings["L1"]).std()
+    alpha = results.decided.alpha / 2
+    leasts = (
+        pooled * detectable(len(one), len(two), tail=alpha / 2)[1],
+        spread * detectable(len(people), tail=alpha)[1],
+    )
+    for place, least in enumerate(leasts, start=1):
+        line = next(line for line in told if line.startswith(f"Hypothesis {place}: with {len(people)} participants"))
+        assert f"must be at least {least:.2f} to be found with 80 % power" in line
+    assert any(line.startswith("Participants were not assigned to groups at random") for line in told)
 
 
 def test_a_hypothesis_names_titles_of_several_words_in_quotation_marks() -> None:

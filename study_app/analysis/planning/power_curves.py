@@ -54,7 +54,7 @@ WANTED: Final = 0.8
 """The power that "smallest detectable effect" and "participants needed" are about."""
 
 _SPREADS: Final = 1000
-_MOST_SD: Final = 3.0
+MOST_SD: Final = 3.0
 """Sample sizes that only find a larger difference, in standard deviations, are too few. [choice]"""
 
 _OVER_ALL: Final = "all statements at once"
@@ -585,7 +585,7 @@ def smallest_differences(
         if min(groups := groups_of(n)) < 2:
             return None
         half, least = detectable(*groups, tail=strictest / (2 if contrast.expected is None else 1))
-        return None if least > _MOST_SD else (half * spread, least * spread)
+        return None if least > MOST_SD else (half * spread, least * spread)
 
     equal = [] if bound is None else [f"shown to be equivalent {IF_EQUAL}"]
     heads = (first, "participants", "SD", "half-width of the 95 % interval", "smallest difference", *equal)
@@ -601,7 +601,7 @@ def smallest_differences(
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}. "
     )
     has_too_few = any(differences(n, spread) is None for n in sizes for *_, spread in rows)
-    unusable = f"“Too few” means that fewer studies would detect even a difference of {_MOST_SD:g} SD. " * has_too_few
+    unusable = f"“Too few” means that fewer studies would detect even a difference of {MOST_SD:g} SD. " * has_too_few
     yield (
         f"{said}{both} The “smallest difference” is the difference that {WANTED:.0%} of studies detect ({at}). "
         f"{unusable}{within}{inclusion_words([contrast])}"
@@ -633,7 +633,7 @@ def _verdict(
     """Return the smallest difference that the planned sample finds, compared with a measure that falls to 0."""
     too_few = f"The planned {planned} participants{given} are too few to find a difference"
     if reached is None:
-        return f"**{too_few} of {_MOST_SD:g} SD with {WANTED:.0%} power.**"
+        return f"**{too_few} of {MOST_SD:g} SD with {WANTED:.0%} power.**"
     _, least = reached
     verdict = f"**{too_few} smaller than {written(least)} with {WANTED:.0%} power.**"
     if assumed is None or least <= assumed[1]:

@@ -1,5 +1,6 @@
 """The parts of the page and its texts: findings, limits, methods, the first page, blocks, and how the study was run."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -19,11 +20,12 @@ from study_app.analysis.data.motion import (
 )
 from study_app.analysis.data.study_tables import By, Study, group_assignment, group_counts, group_means
 from study_app.analysis.findings import all_findings
-from study_app.analysis.findings.finding import Answer, Finding
+from study_app.analysis.findings.finding import FOUND, Answer, Finding
 from study_app.analysis.html_page import bullets, drawn_figure, heading, paragraph, table, table_of, try_part
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_section
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions, rule_sentences
+from study_app.analysis.planning.power_curves import MOST_SD, WANTED, detectable
 from study_app.analysis.planning.power_curves import interval as share_interval
 from study_app.analysis.questions import MEASURES
 from study_app.analysis.report.methods import late_exclusions
@@ -138,6 +140,11 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     hypotheses = [contrast.contrast for contrast in results.contrasts]
     if len({one.groups is None for one in hypotheses}) == 2 and not any(one.is_interaction for one in hypotheses):
         yield "No hypothesis tests an interaction between groups and blocks or conditions."
+    yield from _low_power(results)
+    if any(one.groups for one in hypotheses) and group_assignment(study) == "pre-existing":
+        yield (
+            "Participants were not assigned to groups at random, so a difference between groups may have other causes."
+        )
     if results.questions and not (results.blocks or results.levels):
         yield (
             "The answers to these questions are summarised but not tested. The intervals are not corrected for the "
@@ -162,6 +169,32 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         yield (
             "Intervals for mean rank correlations and exploratory tests of means need at least "
             f"{FEW} participants; this study has {study.n}. Effects that this report does not show may still exist."
+        )
+
+
+def _low_power(results: Results) -> Iterator[str]:
+    """Yield the smallest difference with 80 % power of each hypothesis that was not shown."""
+    for place, result in enumerate(results.contrasts, start=1):
+        sides = [(len(side.values), side.sd) for side in result.sides if side.sd]
+        grouped = result.contrast.groups is not None
+        if result.p_adjusted is None or result.verdict in (*FOUND, "equivalent") or len(sides) < 2:
+            continue
+        sizes, freedom = [n for n, _ in sides], sum(n - 1 for n, _ in sides)
+        sd = math.sqrt(sum((n - 1) * (own or 0.0) ** 2 for n, own in sides) / freedom) if grouped else result.sd
+        if not sd:
+            continue
+        tail = results.decided.alpha / result.members / (2 if result.contrast.expected is None else 1)
+        least = detectable(*(sizes if grouped else sizes[:1]), tail=tail)[1]
+        lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
+        people, power = counted(result.n, "participant"), f"{100 * WANTED:.0f} % power"
+        if least > MOST_SD:
+            yield f"{lead}: {people} are too few to find even a difference of {MOST_SD:g} SD with {power}."
+            continue
+        least *= sd
+        kind, size = ("ratio", f"×/÷ {number(math.exp(least))}") if result.ratio else ("difference", number(least))
+        yield (
+            f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "
+            f"be found with {power}, so a smaller {kind} may exist."
         )
 
 

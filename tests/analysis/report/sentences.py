@@ -16,8 +16,8 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from scipy.stats import binom, binomtest
-from scipy.stats import t as t_distribution
+from scipy.stats import binom, binomtest, nct
+from scipy.stats import t as student
 
 from study_app import __version__
 from study_app.analysis.data.study_tables import Study
@@ -384,7 +384,7 @@ def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
 def mean_holds(text: str, values: np.ndarray) -> bool:
     """Return whether a text is the mean of values, and Student's interval if it gives one."""
     mean, *ends = re.findall(R, text)
-    half = t_distribution.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values))
+    half = student.ppf(0.975, len(values) - 1) * values.std(ddof=1) / math.sqrt(len(values))
     expected = (values.mean() - half, values.mean() + half)
     return is_number(mean, values.mean()) and all(map(is_number, ends, expected[: len(ends)]))
 
@@ -589,6 +589,21 @@ def hypothesis(match: re.Match[str], told: Told) -> bool:
         and (match[3] == "two-sided") == (contrast["expected"] is None)
         and f"“{short_of(told, contrast['measure'])}”" in match[2]
     )
+
+
+def low_power(match: re.Match[str], told: Told) -> bool:
+    """Check that a t test of a hypothesis finds the stated mean difference with 80 % power."""
+    one = told.contrasts[int(match[1] or 1) - 1]
+    sizes, sds = zip(*((len(side["values"]), side["sd"]) for side in one["sides"]), strict=True)
+    sides, freedom, root, sd = 1 if one["contrast"]["expected"] else 2, sizes[0] - 1, math.sqrt(sizes[0]), one["sd"]
+    if one["contrast"]["groups"]:
+        freedom, root = sum(sizes) - 2, math.sqrt(1 / sum(1 / n for n in sizes))
+        sd = math.sqrt(sum((n - 1) * own**2 for n, own in zip(sizes, sds, strict=True)) / freedom)
+    critical = student.isf(told.alpha / one["members"] / sides, min(sizes) - 1)
+    ends = [3.0, math.inf] if match[3] is None else [(float(match[3]) + away) / sd for away in (-0.005, 0.005)]
+    powers = [1.0 if math.isinf(end) else nct.sf(critical, freedom, end * root) for end in ends]
+    said = one["verdict"] not in DECIDED and count(match[2]) == one["n"]
+    return said and powers[0] <= 0.8001 and powers[1] >= 0.7999
 
 
 def tested_means(match: re.Match[str], told: Told) -> bool:
@@ -888,6 +903,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"In addition, the sample had to be large enough to be likely to include a member of any minority that could "
      r"shift the mean by as much as the bound\.",
      when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
+    (rf"Hypothesis(?: (\d+))?: (?:with )?{N} participants (?:and the observed variation between them, a mean "
+     rf"difference must be at least {R} to be found with 80 % power, so a smaller difference may exist|are too few to "
+     r"find even a difference of 3 SD with 80 % power)\.", low_power),
     (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Some participants were excluded from a test because a value was missing \(.*\)\.",
