@@ -310,7 +310,7 @@ class ProblemsCard(Card):
         self.next = small_button("", "Next", cap=key_cap("next problem"), height=36)
         self.next.setToolTip(command_tip("next problem"))
         self.close_button = IconButton("cross", "Close the list of problems", size=36, role="plain")
-        titles = self.heading, label("liquid-study check also lists them", "small", "text2")
+        titles = self.heading, label("also listed by liquid-study check", "small", "text2")
         top = hbox(*titles, STRETCH, self.limit, self.next, self.close_button, spacing=10)
         self.area = QScrollArea()
         self.area.setWidgetResizable(True)

@@ -148,8 +148,9 @@ def _level_picture(study: Study, result: LevelsResult, forms: Sequence[str], nam
     are = "is" if own == 1 else "are"
     left_out = f" {counted(own, 'further participant')} {are} shown only in the table." if own > 0 else ""
     chance = "" if result.guess_rate is None else f" Dashed line: chance ({100 * result.guess_rate:.0f} %)."
+    where = "for each comparison" if result.vary is None else "at each level"
     caption = (
-        f"{result.title}: {summary_words(result)} at each level. {_panels(result, bool(bands))}{chance}{left_out} "
+        f"{result.title}: {summary_words(result)} {where}. {_panels(result, bool(bands))}{chance}{left_out} "
         f"{sample_words(study, len(people(result)))}"
     )
     return picture_of(study, result.block, name, result.title, caption, partial(_draw_levels, result, bands), forms)

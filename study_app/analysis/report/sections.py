@@ -367,10 +367,12 @@ def _measures(result: BlockResult) -> str:
 
 def places(results: Results) -> dict[str, str]:
     """Return the places of questions: id → title of the section, in session order."""
-    levels = {level.block for level in results.levels}
+    levels = {
+        level.block: "discrimination" if level.revealed and level.vary is None else "levels" for level in results.levels
+    }
 
     def kind(result: QuestionResult) -> str:
-        return "form" if result.is_form else "levels" if result.where in levels else "other questions"
+        return "form" if result.is_form else levels.get(result.where, "other questions")
 
     return {result.where: f"{result.title}: {kind(result)}" for result in results.questions}
 

@@ -410,7 +410,7 @@ class _FormHead(QWidget):
         self.title = Elided("card")
         self.kind = Elided("small", "text2")
         self.used = Elided("small", "text2")
-        self.ask = small_button("list", "Ask after …", height=34)
+        self.ask = small_button("list", "When …", height=34)
         self.ask.hide()
         self.asks = QMenu(self)
         self.asks.setFont(font("label"))
