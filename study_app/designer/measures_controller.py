@@ -8,6 +8,8 @@ from typing import Final
 
 from PySide6.QtCore import QObject, QTimer, Signal
 
+from study_app.analysis.planning import PREREGISTRATION
+from study_app.designer.document.document import Document
 from study_app.designer.document.study import Study
 from study_app.designer.editing import Editing
 from study_app.designer.measures.levels import block_of
@@ -27,6 +29,7 @@ from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.gui.widgets.background import delayed_call
 from study_app.number_text import capitalised, counted
+from study_app.protocol.source.files import protocol_hash, source_bytes
 from study_app.store.folders import study_folder
 from study_app.store.output_files import write_files
 from study_app.workers.server import Crashed
@@ -90,8 +93,18 @@ class MeasuresController(QObject):
         shows_power = self._place.measures.isVisible() and valid.whole and valid.forces
         self._request(None if valid.protocol is None else simulation_of(valid.protocol, power=shows_power))
         view = measures_view(study, facts(study), path, self._latest, earlier=study is not opened.study)
+        self._place.measures.power.changed.setVisible(self._differs_from_preregistration(opened))
         self._place.measures.show_measures(view)
         self._place.pane.facts.show_measures(view)
+
+    def _differs_from_preregistration(self, opened: Document) -> bool:
+        """Return whether the saved study is another one than its preregistration describes."""
+        try:
+            study = study_folder(self._editing.results, str(opened.study.document["study"]["name"]))
+            text = (study.path / PREREGISTRATION).read_text(encoding="utf-8")
+            return bool(opened.base) and protocol_hash(source_bytes(str(opened.file))) not in text
+        except (StudyError, OSError, UnicodeDecodeError, LookupError, TypeError):
+            return False
 
     def leave(self) -> None:
         """End the process: it must not share the processor with a session."""
@@ -153,7 +166,8 @@ class MeasuresController(QObject):
             self._place.message.emit(_NOT_WRITTEN, f"{error}.")
             return
         said = f"{note} Register it before the first session. The report lists deviations from it.".lstrip()
-        self._place.message.emit("Preregistration written", f"{file}\n\n{said}")
+        self._place.file_message.emit("Preregistration written", f"{file}\n\n{said}", file)
+        self.show_measures()
 
     # simulations
 

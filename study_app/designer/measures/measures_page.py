@@ -69,12 +69,14 @@ class PowerCard(Card):
         self.preregister.setToolTip("Write the saved study's hypotheses, design, sample size and analysis as a text")
         super().__init__("Power", self.preregister, padding=16, gap=8)
         self.setAccessibleName("Power")
+        self.changed = label("The study has changed since it was preregistered.", "small", "warn", wraps=True)
+        self.changed.hide()
         self.lost = label("", "small", "warn", wraps=True)
         self.progress = label("", "small", "text2", wraps=True)
         self.table = label("", "small", wraps=True)
         self.table.setTextFormat(Qt.TextFormat.MarkdownText)
         self.table.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-        add_parts(self.column, self.lost, self.progress, self.table)
+        add_parts(self.column, self.changed, self.lost, self.progress, self.table)
 
     def show_power(self, simulated: Simulated) -> None:
         table, progress = simulated.table, simulated.failed or simulated.waiting

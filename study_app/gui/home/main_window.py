@@ -1,6 +1,7 @@
 """The main window: the rail, and one view at a time."""
 
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 from PySide6.QtCore import QRectF, QSize, Qt, Signal
@@ -10,6 +11,7 @@ from shiboken6 import isValid
 
 from study_app.discovery import explain_error
 from study_app.errors import StudyError
+from study_app.gui.application import open_here
 from study_app.gui.kit.dialogs import Question
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import DARK, LIGHT, RADIUS_CONTROL, Theme, font
@@ -226,6 +228,9 @@ class MainWindow(Themed, QMainWindow):
             finally:
                 QGuiApplication.restoreOverrideCursor()
             made.message.connect(lambda title, sentence: self.show_message(title, sentence, of=name))
+            made.file_message.connect(
+                lambda title, sentence, file: self.show_message(title, sentence, of=name, file=file)
+            )
             made.message_over.connect(lambda: self._close_notice(name))
             made.go_asked.connect(self.go)
             self._places[name] = made
@@ -290,9 +295,12 @@ class MainWindow(Themed, QMainWindow):
             self._had_keyboard.setFocus()
         self._places[self._here].enter()
 
-    def show_message(self, title: str, sentence: str, *, of: str = "") -> None:
-        """Show a message with one button; a message of the page ``of`` closes when the page is left."""
-        self._show_notice(Question(self, self.theme, title, sentence), of)
+    def show_message(self, title: str, sentence: str, *, of: str = "", file: Path | None = None) -> None:
+        """Show a message, and a button that opens ``file``; that of the page ``of`` closes when the page is left."""
+        opens = None if file is None else ActionButton("file", "Open the file")
+        if opens is not None and file is not None:
+            opens.clicked.connect(lambda: open_here(file))
+        self._show_notice(Question(self, self.theme, title, sentence, other=opens), of)
 
     def ask_about_device(
         self, title: str, sentence: str, again: Callable[[], object], diagnose: Callable[[], object] | None

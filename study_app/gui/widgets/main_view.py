@@ -77,10 +77,12 @@ class Place(Themed, QWidget):
     """A page of the main window, next to the rail.
 
     ``message`` carries a title and a sentence that the main window shows until the page is left or emits
-    ``message_over``; ``go_asked`` carries the name of another page.
+    ``message_over``; ``file_message`` also carries a file that can be opened. ``go_asked`` carries the name of another
+    page.
     """
 
     message = Signal(str, str)
+    file_message = Signal(str, str, object)
     message_over = Signal()
     go_asked = Signal(str)
 

@@ -1,5 +1,6 @@
 """The tab Measures in its window: the cards of an element, and the power that another process simulates."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,6 +11,8 @@ from study_app.designer.document.steps import RetypeFile
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.measures.cards import CardGrid, MeasureCard
 from study_app.designer.measures.simulation import Simulated
+from study_app.gui.home import main_window
+from study_app.gui.widgets.controls import ActionButton
 from study_app.workers.server import Crashed
 from tests.designer.measures.conftest import Worker, open_viscosity_block
 
@@ -138,6 +141,28 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     said = " ".join(one.text() for one in designer.place.prompt.findChildren(QLabel))
     assert f"{file} differs from the text generated" in said
     assert "already has 1 session, for which the text is not a preregistration" in said
+
+
+def test_a_preregistration_can_be_opened_and_is_compared_with_the_saved_study(
+    qtbot: Any, designer: Any, worker: Worker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    open_viscosity_block(designer)
+    designer.saving.save()
+    power, opened = designer.place.measures.power, list[Path]()
+    power.preregister.click()
+    monkeypatch.setattr(main_window, "open_here", opened.append)
+    buttons = {button.text(): button for button in designer.window.notice.findChildren(ActionButton)}
+    buttons["Open the file"].click()
+    assert opened == [designer.results / "thicker" / "preregistration.md"]
+    designer.editing.make_step("Change", Set(("methods", "adaptive", "trials"), 70))
+    qtbot.wait(50)
+    assert not power.changed.isVisible()  # it is the saved study that was preregistered
+    designer.saving.save()
+    qtbot.waitUntil(power.changed.isVisible)
+    assert power.changed.text() == "The study has changed since it was preregistered."
+    designer.editing.undo()
+    designer.saving.save()
+    qtbot.waitUntil(lambda: not power.changed.isVisible())
 
 
 def test_trials_that_would_be_lost_are_shown_above_the_power(qtbot: Any, designer: Any, worker: Worker) -> None:

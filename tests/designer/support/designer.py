@@ -41,6 +41,7 @@ class Designer(KeyUser):
         self.place = self.controller.place
         self.messages: list[tuple[str, str]] = []
         self.place.message.connect(lambda title, sentence: self.messages.append((title, sentence)))
+        self.place.file_message.connect(lambda title, sentence, _file: self.messages.append((title, sentence)))
         window = MainWindow({"home": Place, "designer": lambda: self.place})
         super().__init__(window, QtInput())
         self.window: Any = window
