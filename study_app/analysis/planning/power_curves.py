@@ -582,7 +582,7 @@ def smallest_differences(
         return [n] if shares is None else [int(n * share + 1e-9) for share in shares]
 
     def differences(n: int, spread: float) -> tuple[float, float] | None:
-        if min(groups := groups_of(n)) < 2:
+        if min(groups := groups_of(n)) < 3:
             return None
         half, least = detectable(*groups, tail=strictest / (2 if contrast.expected is None else 1))
         return None if least > MOST_SD else (half * spread, least * spread)

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 
 import pandas as pd
 
-from study_app.analysis.contrasts import answer, question
+from study_app.analysis.contrasts import answer, equality_limits, question
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.data.motion import (
     OF_REACHES,
@@ -184,13 +184,15 @@ def _low_power(results: Results) -> Iterator[str]:
         if not sd:
             continue
         tail = results.decided.alpha / result.members / (2 if result.contrast.expected is None else 1)
-        least = detectable(*(sizes if grouped else sizes[:1]), tail=tail)[1]
+        least = detectable(*(sizes if grouped else sizes[:1]), tail=tail)[1] if min(sizes) > 2 else math.inf
         lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
         people, power = counted(result.n, "participant"), f"{100 * WANTED:.0f} % power"
-        if least > MOST_SD:
-            yield f"{lead}: {people} are too few to find even a difference of {MOST_SD:g} SD with {power}."
-            continue
+        largest = equality_limits(result.contrast, 1.0, ratio=False)[1] or math.inf
+        beyond = f"a difference of {MOST_SD:g} SD" if least > MOST_SD else "the largest difference on the scale"
         least *= sd
+        if least > min(MOST_SD * sd, largest):
+            yield f"{lead}: {people} are too few to find even {beyond} with {power}."
+            continue
         kind, size = ("ratio", f"×/÷ {number(math.exp(least))}") if result.ratio else ("difference", number(least))
         yield (
             f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "

@@ -600,7 +600,10 @@ def low_power(match: re.Match[str], told: Told) -> bool:
         freedom, root = sum(sizes) - 2, math.sqrt(1 / sum(1 / n for n in sizes))
         sd = math.sqrt(sum((n - 1) * own**2 for n, own in zip(sizes, sds, strict=True)) / freedom)
     critical = student.isf(told.alpha / one["members"] / sides, min(sizes) - 1)
-    ends = [3.0, math.inf] if match[3] is None else [(float(match[3]) + away) / sd for away in (-0.005, 0.005)]
+    largest = 12.0 if one["contrast"]["groups"] and one["contrast"]["conditions"] else 6.0
+    away = 0.05 if match[3] and float(match[3]) >= 10 else 0.005
+    ends = [(float(match[3]) - away) / sd, (float(match[3]) + away) / sd] if match[3] else [largest / sd, math.inf]
+    ends[0] = 3.0 if match[4] == "a difference of 3 SD" else ends[0]
     powers = [1.0 if math.isinf(end) else nct.sf(critical, freedom, end * root) for end in ends]
     said = one["verdict"] not in DECIDED and count(match[2]) == one["n"]
     return said and powers[0] <= 0.8001 and powers[1] >= 0.7999
@@ -905,7 +908,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
     (rf"Hypothesis(?: (\d+))?: (?:with )?{N} participants (?:and the observed variation between them, a mean "
      rf"difference must be at least {R} to be found with 80 % power, so a smaller difference may exist|are too few to "
-     r"find even a difference of 3 SD with 80 % power)\.", low_power),
+     r"find even (a difference of 3 SD|the largest difference on the scale) with 80 % power)\.", low_power),
     (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Some participants were excluded from a test because a value was missing \(.*\)\.",
