@@ -245,9 +245,10 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
         hypotheses = " except in the hypotheses above" * any(contrast.form is not None for contrast in contrasts)
         yield (
-            f"Questions in {listed(list(protocol.forms))}: we describe the answers and do not test them{hypotheses}. "
-            "We report means across participants with 95 % confidence intervals (Student's t): of the scores or, if a "
-            "form has no scores, of the ratings and numbers. Chosen options are counted."
+            f"We describe the answers to the questions in {listed(list(protocol.forms))} and do not test "
+            f"them{hypotheses}. We report the mean score of each form across participants with its 95 % confidence "
+            "interval (Student's t). If a form is not scored, we report the means of its ratings and numbers. Chosen "
+            "options are counted."
         )
     if not asked:
         return

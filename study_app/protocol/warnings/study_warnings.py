@@ -431,5 +431,5 @@ def _shared_titles(protocol: Protocol) -> Iterator[str]:
             if other != block.id:
                 yield (
                     f"blocks.{block.id}.title: block {other} has the same title, “{title}”, so the report adds the "
-                    "IDs to both; give each block its own title"
+                    "IDs to both; use a different title for each block"
                 )

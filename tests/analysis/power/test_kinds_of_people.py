@@ -163,7 +163,7 @@ def test_the_command_adds_the_planned_number_of_participants_and_quotes_it(
     asked = ["power", str(file), "--studies", "20", "--workers", "1", "--to", str(tmp_path)]
     result = CliRunner().invoke(commands, asked)
     assert result.exit_code == 0, result.output
-    assert "| statement | n = 5 | n = 7 | n = 8 | n = 12 |" in result.output
+    assert "| statement | n = 5 | n = 7 (planned) | n = 8 | n = 12 |" in result.output
     registered = CliRunner().invoke(commands, ["preregister", str(file), "--power", str(tmp_path)]).output
     (line,) = (line for line in registered.splitlines() if line.startswith("- Smooth (conditions differ): "))
     assert "## Power with the planned 7 participants" in registered
