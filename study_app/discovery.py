@@ -20,7 +20,7 @@ from typing import Any, Final, Generic, Literal, NamedTuple, TypeVar, cast
 
 from study_app.errors import PlugInError, StudyError
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 REGISTRIES: Final = {
     "device": "study_app.devices.registry:DEVICES",
@@ -39,9 +39,9 @@ def modules_of(package: ModuleType) -> Iterator[ModuleType]:
         yield importlib.import_module(f"{package.__name__}.{module.name}")
 
 
-def by_name(own: Mapping[str, T], name: str) -> T:
+def by_name(own: Mapping[str, _T], name: str) -> _T:
     """Return the object that a descriptor names: one of the program's own by id, or that at ``module:attribute``."""
-    return cast("T", pkgutil.resolve_name(name)) if ":" in name else own[name]
+    return cast("_T", pkgutil.resolve_name(name)) if ":" in name else own[name]
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,7 @@ def are_numbers(values: Any) -> bool:
     )
 
 
-class Registry(Mapping[str, T], Generic[T]):
+class Registry(Mapping[str, _T], Generic[_T]):
     """The descriptors of one kind, by name: the program's ``own``, then those of plug-ins.
 
     Entry points are read when a name is not among its own, or when all are requested. An entry point holds an instance
@@ -124,14 +124,14 @@ class Registry(Mapping[str, T], Generic[T]):
     def __init__(
         self,
         kind: str,
-        own: Mapping[str, T],
+        own: Mapping[str, _T],
         base: type,
         key: Literal["name", "key", "kind"],
         returns: Mapping[str, Returns],
     ) -> None:
         self.kind, self.own = kind, own
         self._base, self._key, self._returns = base, key, returns
-        self._found: tuple[tuple[PlugIn, ...], Mapping[str, T]] | None = None
+        self._found: tuple[tuple[PlugIn, ...], Mapping[str, _T]] | None = None
 
     @property
     def plug_ins(self) -> tuple[PlugIn, ...]:
@@ -139,7 +139,7 @@ class Registry(Mapping[str, T], Generic[T]):
         return self._read()[0]
 
     @property
-    def others(self) -> Mapping[str, T]:
+    def others(self) -> Mapping[str, _T]:
         """The descriptors of plug-ins only."""
         return self._read()[1]
 
@@ -161,7 +161,7 @@ class Registry(Mapping[str, T], Generic[T]):
         words = f'"{name}" is a {self.kind} that the plug-in {package} {versions[0]} does not provide'
         return ": ".join([words, *faults]), UPDATE
 
-    def __getitem__(self, name: str) -> T:
+    def __getitem__(self, name: str) -> _T:
         return self.own[name] if name in self.own else self.others[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -170,10 +170,10 @@ class Registry(Mapping[str, T], Generic[T]):
     def __len__(self) -> int:
         return len(self.own) + len(self.others)
 
-    def _read(self) -> tuple[tuple[PlugIn, ...], Mapping[str, T]]:
+    def _read(self) -> tuple[tuple[PlugIn, ...], Mapping[str, _T]]:
         """Load the entry points once; a problem with one is stored as its fault."""
         if self._found is None:
-            plug_ins, others = [], dict[str, T]()
+            plug_ins, others = [], dict[str, _T]()
             for point, plug_in in _of_kind(self.kind):
                 try:
                     loaded = point.load()
@@ -187,7 +187,7 @@ class Registry(Mapping[str, T], Generic[T]):
             self._found = tuple(plug_ins), others
         return self._found
 
-    def _name_of(self, found: Any, place: str, package: str, others: Mapping[str, T]) -> str:
+    def _name_of(self, found: Any, place: str, package: str, others: Mapping[str, _T]) -> str:
         """Return the name of an entry point's object; raise a StudyError with the reason if it has none."""
         if self._key == "name" and not isinstance(found, self._base):
             raise StudyError(f"{place} must be a {self._base.__name__}, but has the type {type(found).__name__}")

@@ -1,7 +1,8 @@
 """The pages of the documentation, without Qt and without Sphinx: the website and the window Help read them here.
 
 A page is plain Markdown. A comment in it, ``<!-- generated: MODULE:FUNCTION -->``, stands for what that function
-returns. The pages of a section are those that the section's own page links to in its lists; all others are in ``ELSE``.
+returns. The pages of a section are those that the section's own page links to in its lists; all others are in
+``_ELSE``.
 """
 
 import math
@@ -13,7 +14,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 INDEX: Final = "index"
-ELSE: Final = "do"
+_ELSE: Final = "do"
 """The section of pages that no section lists."""
 
 _LISTS: Final = ("commands", "data-dictionary", "kinds", "protocol-format")
@@ -91,7 +92,7 @@ def sections() -> dict[str, tuple[str, ...]]:
         placed.update(listed[section])
     for name in known:
         if name not in placed:
-            listed[_FOLDERS.get(name.split("/")[0], ELSE)].append(name)
+            listed[_FOLDERS.get(name.split("/")[0], _ELSE)].append(name)
     return {section: tuple(pages) for section, pages in listed.items()}
 
 

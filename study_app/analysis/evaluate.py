@@ -103,8 +103,8 @@ def _evaluated(study: Study, failures: Failures, progress: Progress, *, recordin
         people=study.people,
         blocks=blocks,
         contrasts=failures.value("the hypotheses", lambda: contrast_results(study, asked, levels), ()),
-        delivered=failures.value("the delivered delays", lambda: delivery_check(study), ()),
-        orders=failures.value("the trial orders", lambda: order_balance(study), {}),
+        delivered=failures.value("the delivered delays", lambda: _delivery_check(study), ()),
+        orders=failures.value("the trial orders", lambda: _order_balance(study), {}),
         seed=SEED,
         questions=failures.value("the answers to other questions", lambda: question_results(study), ()),
         scores=failures.value("the questionnaire scores", lambda: score_results(study), ()),
@@ -137,7 +137,7 @@ def evaluate_block(study: Study | None, answers: BlockAnswers, tell: Callable[[s
     return result
 
 
-def delivery_check(study: Study) -> tuple[Delivered, ...]:
+def _delivery_check(study: Study) -> tuple[Delivered, ...]:
     """Return the manipulation check by setting or, while sealed, over all settings of a block.
 
     Delays must not be revealed by code before the key is opened.
@@ -173,7 +173,7 @@ def _measured(block: Block, code: str | None, delay_ms: float | None, rows: pd.D
     )
 
 
-def order_balance(study: Study) -> dict[str, Evenness]:
+def _order_balance(study: Study) -> dict[str, Evenness]:
     """Return how balanced the orders of trials were as run (block id → counts), including excluded trials.
 
     They are unknown in a sealed study in which each site or each participant has its own codes.

@@ -13,7 +13,7 @@ from study_app import figure_style as style
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import Failure, Failures
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 LONG = 32
 """Cells of more letters are broken into lines."""
@@ -114,7 +114,7 @@ def table(
 
 
 def table_of(
-    rows: Iterable[T], *columns: tuple[str, Callable[[T], str]] | None, words: int = 1, last: int = 0
+    rows: Iterable[_T], *columns: tuple[str, Callable[[_T], str]] | None, words: int = 1, last: int = 0
 ) -> Markup:
     """Return a table of ``rows``; a column is a heading and a function from row to cell, or None to omit it."""
     shown = [column for column in columns if column is not None]

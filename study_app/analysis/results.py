@@ -48,8 +48,8 @@ class Delivered:
     achieved_ms: float | None
 
 
-T = TypeVar("T")
-U = TypeVar("U")
+_T = TypeVar("_T")
+_U = TypeVar("_U")
 Progress: TypeAlias = Callable[[str, float], object]
 """Receives what is being done, and which share of all is done (0 to 1); what it raises ends the evaluation."""
 
@@ -92,7 +92,7 @@ class Failures:
     def __init__(self, found: Iterable[Failure] = ()) -> None:
         self.found = list(found)
 
-    def attempt(self, what: str, compute: Callable[[], T], *, block: str | None = None) -> T | Failure:
+    def attempt(self, what: str, compute: Callable[[], _T], *, block: str | None = None) -> _T | Failure:
         """Return the result of ``compute``, or the failure, which is recorded."""
         try:
             return compute()
@@ -105,7 +105,7 @@ class Failures:
             self.found.append(failure)
             return failure
 
-    def value(self, what: str, compute: Callable[[], T], empty: U) -> T | U:
+    def value(self, what: str, compute: Callable[[], _T], empty: _U) -> _T | _U:
         """Return the result of ``compute``, or ``empty`` if it fails."""
         computed = self.attempt(what, compute)
         return empty if isinstance(computed, Failure) else computed

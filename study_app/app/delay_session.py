@@ -253,7 +253,7 @@ FRAME_MS, TRACE_MS, TILES_MS = 16, 33, 500
 _HEARTBEAT_MS = 100  # Python handles Ctrl+C only while it runs; Qt waits outside Python
 _LONGEST_FRAME_TICKS = 100
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 class WindowsThread(QObject):
@@ -278,7 +278,7 @@ class WindowsThread(QObject):
     def frames(self) -> int:
         return self._painting.frames if self._painting is not None else 0
 
-    def during(self, work: Callable[[], T]) -> T:
+    def during(self, work: Callable[[], _T]) -> _T:
         """Run ``work`` in another thread while this one runs the event loop; return its result or raise its error."""
         loop, heart = QEventLoop(), QTimer()
         heart.timeout.connect(lambda: None)

@@ -118,15 +118,15 @@ class Failing(Protocol):
     def fail(self, error: BaseException) -> None: ...
 
 
-F = TypeVar("F", bound=Failing)
-P = ParamSpec("P")
+_F = TypeVar("_F", bound=Failing)
+_P = ParamSpec("_P")
 
 
-def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
+def guarded(slot: Callable[Concatenate[_F, _P], None]) -> Callable[Concatenate[_F, _P], None]:
     """Decorate a slot so that an exception in it ends with zero force."""
 
     @wraps(slot)
-    def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
+    def run(self: _F, /, *arguments: _P.args, **named: _P.kwargs) -> None:
         try:
             slot(self, *arguments, **named)
         except Exception as error:  # noqa: BLE001 - zero force comes first, after any of them
@@ -135,11 +135,11 @@ def guarded(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, 
     return run
 
 
-def guarded_session_slot(slot: Callable[Concatenate[F, P], None]) -> Callable[Concatenate[F, P], None]:
+def guarded_session_slot(slot: Callable[Concatenate[_F, _P], None]) -> Callable[Concatenate[_F, _P], None]:
     """Decorate a slot like `guarded`, but ignore events that arrive too late (`SessionError`)."""
 
     @wraps(slot)
-    def run(self: F, /, *arguments: P.args, **named: P.kwargs) -> None:
+    def run(self: _F, /, *arguments: _P.args, **named: _P.kwargs) -> None:
         try:
             slot(self, *arguments, **named)
         except SessionError as error:

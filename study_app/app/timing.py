@@ -19,7 +19,7 @@ _FORGETS: Final = 0.9  # the decay of a task's worst duration per run
 
 
 @dataclass(slots=True, kw_only=True)
-class DeferredTask:
+class _DeferredTask:
     """A recurring task; ``took_ns`` is its longest recent duration."""
 
     do: Callable[[], object]
@@ -45,7 +45,7 @@ class FrameBudget:
     def __init__(
         self, works: Sequence[tuple[Callable[[], object], float]], now_ns: Callable[[], int] = time.perf_counter_ns
     ) -> None:
-        self.tasks = [DeferredTask(do=do, period_ns=round(period_s * 1e9)) for do, period_s in works]
+        self.tasks = [_DeferredTask(do=do, period_ns=round(period_s * 1e9)) for do, period_s in works]
         self._now_ns = now_ns
 
     def run_due_tasks(self, until_ns: int) -> None:
@@ -62,7 +62,7 @@ class FrameBudget:
                 hurried = True
             self._run_task(work, now_ns)
 
-    def _run_task(self, work: DeferredTask, began_ns: int) -> None:
+    def _run_task(self, work: _DeferredTask, began_ns: int) -> None:
         work.done_ns = began_ns
         work.do()
         work.took_ns = max(self._now_ns() - began_ns, round(_FORGETS * work.took_ns))

@@ -25,7 +25,7 @@ from study_app.discovery import explain_error
 from study_app.errors import PlugInError, StudyError, naming_the_extra
 from study_app.workers.one_thread import compute_in_one_thread
 
-BY_SIGNAL = 128  # added to a signal's number
+_BY_SIGNAL = 128  # added to a signal's number
 SHOWN = 200  # letters of a bad value that a message repeats
 
 
@@ -114,7 +114,7 @@ def main() -> None:
         click.echo(f"liquid-study: {_shortened(str(said))}", err=True)
         sys.exit(EXIT_USER_ERROR)
     code = code if isinstance(code, int) else 0
-    if code > BY_SIGNAL and (qt := sys.modules.get("PySide6.QtCore")):
+    if code > _BY_SIGNAL and (qt := sys.modules.get("PySide6.QtCore")):
         atexit.unregister(getattr(qt, "__moduleShutdown", print))
         ended.append(code)
     sys.exit(code)

@@ -49,7 +49,7 @@ _SAMPLES: Final = {
 """Values of arguments and of required options in examples."""
 _LONGEST: Final = 150
 """Characters of a command's first sentence in ``--help``, which wraps it."""
-Command = TypeVar("Command", bound=Callable[..., Any])
+_Command = TypeVar("_Command", bound=Callable[..., Any])
 FILE = click.argument("protocol", metavar="FILE")
 SCENE_FILE = click.argument("scene", metavar="FILE")
 BY = click.option("--by", required=True, metavar="NAME", help="Name or initials of the person responsible.")
@@ -114,7 +114,7 @@ def exclude_each_other(**given: object) -> None:
         raise click.UsageError(f"{' and '.join(names)} cannot be combined: specify only one of them")
 
 
-def takes_study(function: Command) -> Command:
+def takes_study(function: _Command) -> _Command:
     """Add the argument RESULTS and ``--results DIR`` to a command; its function gets the study's folder ``results``."""
 
     @click.argument("named", metavar="[RESULTS]", required=False)
@@ -126,7 +126,7 @@ def takes_study(function: Command) -> Command:
     return run  # type: ignore[return-value]
 
 
-def takes_session(function: Command) -> Command:
+def takes_session(function: _Command) -> _Command:
     """Add the argument SESSION to a command; its function gets ``session``, the session's folder."""
 
     @click.argument("session", metavar="SESSION")
@@ -243,7 +243,7 @@ def progress(otherwise: Callable[[str], object] | None = None) -> Iterator[ShowP
         yield show
 
 
-def takes_workers(function: Command) -> Command:
+def takes_workers(function: _Command) -> _Command:
     """Add ``--workers`` and ``--cluster`` to a command; its function gets ``workers``."""
 
     @click.option(

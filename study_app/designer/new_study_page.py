@@ -150,7 +150,7 @@ _STEPS: Final = ("pages", "blocks", "questionnaires")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OwnQuestion:
+class _OwnQuestion:
     """A question of a template: its key, text, unit, permitted values, and the template's value."""
 
     path: Place
@@ -177,7 +177,7 @@ class TemplateChoice:
     name: str = ""  # short name that a copy gets where none is given
     study_title: str = ""  # title that it gets where none is given
     languages: tuple[str, ...] = ()
-    questions: tuple[OwnQuestion, ...] = ()  # beyond title, name and languages
+    questions: tuple[_OwnQuestion, ...] = ()  # beyond title, name and languages
 
 
 def _languages_offered() -> tuple[tuple[str, str], ...]:
@@ -236,7 +236,7 @@ def _figure_texts(protocol: Protocol) -> Iterator[tuple[str, str]]:
     yield "layers", counted(trials, "trial")
 
 
-def _own_questions(name: str, study: Study) -> Iterator[OwnQuestion]:
+def _own_questions(name: str, study: Study) -> Iterator[_OwnQuestion]:
     for question, path in QUESTIONS.get(name, ()):
         row = row_at(study.document, path)
         if row is not None:
@@ -245,7 +245,7 @@ def _own_questions(name: str, study: Study) -> Iterator[OwnQuestion]:
             parts = current if isinstance(current, tuple) else (current,)
             value = ", ".join(f"{part:g}" for part in parts if isinstance(part, int | float))
             unit = row.unit or _unit_of(study, path)
-            yield OwnQuestion(
+            yield _OwnQuestion(
                 path=path, words=question, unit=unit, bounds=", ".join(row.bounds), value=value, several=several
             )
 
@@ -411,7 +411,7 @@ class Picture(QWidget):
         _paint_picture(smooth_painter(self), self.name, QRectF(self.rect()))
 
 
-class TemplateButton(Themed, QAbstractButton):
+class _TemplateButton(Themed, QAbstractButton):
     """A starting point for a study: its picture or icon, title, description and figures.
 
     ``came`` is emitted when it gets the focus, with whether this was by a click.
@@ -534,7 +534,7 @@ class Questions(Themed, QWidget):
         self._show_proposed_name()
         self.title.textChanged.connect(self._show_proposed_name)
         self.languages: dict[str, Check] = {}
-        self.own: dict[OwnQuestion, QLineEdit] = {}
+        self.own: dict[_OwnQuestion, QLineEdit] = {}
         self._grid = grid_of(8, 8, margins=0, parent=self)
         self._grid.setColumnStretch(1, 1)
         for row, (title, field) in enumerate((("Title", self.title), ("Short name", self.name))):
@@ -741,7 +741,7 @@ class NewStudyPage(Themed, QWidget):
 
     def __init__(self) -> None:
         super().__init__()
-        self.buttons: list[TemplateButton] = []
+        self.buttons: list[_TemplateButton] = []
         self._choices: tuple[TemplateChoice, ...] = ()
         self._group = QButtonGroup(self)
         self.back = IconButton("chevron_left", "Back", role="plain")
@@ -778,7 +778,7 @@ class NewStudyPage(Themed, QWidget):
             grid = grid_of(14 - 2 * _RING, 14 - 2 * _RING)
             columns = across if self.width() >= NARROW_BELOW else 2
             for at, choice in enumerate(choice for choice in choices if choice.copy == copies):
-                made = TemplateButton(choice)
+                made = _TemplateButton(choice)
                 made.came.connect(partial(self._show_focused_card, made))
                 self._group.addButton(made)
                 grid.addWidget(made, at // columns, at % columns)
@@ -796,7 +796,7 @@ class NewStudyPage(Themed, QWidget):
         first.setChecked(True)
         QTimer.singleShot(0, first, lambda: self.area.ensureWidgetVisible(first))  # once it has its place
 
-    def _show_focused_card(self, button: TemplateButton, by_mouse: bool) -> None:
+    def _show_focused_card(self, button: _TemplateButton, by_mouse: bool) -> None:
         """Show the card that has keyboard focus. A mouse click leaves the focus in the form."""
         if by_mouse:
             (last_focused(self.card) or self.card.questions.title).setFocus()
@@ -828,7 +828,7 @@ class NewStudyPage(Themed, QWidget):
             self.begin_asked.emit(chosen.source, self.card.questions.short_name(), answers)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        begins = isinstance(self.focusWidget(), Check | TemplateButton)
+        begins = isinstance(self.focusWidget(), Check | _TemplateButton)
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter} and begins:
             self._ask_to_begin()
         elif event.key() == Qt.Key.Key_Escape:

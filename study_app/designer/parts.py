@@ -88,10 +88,10 @@ class Segments(Themed, QWidget):
 
 
 FIELD_PX = 34
-W = TypeVar("W", bound=QWidget)
+_W = TypeVar("_W", bound=QWidget)
 
 
-def make_dense(part: W, name: str, height: int = FIELD_PX) -> W:
+def make_dense(part: _W, name: str, height: int = FIELD_PX) -> _W:
     """Give a field or list the designer's low height and an accessible name."""
     part.setAccessibleName(name)
     part.setProperty("dense", "true")

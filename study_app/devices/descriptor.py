@@ -34,7 +34,7 @@ DRIVER_READY: Final = "driver ready"
 NONE: Final = "none connected"
 NOT_AVAILABLE: Final = "not available"
 
-Opened = TypeVar("Opened", bound="Device")
+_Opened = TypeVar("_Opened", bound="Device")
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +187,7 @@ class DeviceDescriptor:
         return {option.name: values[option.name] for option in self.window_options if option.name in values}
 
 
-def opened(device: Opened) -> Opened:
+def opened(device: _Opened) -> _Opened:
     """Open a device and return it."""
     device.open()
     return device

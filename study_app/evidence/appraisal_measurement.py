@@ -29,9 +29,9 @@ _MOTIONS: Final = (
     ("zigzag", {"leg_s": 0.25, "legs": 8.0}),
 )
 _LASTS_S: Final = 2.0
-HAND_M: Final = 0.03
-HAND_HZ: Final = 2.0
-FINE_M: Final = 10e-6
+_HAND_M: Final = 0.03
+_HAND_HZ: Final = 2.0
+_FINE_M: Final = 10e-6
 """An encoder count at the handle that is finer than the assumed one."""
 
 
@@ -85,12 +85,12 @@ def _lag_s(scene: Scene) -> float:
 def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
     """Return the relative RMS velocity error on a device, and on the same device with fully known dynamics.
 
-    The hand moves by `HAND_M` at `HAND_HZ`. An unknown encoder count is assumed to be `FINE_M`, an unknown delay one
+    The hand moves by `_HAND_M` at `_HAND_HZ`. An unknown encoder count is assumed to be `_FINE_M`, an unknown delay one
     tick.
     """
     known = dynamics._replace(
         delay_s=ASSUMED_TICKS / scene.rate_hz if dynamics.delay_s is None else dynamics.delay_s,
-        count_m=FINE_M if "count_m" in dynamics.assumed else dynamics.count_m,
+        count_m=_FINE_M if "count_m" in dynamics.assumed else dynamics.count_m,
         assumed=(),
     )
     return _velocity_error(scene, dynamics, known.count_m), _velocity_error(scene, known, known.count_m)
@@ -98,12 +98,12 @@ def velocity_errors(scene: Scene, dynamics: Dynamics) -> tuple[float, float]:
 
 def _velocity_error(scene: Scene, dynamics: Dynamics, count_m: float) -> float:
     t_s = np.arange(round(_LASTS_S * scene.rate_hz)) / scene.rate_hz
-    turns = 2.0 * math.pi * HAND_HZ * t_s
+    turns = 2.0 * math.pi * _HAND_HZ * t_s
     rest = np.zeros_like(t_s)
-    counted_m = scene.scale * count_m * np.rint(HAND_M * np.sin(turns) / count_m)
+    counted_m = scene.scale * count_m * np.rint(_HAND_M * np.sin(turns) / count_m)
     still = scene.model_copy(update={"liquids": (), "knee": Knee(law="none"), "origin_m": (0.0, 0.0, 0.0)})
     seen = samples_along(still, Motion(t_s, np.column_stack([counted_m, rest, rest])), dynamics)
-    true_mps = scene.scale * HAND_M * 2.0 * math.pi * HAND_HZ * np.cos(turns)
+    true_mps = scene.scale * _HAND_M * 2.0 * math.pi * _HAND_HZ * np.cos(turns)
     settled = len(t_s) // 4
     wrong_mps = seen["velocity_mps"][settled:, 0] - true_mps[settled:]
     return float(np.sqrt(np.mean(wrong_mps**2) / np.mean(true_mps[settled:] ** 2)))

@@ -29,7 +29,7 @@ def machine() -> str:
 
 LoadName: TypeAlias = Literal["none", "gui", "gui+cpu"]
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _BUSY: Final = """\
 import os, sys, threading
@@ -49,10 +49,10 @@ class Windows(Protocol):
     @property
     def frames(self) -> int: ...
     def timer(self, period_ms: int, count: int, fire: Callable[[], object]) -> int: ...
-    def during(self, work: Callable[[], T]) -> T: ...
+    def during(self, work: Callable[[], _T]) -> _T: ...
 
 
-def under_load(load: LoadName, windows: Windows | None, work: Callable[[], T]) -> T:
+def under_load(load: LoadName, windows: Windows | None, work: Callable[[], _T]) -> _T:
     """Run ``work`` under a load and return its result; ``windows``, if any, are kept open in this thread meanwhile."""
     if windows is None:
         return work()

@@ -47,7 +47,7 @@ _SETTLED: Final = 2 / 3
 """After this share of the strokes the flow no longer depends on their start."""
 
 
-class Causes(NamedTuple):
+class _Causes(NamedTuple):
     """The change in force due to each cause along the same strokes: RMS of the change over RMS of the reference.
 
     The causes lead from the reference to the force sent, one step each: the scene's effects with exact velocities
@@ -70,7 +70,7 @@ class Expected(NamedTuple):
     cost_ns: float
     error_share: float
     error_n: float
-    causes: Causes
+    causes: _Causes
     against: str
 
 
@@ -138,13 +138,13 @@ def _alone(scene: Scene, liquid: Liquid) -> Scene:
     return with_effects(scene.model_copy(update={"liquids": (whole,)}), *kept)
 
 
-def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
+def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, _Causes, str]:
     if not scene.liquids:
-        return 0.0, 0.0, Causes(), "a scene without liquid"
+        return 0.0, 0.0, _Causes(), "a scene without liquid"
     return max((_of_one(scene, index, delay_ticks) for index in range(len(scene.liquids))), key=lambda it: it[1])
 
 
-def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
+def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, _Causes, str]:
     """Return the errors of one liquid, as if it filled the scene without a current."""
     alone = _alone(scene, scene.liquids[index])
     liquid = alone.liquids[0]
@@ -170,18 +170,23 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, C
         true_n = _defined_n(alone, motion)
         against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
     if not true_n.any():
-        return 0.0, 0.0, Causes(), against
+        return 0.0, 0.0, _Causes(), against
     truth = Truth(name="", source="", cases=(Case(motion, true_n, motion.t_s >= _SETTLED * motion.t_s[-1]),))
     steps_n = [true_n, *_forces(alone, motion, Dynamics(delay_ticks / alone.rate_hz, COUNT_M))]
     law, acceleration, velocity, limits = (
         error_of([true_n + after_n - before_n], truth).rms for before_n, after_n in itertools.pairwise(steps_n)
     )
     whole = error_of(steps_n[-1:], truth)
-    return whole.rms, whole.rms_n, Causes(velocity=velocity, acceleration=acceleration, limits=limits, law=law), against
+    return (
+        whole.rms,
+        whole.rms_n,
+        _Causes(velocity=velocity, acceleration=acceleration, limits=limits, law=law),
+        against,
+    )
 
 
 def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats]:
-    """Yield the forces (n, 3) [N], each with one more of the causes in `Causes` than the previous one."""
+    """Yield the forces (n, 3) [N], each with one more of the causes in `_Causes` than the previous one."""
     yield samples_along(scene, motion, dynamics).force_n
     yield samples_along(scene, motion, dynamics, smooths=True).force_n
     step_m = dynamics.count_m * scene.scale

@@ -20,8 +20,8 @@ TURN_S: Final = 0.25
 _LEAST_S: Final = 0.5
 _MOST_S: Final = 3600.0
 
-Arm = TypeVar("Arm")
-Found = TypeVar("Found")
+_Arm = TypeVar("_Arm")
+_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True)
@@ -96,16 +96,16 @@ def duration(ns: float) -> str:
 
 
 def run(
-    measure: Callable[..., Found],
+    measure: Callable[..., _Found],
     cases: Iterable[Sequence[Any]],
     executor: Executor | None = None,
     progress: Callable[[int], object] = lambda _done: None,
-) -> tuple[Found, ...]:
+) -> tuple[_Found, ...]:
     """Return the results of ``measure`` for each case; in parallel with an executor.
 
     ``progress`` is called with the number of finished cases.
     """
-    rows: list[Found] = []
+    rows: list[_Found] = []
     for row in (map if executor is None else executor.map)(measure, *zip(*cases, strict=True)):
         rows.append(row)
         progress(len(rows))
@@ -125,18 +125,18 @@ def check_seconds(seconds: float, what: str) -> None:
 
 
 def take_turns(
-    arms: Mapping[Arm, Callable[[int], Found]],
+    arms: Mapping[_Arm, Callable[[int], _Found]],
     rounds: int,
     *,
     ending: threading.Event,
     progress: Callable[[str], object] = lambda _line: None,
     alternating: bool = False,
-) -> dict[Arm, list[Found]]:
+) -> dict[_Arm, list[_Found]]:
     """Run each arm once per round, so that other load affects all alike; return the results by arm.
 
     An arm is called with the number of the round; with ``alternating``, every second round is in reverse order.
     """
-    rows: dict[Arm, list[Found]] = {arm: [] for arm in arms}
+    rows: dict[_Arm, list[_Found]] = {arm: [] for arm in arms}
     for number in range(rounds):
         for arm in reversed(tuple(arms)) if alternating and number % 2 else arms:
             if ending.is_set():

@@ -18,7 +18,7 @@ SampleChoice: TypeAlias = Literal["off", "single-blind", "always"]
 """The studies in which samples are streamed: none, those that are not double-blind, all."""
 
 
-class SampledServo(Protocol):
+class _SampledServo(Protocol):
     """The part of the servo (``haptics.runtime.servo.Servo``) that outlets use."""
 
     rate_hz: float
@@ -79,7 +79,7 @@ def open_sink(address: str, now_ns: Callable[[], int]) -> Sink:
 class Outlets:
     """The outlets of a session: markers to sinks, by their addresses, and samples; `mark` never waits."""
 
-    def __init__(self, addresses: Sequence[str], samples: SampleChoice, servo: SampledServo, blinding: str) -> None:
+    def __init__(self, addresses: Sequence[str], samples: SampleChoice, servo: _SampledServo, blinding: str) -> None:
         self._failed: dict[str, str] = {}
         self._threads: list[SinkThread] = []
         self._samples: SampleStream | None = None

@@ -50,7 +50,7 @@ __all__ = [
     "validate_document",
 ]
 
-M = TypeVar("M", bound=BaseModel)
+_M = TypeVar("_M", bound=BaseModel)
 
 _RENAME: Final = "rename the file, because studies are shared between systems"
 _SHOWN = 200  # characters of a bad value that a message repeats
@@ -277,7 +277,7 @@ def read_document(source: bytes, name: str) -> tuple[dict[str, Any], Places]:
     return document, Places(text)
 
 
-def _validate(model: type[M], document: Mapping[str, Any]) -> tuple[M | None, list[Fault]]:
+def _validate(model: type[_M], document: Mapping[str, Any]) -> tuple[_M | None, list[Fault]]:
     """Return the validated document, None if it is invalid, and the faults found by its models."""
     named = [path for section in ("liquids", "blocks") for path, _ in entries(document, f"{section}.*.id")]
     faults = [Fault(path, "unknown key", "the name of the table is its ID") for path in named]

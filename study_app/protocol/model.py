@@ -639,7 +639,7 @@ class Analysis(Table):
         yield "Detection", "not asked" if self.noticed is None else f"agreement with {self.noticed} (5 to 7)"
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 def _with_ids(tables: Any) -> Any:
@@ -649,7 +649,7 @@ def _with_ids(tables: Any) -> Any:
     return {name: {**table, "id": name} if isinstance(table, Mapping) else table for name, table in tables.items()}
 
 
-Named: TypeAlias = Annotated[dict[Id, T], BeforeValidator(_with_ids)]
+Named: TypeAlias = Annotated[dict[Id, _T], BeforeValidator(_with_ids)]
 
 
 class Protocol(Table):

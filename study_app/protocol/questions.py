@@ -154,7 +154,7 @@ class Context:
         return text_in(value, self.language)
 
 
-V = TypeVar("V", bound=ItemView)
+_V = TypeVar("_V", bound=ItemView)
 
 
 class Question(Table):
@@ -204,7 +204,7 @@ class Question(Table):
         """Return the `levels` that an answer counts for; for a ranking only the first, for example."""
         return tuple(response.split()) if self.names_several else (response,)
 
-    def _shown(self, kind: type[V], number: int, context: Context, **own: Any) -> V:
+    def _shown(self, kind: type[_V], number: int, context: Context, **own: Any) -> _V:
         """Return its view with the common fields and those of its kind."""
         return kind(self.id, number, context.text(self.text), self.required, show_if=self.show_if, **own)
 

@@ -143,7 +143,7 @@ def assigned_row(study: str, block: str, rows: int, participant: str, place: int
     return shuffle(range(rows), study_stream(study, f"rows/{block}/{rounds}").random)[place]
 
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 _Proposal: TypeAlias = tuple[tuple[int, ...], Fraction]
 
@@ -151,7 +151,7 @@ PROPOSALS = 32
 _STEEPEST = 6
 
 
-def draw_order(codes: Sequence[T], repetitions: int, constraint: Constraint, draw: Draw) -> tuple[T, ...]:
+def draw_order(codes: Sequence[_T], repetitions: int, constraint: Constraint, draw: Draw) -> tuple[_T, ...]:
     """Return every code ``repetitions`` times in a random order that satisfies a constraint.
 
     ``draw`` gives uniform numbers in [0, 1); at most (len(codes) · repetitions + 1) · ``PROPOSALS`` + len(codes) of

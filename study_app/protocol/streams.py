@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final, TypeAlias, TypeVar
 
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 Draw: TypeAlias = Callable[[], float]
 
@@ -37,7 +37,7 @@ def study_stream(study: str, name: str) -> random.Random:
     return stream(0, f"study/{study}/{name}")
 
 
-def shuffle(items: Iterable[T], draw: Draw) -> tuple[T, ...]:
+def shuffle(items: Iterable[_T], draw: Draw) -> tuple[_T, ...]:
     """Return ``items`` in random order (Fisher–Yates, Durstenfeld's variant), with len(items) − 1 calls of ``draw``.
 
     ``draw`` gives uniform numbers in [0, 1), as ``stream(…).random`` does.

@@ -196,18 +196,18 @@ class Table(BaseModel):
         return node
 
 
-K = TypeVar("K", bound=Table)
+_K = TypeVar("_K", bound=Table)
 RECORDED: Final = {"recorded": True}
 """The context in which a recorded protocol is read: what a plug-in that is not here has added is kept as it stands."""
 
 
-class OfKinds(Generic[K]):
+class OfKinds(Generic[_K]):
     """The annotation for the union of a table's built-in kinds; a kind with a colon belongs to a plug-in.
 
     ``base`` is the common class, ``stand_in`` holds a recorded table of a plug-in that is not installed.
     """
 
-    def __init__(self, registry: Registry[type[K]], base: type[K], stand_in: type[K]) -> None:
+    def __init__(self, registry: Registry[type[_K]], base: type[_K], stand_in: type[_K]) -> None:
         self.registry, self.base, self.stand_in = registry, base, stand_in
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

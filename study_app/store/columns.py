@@ -285,7 +285,7 @@ DELIVERED: tuple[Column, ...] = (
 """Columns of the stimulus that each interval delivered."""
 
 
-VIDEO: tuple[Column, ...] = (
+_VIDEO: tuple[Column, ...] = (
     _count("video_frames", "Number of video frames shown; n/a if there is no video.", sealed=True),
     _count(
         "video_frames_late",
@@ -337,14 +337,14 @@ INTERVALS: tuple[Column, ...] = (
     ),
     *DELIVERED,
     *(column for column in _TRIALS[_OUTCOME:] if column.name not in _NOT_OF_INTERVALS),
-    *VIDEO,
+    *_VIDEO,
 )
 """Intervals of the trials of a study with designs."""
 
 
 TRIALS: tuple[Column, ...] = (
     *(replace(column, levels=(*column.levels, _INVALID)) if column.name == "outcome" else column for column in _TRIALS),
-    *VIDEO,
+    *_VIDEO,
     _count("intervals", "Number of intervals presented in this attempt; n/a if the block does not have a design."),
     GROUP,
 )

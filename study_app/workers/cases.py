@@ -34,8 +34,8 @@ CONNECT_S: Final = 10.0
 _LONGEST_GREETING: Final = 1 << 16
 _CLOSE_S: Final = 2.0
 _WATCH_S: Final = 0.5
-P = ParamSpec("P")
-T = TypeVar("T")
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
 _PACKAGE: Final = Path(study_app.__file__).resolve().parent
 _ENDINGS: Final = (".py", ".csv", ".toml")
 _LOGGERS: Final = ("distributed", "distributed.client", "tornado.application")
@@ -52,7 +52,7 @@ class ProcessExecutor(ProcessPoolExecutor):
         self._watched, self._held = CONTEXT.Pipe(duplex=False)
         super().__init__(workers, mp_context=CONTEXT, initializer=_start_process, initargs=(self._watched,))
 
-    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+    def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
         """Compute a case; raise `WorkerError` if a process cannot be started."""
         try:
             return super().submit(_run, fn, args, kwargs)
@@ -122,9 +122,9 @@ class ClusterExecutor(Executor):
         self._ended = threading.Event()
         threading.Thread(target=self._watch, name="cluster", daemon=True).start()
 
-    def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+    def submit(self, fn: Callable[_P, _T], /, *args: _P.args, **kwargs: _P.kwargs) -> Future[_T]:
         """Compute a case on a worker."""
-        future: Future[T] = self._executor.submit(_compute, dict(environment()), fn, args, kwargs)
+        future: Future[_T] = self._executor.submit(_compute, dict(environment()), fn, args, kwargs)
         self._pending.add(future)
         future.add_done_callback(self._pending.discard)
         return future
@@ -164,7 +164,7 @@ class ClusterExecutor(Executor):
                 self._cancel()
 
 
-def _compute(expected: Mapping[str, str], fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
+def _compute(expected: Mapping[str, str], fn: Callable[..., _T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> _T:
     """Compute a case on a worker, which must have the expected `environment`."""
     own = environment()
     differing = "; ".join(
@@ -180,7 +180,7 @@ def _compute(expected: Mapping[str, str], fn: Callable[..., T], args: tuple[Any,
     return _run(fn, args, kwargs)
 
 
-def _run(fn: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
+def _run(fn: Callable[..., _T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> _T:
     """Compute a case; name the plug-in in its errors, since its modules are known only in this process."""
     try:
         return fn(*args, **kwargs)

@@ -11,11 +11,11 @@ from study_app.workers.server import CONTEXT, Crashed, Refused, serve_orders
 PATIENCE_S: Final = 3.0
 """Time after which a process that was asked to end is killed [s]."""
 
-Order = TypeVar("Order")
-Answer = TypeVar("Answer")
+_Order = TypeVar("_Order")
+_Answer = TypeVar("_Answer")
 
 
-class WorkerClient(Generic[Order, Answer]):
+class WorkerClient(Generic[_Order, _Answer]):
     """A worker process that carries out orders, one after the other.
 
     A new order, like `stop`, asks the last one to stop early; its task decides whether to do so.
@@ -61,7 +61,7 @@ class WorkerClient(Generic[Order, Answer]):
         """Whether the process has ended."""
         return not self.process.is_alive()
 
-    def order(self, order: Order) -> int:
+    def order(self, order: _Order) -> int:
         """Send an order; return the number of its answers. Answers to earlier orders may still arrive."""
         self._ordered += 1
         self._open.append(self._ordered)
@@ -72,7 +72,7 @@ class WorkerClient(Generic[Order, Answer]):
         """Ask the current order to stop early."""
         self._send(None)
 
-    def answers(self, wait_s: float = 0.0) -> list[tuple[int, Answer | Refused | Crashed]]:
+    def answers(self, wait_s: float = 0.0) -> list[tuple[int, _Answer | Refused | Crashed]]:
         """Return the answers since the last call, with the numbers of their orders.
 
         The last answer to an order is the result of its task, `Refused`, or `Crashed` if the process ended.
@@ -84,7 +84,7 @@ class WorkerClient(Generic[Order, Answer]):
         """
         if self._closed:
             return []
-        answers: list[tuple[int, Answer | Refused | Crashed]] = []
+        answers: list[tuple[int, _Answer | Refused | Crashed]] = []
         with suppress(EOFError, OSError):
             wait([self._answers], wait_s)
             while self._answers.poll():
@@ -121,7 +121,7 @@ class WorkerClient(Generic[Order, Answer]):
             self.process.kill()
             self.process.join()
 
-    def _send(self, message: tuple[int, Order] | None) -> None:
+    def _send(self, message: tuple[int, _Order] | None) -> None:
         if not self._closed:
             with suppress(BrokenPipeError, ConnectionResetError):
                 self._orders.send(message)

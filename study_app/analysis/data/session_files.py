@@ -68,7 +68,7 @@ def _texts(path: Path, columns: tuple[Column, ...]) -> tuple[Mapping[str, Sequen
     try:
         names, *rows = read_cells(read_regular(path))
     except OSError as error:
-        raise unreadable_error(path, error, _again(path)) from error
+        raise _unreadable_error(path, error, _again(path)) from error
     except ValueError as error:
         raise AnalysisError(f"{path} {error}: it has been truncated or changed; {_again(path)}") from error
     held = tuple(column for column in columns if column.name in names or not column.sealed)
@@ -101,7 +101,7 @@ def document(path: Path) -> dict[str, Any]:
     try:
         parsed = parse_json(read_regular(path))
     except OSError as error:
-        raise unreadable_error(path, error) from error
+        raise _unreadable_error(path, error) from error
     except ValueError as error:
         raise AnalysisError(f"{path} is damaged ({error}): restore it from a back-up") from error
     if not isinstance(parsed, dict):
@@ -109,7 +109,7 @@ def document(path: Path) -> dict[str, Any]:
     return parsed
 
 
-def unreadable_error(path: Path, error: OSError, remedy: str = "restore it from a back-up") -> AnalysisError:
+def _unreadable_error(path: Path, error: OSError, remedy: str = "restore it from a back-up") -> AnalysisError:
     """Return the error for a file that cannot be read."""
     return AnalysisError(
         f"{path} cannot be read ({error.strerror or type(error).__name__}): {remedy}, or correct its permissions"

@@ -71,10 +71,10 @@ from study_app.store.verification.verify_session import Discrepancy, session_dis
 from study_app.store.withdrawals import Tombstone, tombstones
 
 Settings: TypeAlias = Mapping[tuple[str, str], Setting]
-AnyBlock = TypeVar("AnyBlock", Block, LevelBlock)
+_AnyBlock = TypeVar("_AnyBlock", Block, LevelBlock)
 
 
-def with_merged_code(site: str, setting: Setting) -> Setting:
+def _with_merged_code(site: str, setting: Setting) -> Setting:
     """Return a site's setting with its code in the merged study."""
     code = f"{site}{DASH}{setting.code}" if setting.condition is None else setting.condition
     return replace(setting, code=code)
@@ -83,11 +83,11 @@ def with_merged_code(site: str, setting: Setting) -> Setting:
 def _unique_settings(each: Mapping[str, Iterable[Setting]]) -> tuple[Setting, ...]:
     """Return the settings of all sites without duplicates, in order of first occurrence."""
     return tuple(
-        dict.fromkeys(with_merged_code(site, setting) for site, settings in each.items() for setting in settings)
+        dict.fromkeys(_with_merged_code(site, setting) for site, settings in each.items() for setting in settings)
     )
 
 
-def _pooled_blocks(sites: Mapping[str, Sequence[AnyBlock]]) -> tuple[AnyBlock, ...]:
+def _pooled_blocks(sites: Mapping[str, Sequence[_AnyBlock]]) -> tuple[_AnyBlock, ...]:
     """Return the blocks, which are common to all sites, with the settings of all sites."""
     first = next(iter(sites.values()))
     return tuple(
@@ -128,7 +128,7 @@ def _of_site(site: str, settings: Settings, table: pd.DataFrame) -> pd.DataFrame
     if "code" not in table:
         return table
     codes = [
-        None if pd.isna(code) else with_merged_code(site, settings.get((block, code), Setting(code=code))).code
+        None if pd.isna(code) else _with_merged_code(site, settings.get((block, code), Setting(code=code))).code
         for block, code in zip(table["block"], table["code"], strict=True)
     ]
     return table.assign(code=pd.array(codes, dtype="string"))
@@ -382,7 +382,7 @@ def pool_sites(folder: Path, sites: Mapping[str, Study], withdrawn: Sequence[Tom
             (block, own.code): own
             for site, study in sites.items()
             for (block, _), setting in study.settings.items()
-            for own in [with_merged_code(site, setting)]
+            for own in [_with_merged_code(site, setting)]
         },
         responses=table("responses"),
         trials=table("trials"),

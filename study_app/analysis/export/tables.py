@@ -43,10 +43,10 @@ def _with_site(study: Study, table: Delivered) -> Delivered:
     place = header(table.columns).index("participant") + 1
     sites = pd.array([study.site_of(str(one)) for one in table.frame["participant"]], dtype="string")
     columns = (*table.columns[:place], SITE, *table.columns[place:])
-    return select_columns(table.name, columns, table.frame.assign(site=sites))
+    return _select_columns(table.name, columns, table.frame.assign(site=sites))
 
 
-def select_columns(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
+def _select_columns(name: str, columns: tuple[Column, ...], frame: pd.DataFrame) -> Delivered:
     """Return a table with these columns of a frame."""
     return Delivered(name, columns, frame[list(header(columns))])
 
@@ -66,13 +66,13 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
     if not study.levels:
         return
     intervals = INTERVALS if study.revealed else unsealed_columns(INTERVALS)
-    yield select_columns("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
+    yield _select_columns("intervals", (*intervals, *JUDGED, TRIALS_MISSING), study.intervals)
     if not study.revealed:
         return
     frame = _named(study, tracks(study)).rename(columns={"level": "level_asked"})
     # the frame has no column for an interval that no trial reached
     of_tracks = (*_TRACKS, *_may_miss((*OPENED, ACHIEVED)), *_of_intervals(study))
-    yield select_columns("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
+    yield _select_columns("tracks", of_tracks, frame.reindex(columns=list(header(of_tracks))))
     results = level_results(study, frame.rename(columns={"level_asked": "level"}))
     about = {"study": study.name, "simulated": study.simulated, "pilot": study.pilot}
     groups = dict(zip(frame["participant"], frame["group"], strict=True))
@@ -85,7 +85,7 @@ def _level_tables(study: Study) -> Iterator[Delivered]:
                 for row in statistic(of).exported()
             ]
             table = pd.DataFrame(rows, columns=list(header(columns)))
-            yield select_columns(
+            yield _select_columns(
                 statistic.table, columns, table.astype({column.name: _TYPES[column.kind] for column in columns})
             )
 
@@ -158,15 +158,15 @@ def exported_tables(study: Study) -> tuple[Delivered, ...]:
     trials = TRIALS if study.revealed else unsealed_columns(TRIALS)
     judged = (*JUDGED, TRIALS_MISSING) if study.levels else JUDGED
     tables = (
-        select_columns(
+        _select_columns(
             "responses", (*RESPONSES, *judged, *_may_miss(achieved)), _named(study, _with_delay_error(study))
         ),
-        select_columns(
+        _select_columns(
             "trials",
             (*trials, *judged, *(_may_miss(achieved) if study.levels else achieved)),
             _named(study, study.trials),
         ),
-        select_columns("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
+        _select_columns("aggregate", (*_aggregate_head(), *opened, *_MEASURED), _aggregate(study)),
         *_level_tables(study),
     )
     return tuple(_with_site(study, table) for table in tables)

@@ -16,7 +16,7 @@ from study_app.analysis.statistics.outcome import false_discovery
 from study_app.analysis.wording import counted, interval, number, p_value
 
 
-class CumulativeModels(StatementTests):
+class _CumulativeModels(StatementTests):
     """An exploratory cumulative mixed model of each primary statement.
 
     Over delays it is fitted to all individual answers, with effects of the delay that differ between participants; over

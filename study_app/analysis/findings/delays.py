@@ -477,7 +477,7 @@ def _half_way(threshold: Threshold) -> str:
     )
 
 
-class NoticedFrom(Finding[None]):
+class _NoticedFrom(Finding[None]):
     """The first page's answer: the delay from which participants notice a difference."""
 
     key = "noticed from"
@@ -540,7 +540,7 @@ class NoticedFrom(Finding[None]):
         return (step.trend.effect or 0.0) * (-1 if falling else 1)
 
 
-class UnchangedUpTo(Finding[None]):
+class _UnchangedUpTo(Finding[None]):
     """The first page's answer: the delay up to which answers do not change by a relevant amount."""
 
     key = "unchanged up to"

@@ -21,8 +21,8 @@ from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO
 from study_app.errors import StudyError
 from study_app.store.csv_files import Column, optional
 
-T = TypeVar("T")
-U = TypeVar("U")
+_T = TypeVar("_T")
+_U = TypeVar("_U")
 
 MANY: Final = DRAWN_UP_TO
 """Above so many participants p of single statements is approximated."""
@@ -145,7 +145,7 @@ def summarize_block(study: Study | None, answers: BlockAnswers) -> BlockResult:
             {str(name): None if pd.isna(value) else value for name, value in row.items()}
             for row in ([] if study is None else study.aggregate(block).to_dict("records"))
         ),
-        presentations=presentation_range(answers.single.values()),
+        presentations=_presentation_range(answers.single.values()),
         replicated_ms=tuple(delay for place, delay in delays if columns.count(place) > 1),
         sessions=tuple(sorted({int(number) for number in sessions})),
         incomplete={
@@ -173,7 +173,7 @@ def empty_result(block: Block, *absent: NotTested) -> BlockResult:
     )
 
 
-def presentation_range(single: Iterable[Array]) -> tuple[int, int]:
+def _presentation_range(single: Iterable[Array]) -> tuple[int, int]:
     """Return the least and greatest number of answers by a participant to one statement in one setting."""
     counts = np.concatenate([(~np.isnan(values)).sum(axis=2).ravel() for values in single] or [np.zeros(0)])
     given = counts[counts > 0]
@@ -352,16 +352,16 @@ class Answer:
     claims: bool = False
 
 
-R = TypeVar("R")
+_R = TypeVar("_R")
 Absent: TypeAlias = tuple[NotTested, ...]
 Row: TypeAlias = dict[str, Any]
 
 
-class Finding(Generic[R]):
+class Finding(Generic[_R]):
     """A finding of the analysis; an instance says what outputs state of it in one block.
 
     A subclass with a ``key`` in a module of this folder is in every output. It overrides what it has to say; the others
-    say nothing. ``R`` is the type of its value.
+    say nothing. ``_R`` is the type of its value.
 
     Attributes
     ----------
@@ -378,7 +378,7 @@ class Finding(Generic[R]):
         and in which it is named as waiting for the key.
     statements : bool
         Whether the value is tests of single statements whose verdicts belong to the limits of the study.
-    empty : R
+    empty : _R
         The value if nothing was tested.
     figure_name, figure_title : str
         File name and title of its figure; empty if it has none.
@@ -415,17 +415,17 @@ class Finding(Generic[R]):
         self._pictures = pictures or {}
 
     @classmethod
-    def of(cls, result: BlockResult) -> R:
+    def of(cls, result: BlockResult) -> _R:
         """Return its value in a block's result."""
-        return cast("R", result.findings.get(cls.key, cls.empty))
+        return cast("_R", result.findings.get(cls.key, cls.empty))
 
     @classmethod
-    def add_to(cls, result: BlockResult, value: R) -> BlockResult:
+    def add_to(cls, result: BlockResult, value: _R) -> BlockResult:
         """Return a block's result with this value added."""
         return replace(result, findings={**result.findings, cls.key: value})
 
     @classmethod
-    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[R, Absent]:
+    def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[_R, Absent]:
         """Return the value computed from a block's answers and the findings with lower places, and untested parts."""
         raise NotImplementedError
 

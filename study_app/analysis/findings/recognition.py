@@ -201,7 +201,7 @@ def recognised(named: RecognitionResult, alpha: float) -> tuple[int, ...]:
     return tuple(rate.setting for rate in named.found.rates if rate.p_adjusted is not None and rate.p_adjusted <= alpha)
 
 
-class Distinguished(Finding[None]):
+class _Distinguished(Finding[None]):
     """The first page's answer: the liquids or views that were distinguished."""
 
     key = "distinguished"

@@ -22,17 +22,17 @@ from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.wording import listed, number
 from study_app.discovery import modules_of
 
-R = TypeVar("R")
+_R = TypeVar("_R")
 Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
 """A column of a table of the report: its heading and what makes a cell of a row; None is one that is left out."""
 
 MOTORS: Final = "the motors are audible and were not masked, so participants may have relied on their sound."
 
 
-class LevelStatistic(Generic[R]):
+class LevelStatistic(Generic[_R]):
     """A statistic of blocks of levels; an instance provides its output for one block.
 
-    A subclass with a ``key`` in a module of this folder is in every output. ``R`` is the type of its rows; the
+    A subclass with a ``key`` in a module of this folder is in every output. ``_R`` is the type of its rows; the
     ``participant`` of a group's row is None. A figure is a row of `level_figures.FIGURES`.
 
     Attributes
@@ -71,12 +71,12 @@ class LevelStatistic(Generic[R]):
         self.estimator = estimator
 
     @classmethod
-    def of(cls, result: LevelsResult) -> tuple[R, ...]:
+    def of(cls, result: LevelsResult) -> tuple[_R, ...]:
         """Return its rows in a block."""
         return result.statistics.get(cls.key, ())
 
     @classmethod
-    def own(cls, result: LevelsResult) -> tuple[R, ...]:
+    def own(cls, result: LevelsResult) -> tuple[_R, ...]:
         """Return its rows of single participants in a block."""
         return tuple(one for one in cls.of(result) if getattr(one, "participant", None) is not None)
 
@@ -231,13 +231,13 @@ def analysed(block: LevelBlock, opened: pd.DataFrame, answer: str = "response") 
 
 
 def mean_over(
-    own: Sequence[R],
+    own: Sequence[_R],
     middle: str,
     *others: str,
     coordinate: Callable[[float], float] = float,
     level_of: Callable[[float], float] = float,
     **group: Any,
-) -> R:
+) -> _R:
     """Return the group's row: means over the participants with a known value; ``group`` overrides fields.
 
     The field ``middle`` is a mean in the coordinate u with Student's 95 % interval.

@@ -191,7 +191,7 @@ def thresholds_of(trials: pd.DataFrame, stimulus: Stimulus, design: Design) -> I
 
 
 @dataclass(frozen=True, slots=True)
-class FittedPerson:
+class _FittedPerson:
     """The fit to the ``rows`` of a participant at a standard; width and lapse rate are informed by all answers."""
 
     person: Any
@@ -204,14 +204,14 @@ class FittedPerson:
         return self.fit.flat.reweighted(self.factors)
 
 
-def _fits(block: LevelBlock, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[FittedPerson], GroupPriors | None]:
+def _fits(block: LevelBlock, assumed: Assumed, rows: pd.DataFrame) -> tuple[list[_FittedPerson], GroupPriors | None]:
     """Return the fit of each participant from the analysed rows of one standard, and what the group says about it."""
     fits, of_people = _flat_fits(block, rows), dict(list(rows.groupby("participant")))
     if not fits:
         return [], None
     priors = group_priors([fit.flat for fit in fits.values()], assumed.width_prior)
     return [
-        FittedPerson(person, of_people[person], fit, factors)
+        _FittedPerson(person, of_people[person], fit, factors)
         for (person, fit), factors in zip(fits.items(), priors.factors, strict=True)
     ], priors
 
@@ -280,7 +280,7 @@ def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[Any, PersonFit]:
 
 
 def _own(
-    block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: FittedPerson, heard: pd.DataFrame
+    block: LevelBlock, stimulus: Stimulus, standard: Any, fitted: _FittedPerson, heard: pd.DataFrame
 ) -> ThresholdEstimate:
     """Return a participant's threshold; ``heard`` are also the rows that are not analysed."""
     fit, posterior, rows = fitted.fit, fitted.posterior, fitted.rows
@@ -413,7 +413,7 @@ def courses(block: LevelBlock, opened: pd.DataFrame, most: int) -> Iterator[Trac
         return
     rows = _answered(block, opened)
     at_standards = rows[rows["analysed"]].groupby("standard", dropna=False, sort=True)
-    fits: list[tuple[Any, FittedPerson]] = [
+    fits: list[tuple[Any, _FittedPerson]] = [
         (standard, person) for standard, own in at_standards for person in _fits(block, assumed, own)[0]
     ]
     for standard, fitted in sorted(fits, key=lambda fit: fit[1].person)[:most]:

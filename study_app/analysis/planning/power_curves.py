@@ -397,7 +397,7 @@ def power_markdown(power: Powers) -> str:
                     [curve for curve in curves if curve.detectable],
                     power,
                     first,
-                    lambda curve, at: difference_text(curve.points(at), 2),
+                    lambda curve, at: _difference_text(curve.points(at), 2),
                 )
     return "\n".join([*lines, *_between(power)]) + "\n"
 
@@ -750,20 +750,20 @@ def _markdown_table(
         kinds = found.among_kinds(curve)
         cells = [
             _name(curve, found),
-            *(with_range([cell(kind, at) for kind in kinds]) for at in range(len(found.sizes))),
+            *(_with_range([cell(kind, at) for kind in kinds]) for at in range(len(found.sizes))),
         ]
         if needed:
-            cells.append(with_range([str(kind.needed(found.sizes) or f"> {found.sizes[-1]}") for kind in kinds]))
+            cells.append(_with_range([str(kind.needed(found.sizes) or f"> {found.sizes[-1]}") for kind in kinds]))
         lines.append(f"| {' | '.join(cells)} |")
     return lines
 
 
-def difference_text(points: float | None, decimals: int) -> str:
+def _difference_text(points: float | None, decimals: int) -> str:
     """Return a smallest difference as text; None means beyond those that were simulated."""
     return BEYOND if points is None else f"{points:.{decimals}f}"
 
 
-def with_range(numbers: Sequence[str]) -> str:
+def _with_range(numbers: Sequence[str]) -> str:
     """Return the first number as text, with the range of all numbers in parentheses if they differ."""
     lowest, *_, highest = sorted(numbers, key=_order)
     joint = "–" if highest.strip("%").replace(".", "").isdigit() else " to "

@@ -396,7 +396,7 @@ def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: 
             found = judge(block, decided, given[place][:, :, :n], ps[place][0], shown, rngs[place])
             for what, of_studies in found.items():
                 of_sizes.setdefault((block.id, what), []).append(of_studies)
-        for name, shown in shown_contrasts(plan, [one[:, :, :n] for one in given], decided.alpha).items():
+        for name, shown in _shown_contrasts(plan, [one[:, :, :n] for one in given], decided.alpha).items():
             of_sizes.setdefault((name, "contrast"), []).append(shown)
     for numbers in of_sizes.values() if plan.decided.looks else ():
         numbers[:] = np.logical_or.accumulate(numbers)  # a study that shows it at a look is stopped
@@ -408,7 +408,7 @@ def _counted_in(plan: Plan, sizes: Sequence[int], given: Sequence[Array], seed: 
 IF_EQUAL: Final = "if there is no difference"
 
 
-def shown_contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
+def _shown_contrasts(plan: Plan, given: Sequence[Array], alpha: float) -> dict[str, NDArray[np.bool_]]:
     """Return which studies (studies, effects) show each contrast of statements, by its text, as in the report.
 
     For a contrast with a bound, equivalence within it is included as `IF_EQUAL`. Both are corrected by Holm. ``given``

@@ -402,13 +402,13 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
             f"SD: standard deviation {whose} (a factor of {BETWEEN_PEOPLE:g}){share}.",
             (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
             group_shares(precisions.protocol, contrast),
-            log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
+            _log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
             bounds=sum(each.bound is not None for each in decided.contrasts),
             planned=decided.participants, assumed=assumed,
         )  # fmt: skip
 
 
-def log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
+def _log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
     """Return the logarithm of the equivalence bound; None if there is none, or if thresholds are not ratios."""
     stimuli = [stimulus_of(protocol, protocol.blocks[block]) for block in contrast.blocks]
     if contrast.bound is None or any(stimulus.spacing != "log" for stimulus in stimuli):

@@ -159,7 +159,7 @@ _VERSION: Final = re.compile(r"[0-9A-Za-z.+-]+")
 
 
 @dataclass(frozen=True, slots=True)
-class DoneStep:
+class _DoneStep:
     """A completed step: its description ("Move Honey up"), its splices, and the selection before and after it."""
 
     words: str
@@ -181,8 +181,8 @@ class Document:
     ) -> None:
         self.study, self.selected, self.file = study, selected, file
         self.base, self.saved = base, study.text if base else ""
-        self.done: list[DoneStep] = []
-        self.undone: list[DoneStep] = []
+        self.done: list[_DoneStep] = []
+        self.undone: list[_DoneStep] = []
         self.read_only = ""
         self.draft = draft
         self.kept: datetime | None = None
@@ -212,7 +212,7 @@ class Document:
             joined = self.done.pop()
             splices, before = (*joined.splices, *splices), joined.before
         self.study, self.undone, self.last = study, [], (key, time.perf_counter())
-        self.done = [*self.done, DoneStep(name, splices, before, selected)][-_MOST_STEPS:]
+        self.done = [*self.done, _DoneStep(name, splices, before, selected)][-_MOST_STEPS:]
 
     def end_step(self) -> None:
         """Close the current undo step; the next edit begins a new one."""

@@ -157,7 +157,7 @@ class _FaultLine(QWidget):
         hbox(icon, (self.sentence, 1), spacing=8, margins=(_LABEL_PX + 8, 0, 0, 0), parent=self)
 
 
-class RowWidget(Themed, QWidget):
+class _RowWidget(Themed, QWidget):
     """A row: its label, its editor, a button that removes the key, and its faults.
 
     ``repair_asked`` carries a problem and the text of one of its repairs.
@@ -598,11 +598,11 @@ class FormCard(Card):
         self.setAccessibleName("Form")
         self.form: Form | None = None
         self.read_only = False
-        self.rows: list[RowWidget] = []
+        self.rows: list[_RowWidget] = []
         self.adds: dict[Path, QWidget] = {}
         self._parts: dict[object, QWidget] = {}
         self._known: Mapping[ProblemRow, tuple[str, ...]] = {}
-        self._focused: RowWidget | None = None
+        self._focused: _RowWidget | None = None
         self._renames = False
         self.head = _FormHead()
         self.head.asked.connect(self._request)
@@ -667,7 +667,7 @@ class FormCard(Card):
         for key, make, row in self._form_parts(form):
             kept = old.pop(key, None)
             part = self._parts[key] = kept or make()
-            if isinstance(part, RowWidget) and row is not None:
+            if isinstance(part, _RowWidget) and row is not None:
                 if before is None and kept is not None:
                     part.begin(row)
                 else:
@@ -690,7 +690,7 @@ class FormCard(Card):
     def _refocus(self, form: Form, before: Form | None, gone: QWidget) -> None:
         """Move the focus from a removed part to the row in its place or the row it added; else to the first row."""
         path: Path | None = None
-        if before is not None and isinstance(gone, RowWidget):
+        if before is not None and isinstance(gone, _RowWidget):
             path = gone.row.path
             path = (*form.path, *path[len(before.path) :]) if path[: len(before.path)] == before.path else path
         elif before is not None:
@@ -749,8 +749,8 @@ class FormCard(Card):
             heading.addWidget(away)
         return made
 
-    def _make_row(self, row: FormRow) -> RowWidget:
-        made = RowWidget(row)
+    def _make_row(self, row: FormRow) -> _RowWidget:
+        made = _RowWidget(row)
         made.field.asked.connect(self._request)
         made.repair_asked.connect(self.repair_asked)
         if isinstance(made.field, EntryList) and self.read_only:
@@ -776,7 +776,7 @@ class FormCard(Card):
         if keyboard is not None and row.isAncestorOf(keyboard):
             self.area.ensureWidgetVisible(keyboard, 0, 40)
 
-    def _row_of(self, path: Path) -> RowWidget | None:
+    def _row_of(self, path: Path) -> _RowWidget | None:
         around = [row for row in self.rows if path[: len(row.row.path)] == row.row.path]
         return max(around, key=lambda row: len(row.row.path), default=None)
 
@@ -836,7 +836,7 @@ class FormCard(Card):
     def repairs_of(self, problem: ProblemRow) -> list[RepairButton]:
         return [button for row in self.rows for button in row.repairs if button.problem == problem]
 
-    def _show_focused_row(self, row: RowWidget) -> None:
+    def _show_focused_row(self, row: _RowWidget) -> None:
         self._focused = row if row in self.rows else self._focused  # its own step may have replaced the row
         row.show_messages()
         self.show_help()

@@ -101,7 +101,7 @@ NUMBER_PX, ICON_PX, OPEN_PX = 18, 18, 32
 _INSET_PX = NUMBER_PX + ICON_PX + 2 * 8
 
 
-class QuestionRow(Themed, QWidget):
+class _QuestionRow(Themed, QWidget):
     """One question; ``opened`` is emitted when it is clicked or its button is pressed."""
 
     opened = Signal()
@@ -168,7 +168,7 @@ class QuestionRows(Themed, QWidget):
     def __init__(self) -> None:
         super().__init__()
         self.column = vbox(spacing=0, margins=0, parent=self)
-        self.rows: list[QuestionRow] = []
+        self.rows: list[_QuestionRow] = []
         self._shown: object = ((), ())
         self.hide()
 
@@ -186,7 +186,7 @@ class QuestionRows(Themed, QWidget):
             hbox(*columns, spacing=8, margins=(_INSET_PX, 0, OPEN_PX + 8, 0), parent=heads)
             self.column.addWidget(heads)
         for line in lines:
-            made = QuestionRow(line)
+            made = _QuestionRow(line)
             made.opened.connect(lambda path=line.path: self.asked.emit(Do("write", (path,))))
             add_parts(self.column, made, Rule())
             self.rows.append(made)

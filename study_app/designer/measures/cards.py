@@ -127,7 +127,7 @@ class _Strip(Themed, QWidget):
             x += width
 
 
-class CardWidget(Card):
+class _CardWidget(Card):
     """Shows a card; ``opens`` is called with the path of an element whose step is clicked."""
 
     def __init__(self, shown: MeasureCard, opens: Callable[[Path], None]) -> None:
@@ -264,7 +264,7 @@ class CardGrid(Themed, QWidget):
         super().__init__()
         self.opens = opens
         self.cards: tuple[MeasureCard, ...] = ()
-        self.parts: list[CardWidget] = []
+        self.parts: list[_CardWidget] = []
         self.grid = grid_of(8, 8, margins=0, parent=self)
         for column in range(2):
             self.grid.setColumnStretch(column, 1)
@@ -277,13 +277,13 @@ class CardGrid(Themed, QWidget):
         before, self.parts, self.cards = self.parts, [], cards
         for at, card in enumerate(cards):
             kept = at < len(before) and before[at].shown == card
-            self.parts.append(before[at] if kept else CardWidget(card, self.opens))
+            self.parts.append(before[at] if kept else _CardWidget(card, self.opens))
         for part in before:
             self.grid.removeWidget(part)
             if part not in self.parts:
                 remove_widget(part)
-        rows: list[list[CardWidget]] = []
-        pair: list[CardWidget] = []
+        rows: list[list[_CardWidget]] = []
+        pair: list[_CardWidget] = []
         for part in self.parts:
             pair += [] if part.shown.wide else [part]
             if part.shown.wide or len(pair) == 2:

@@ -61,7 +61,7 @@ class _MeasureCards(QScrollArea):
         self.grid.show_cards(shown.cards)
 
 
-class PowerCard(Card):
+class _PowerCard(Card):
     """The output of ``liquid-study power``, with the progress of its simulation and the trials that would be lost."""
 
     def __init__(self) -> None:
@@ -94,7 +94,7 @@ class MeasuresPage(_MeasureCards):
     def __init__(self) -> None:
         super().__init__("Measures")
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.power = PowerCard()
+        self.power = _PowerCard()
         self.column.addWidget(self.power)
         self.column.addStretch(1)
         self.column.setStretchFactor(self.grid, 0)

@@ -11,8 +11,8 @@ delay is measured: when for ``_SLOWER_READS`` reads more replies are owed than t
 ``_FASTER_READS`` fewer, no packet is sent until a read has no reply; the number of these reads is the delay. Replies
 still owed then are lost. A longer delay is adopted at once, a shorter one after two measurements in a row, since a lost
 reply looks like a shorter one. If the force changes too fast for a measurement, the delay is set to explain the owed
-replies. Positions later than ``MOST_DELAY`` are not used, nor those read while more than ``MOST_OWED`` replies are owed
-beyond the delay.
+replies. Positions later than ``MOST_DELAY`` are not used, nor those read while more than ``_MOST_OWED`` replies are
+owed beyond the delay.
 
 There is no checksum, so a byte corrupted into a permitted one passes the parser. An implausible jump of an arm
 therefore needs a second reply that confirms it; likewise buttons, the end of the out-stroke and arms no longer homed.
@@ -159,7 +159,7 @@ def _read(packet: Any, status: Any) -> None:
     status.count += 1
 
 
-MOST_OWED: Final = 4
+_MOST_OWED: Final = 4
 _SLOWER_READS: Final = 8
 _FASTER_READS: Final = 200
 _GIVEN_UP_READS: Final = 32
@@ -211,7 +211,7 @@ def _look_for_change(falcon: Any) -> None:
 @kernel
 def _has_few_owed(falcon: Any) -> bool:
     """Return whether so few replies are pending beyond the delay that any received one is recent."""
-    return bool(falcon.owed < falcon.delay + MOST_OWED)
+    return bool(falcon.owed < falcon.delay + _MOST_OWED)
 
 
 @kernel

@@ -289,7 +289,7 @@ class _Panel:
         listed = sorted(place_pt, key=lambda row: place_pt[row] + _SLANT_PT * np.log10(row.ns_per_ms))
         wanted = [place_pt[row] for row in listed]
         column_ns = max(_COLUMN_NS, *(2.2 * row.ns_per_ms for row in listed))
-        for row, label_pt in zip(listed, spread_apart(wanted, _LABEL_PT, _PANEL_PT), strict=True):
+        for row, label_pt in zip(listed, _spread_apart(wanted, _LABEL_PT, _PANEL_PT), strict=True):
             height = float(np.exp(low + label_pt / _PANEL_PT * (high - low)))
             axes.annotate(
                 row.candidate.label,
@@ -318,7 +318,7 @@ def _height(row: Row) -> float:
     return 100 * row.error.rms
 
 
-def spread_apart(wanted: Sequence[float], gap: float, most: float) -> list[float]:
+def _spread_apart(wanted: Sequence[float], gap: float, most: float) -> list[float]:
     """Return positions close to ``wanted``, in the same order, at least ``gap`` apart and at most ``most``."""
     places: list[float] = []
     for place in wanted:

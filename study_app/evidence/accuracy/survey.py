@@ -50,7 +50,7 @@ PUBLISHED: Final[Mapping[str, Callable[[float], float]]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Surveyed:
+class _Surveyed:
     """One liquid: its Reynolds number at the scene's greatest speed, its model, and the model's errors.
 
     Errors are relative RMS errors with known velocities, against creeping flow, experiments and the fluid solver. They
@@ -74,7 +74,7 @@ class Surveyed:
         return self.speed_mps / self.mps_per_reynolds
 
 
-def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
+def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[_Surveyed, ...]:
     """Measure every liquid of a file that has a viscosity, most viscous first."""
     surveyed = []
     for name, scene in scenes.items():
@@ -86,7 +86,7 @@ def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda
     return tuple(sorted(surveyed, key=lambda it: it.reynolds))
 
 
-def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
+def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> _Surveyed:
     models, model = candidates.physical_candidates(scene)
     alone = models[0].scene
 
@@ -99,7 +99,7 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
     speeds = [float(np.abs(it.velocity_mps).max()) for it in motions if it.velocity_mps is not None]
     speed_mps = scene.motion_in(liquid).speed_mps or math.nan
     creeping = max(share(truths.oscillation_truth(alone)), share(truths.starting_truth(alone)))
-    return Surveyed(
+    return _Surveyed(
         liquid=name,
         speed_mps=speed_mps,
         mps_per_reynolds=mps_per_reynolds,
@@ -114,13 +114,13 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
     )
 
 
-def law_spread(reynolds: float) -> float:
+def _law_spread(reynolds: float) -> float:
     """Return the greatest difference between published laws of steady drag, relative to their mean."""
     ratios = [law(reynolds) for law in PUBLISHED.values()]
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
 
 
-def evidence(found: tuple[Surveyed, ...]) -> Evidence:
+def evidence(found: tuple[_Surveyed, ...]) -> Evidence:
     """Return tables of the liquids and of drag laws as a function of the Reynolds number, as Markdown."""
     highest = max(it.case.reynolds for it in (*load_tables(), *training(), *held_out()))
     liquids = []
@@ -135,7 +135,7 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
             _percent(it.steady),
             _percent(it.solver) + (f" (Re {_range(least, greatest)})" if it.solver is not None else ""),
             f"{checked_mps:.2g} m/s" if it.model == "unsteady drag" else "–",
-            _percent(law_spread(it.reynolds)),
+            _percent(_law_spread(it.reynolds)),
             _percent(it.expected.causes.law),
             _percent(it.expected.error_share),
             f"{it.expected.cost_ns:.0f}",
@@ -145,7 +145,7 @@ def evidence(found: tuple[Surveyed, ...]) -> Evidence:
     for reynolds in _REYNOLDS:
         drags = [law(reynolds) for law in (*PUBLISHED.values(), finite_reynolds)]
         values = [f"{24 / reynolds * ratio:.3g}" for ratio in (*drags, _measured(reynolds))]
-        laws.append((f"{reynolds:,g}", *values, _percent(law_spread(reynolds))))
+        laws.append((f"{reynolds:,g}", *values, _percent(_law_spread(reynolds))))
     tables = (
         Table(_HEADINGS, liquids, left=(0, 2)),
         Table(("Re", *PUBLISHED, "unsteady drag", "experiments", "spread"), laws),

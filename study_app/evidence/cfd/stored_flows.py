@@ -100,7 +100,7 @@ held_out: Final = partial(load_tables, of=HELD_OUT_FOLDER)
 """Motions that no fit uses."""
 
 
-def load_left_out(folder: Traversable | None = None) -> dict[str, Constants]:
+def _load_left_out(folder: Traversable | None = None) -> dict[str, Constants]:
     """Return the constants of unsteady drag that were fitted without one motion, by case name; may be empty."""
     file = (folder or package()) / LEFT_OUT_FILE
     if not file.is_file():
@@ -158,7 +158,7 @@ def solver_truths(scene: Scene, folder: Traversable | None = None) -> tuple[Trut
     ours = (liquid.density_kg_m3, liquid.viscosity_pa_s or math.nan, scene.body.diameter_m)
     more = (*training(), *held_out()) if folder is None else ()
     tables = (*load_tables(folder), *more)
-    without = load_left_out() if folder is None else {}
+    without = _load_left_out() if folder is None else {}
     truths = []
     for table in tables:
         notes = table.notes

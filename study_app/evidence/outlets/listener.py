@@ -26,7 +26,7 @@ _QUIET_S: Final = 1.0
 """Time without data after the end of the input, after which all is received."""
 
 
-def open_inlet(lsl: Any, name: str) -> Any:
+def _open_inlet(lsl: Any, name: str) -> Any:
     """Open an inlet for a stream and return it."""
     streams = lsl.resolve_byprop("name", name, 1, _FOUND_WITHIN_S)
     if not streams:
@@ -45,7 +45,7 @@ def _await_end(ending: threading.Event) -> None:
 def _listen() -> dict[str, Any]:
     """Receive both streams until the input closes; return the received data."""
     lsl, clock = library(), SystemClock()
-    markers, samples = open_inlet(lsl, MARKERS), open_inlet(lsl, SAMPLES)
+    markers, samples = _open_inlet(lsl, MARKERS), _open_inlet(lsl, SAMPLES)
     correction_s = markers.time_correction(_FOUND_WITHIN_S)
     mapping = ClockMapping(clock.now_ns, lsl.local_clock)
     ending = threading.Event()

@@ -63,7 +63,7 @@ TRUTH: Final = 4000
 """The true differences of means are those of so many simulated people."""
 
 
-def equal_settings(block: Block, extent: _Extent) -> Mapping[int, int]:
+def _equal_settings(block: Block, extent: _Extent) -> Mapping[int, int]:
     """Return, for each condition that is truly equal to an earlier one, the index of that one."""
     k = len(block.settings)
     if extent in _NO_EFFECT:
@@ -96,7 +96,7 @@ def _opined(block: Block, opinions: Opinions, extent: _Extent, rng: np.random.Ge
     if extent == "own trends":
         own = _own(block, (len(thought), *thought.shape[2:]), rng)
         return replace(opinions, thought=thought.mean(axis=2, keepdims=True) + own[:, None]).answers(1.0, PEOPLE)
-    for place, other in equal_settings(block, extent).items():
+    for place, other in _equal_settings(block, extent).items():
         thought[:, :, place] = thought[:, :, other]
     return replace(opinions, thought=thought).answers(1.0, PEOPLE)
 
@@ -109,7 +109,7 @@ def _probit(
         latent = leaning[:, None, None] + _own(block, (len(leaning), *effects.shape), rng)
         latent += rng.normal(size=latent.shape)
         return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
-    for place, other in equal_settings(block, extent).items():
+    for place, other in _equal_settings(block, extent).items():
         effects[place] = effects[other]
     latent = leaning[:, None, None] + slope[:, None, None] * effects + rng.normal(size=(len(leaning), *effects.shape))
     return np.add(np.searchsorted(_LEVELS, latent), 1, dtype=np.float64)
@@ -147,7 +147,7 @@ def _true_differences(simulation: Plan, generator: Generator, extent: _Extent) -
         simulation.blocks, simulate_answers(simulation, generator, extent, TRUTH, 0, 0), strict=True
     ):
         means = given.mean(axis=0)
-        for place, other in equal_settings(block, extent).items():
+        for place, other in _equal_settings(block, extent).items():
             means[place] = means[other]
         differences.append(np.asarray(means - means[0]))
     return tuple(differences)
@@ -160,7 +160,7 @@ _Verdict: TypeAlias = Literal["yes", "no", "too few studies", "counted"]
 _COMPARED: Final = 400
 """More rates than are compared with limits."""
 
-SURE: Final = 1 - 0.05 / _COMPARED
+_SURE: Final = 1 - 0.05 / _COMPARED
 """Confidence of the interval that must lie beyond a limit to say that a rate does not keep to it.
 
 Of so many rates that are exactly at their limits none exceeds it by chance in 95 % of runs (Bonferroni).
@@ -209,7 +209,7 @@ class Rate:
     def holds(self) -> _Verdict:
         """Whether the rate meets its limit.
 
-        "no" if the interval with confidence `SURE` lies beyond the limit: of a hundred rates exactly at their limit,
+        "no" if the interval with confidence `_SURE` lies beyond the limit: of a hundred rates exactly at their limit,
         some 95 % intervals miss it by chance. "yes" if the 95 % interval lies within the limit; otherwise there are too
         few studies.
         """
@@ -220,7 +220,7 @@ class Rate:
         if not self.studies:
             return "too few studies"
         lowest, highest, least, most = _ALLOWED[self.limit]
-        low, high = binomtest(self.hits, self.studies).proportion_ci(SURE, method="wilson")
+        low, high = binomtest(self.hits, self.studies).proportion_ci(_SURE, method="wilson")
         if high < lowest or low > highest:
             return "no"
         low, high = self.interval
@@ -397,7 +397,7 @@ def _recognised(result: BlockResult) -> bool:
 
 def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
     """Return the pairs of codes whose conditions are truly equal."""
-    like = equal_settings(block, extent)
+    like = _equal_settings(block, extent)
     codes = block.codes
     return {
         (first, second)
@@ -409,7 +409,7 @@ def _equal_pairs(block: Block, extent: _Extent) -> set[tuple[str, str]]:
 
 def _in_delays(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Array) -> Iterator[tuple[Event, bool]]:
     block = asked.block
-    null = [block.settings[at].delay_ms or 0.0 for at in equal_settings(block, cell.extent)]
+    null = [block.settings[at].delay_ms or 0.0 for at in _equal_settings(block, cell.extent)]
     if cell.extent in _NO_EFFECT:
         yield ("trend in a statement", "at most 5 %"), any(test.verdict in FOUND for test in DelayTrend.of(result))
         yield ("detection threshold printed", "at most 5 %"), _printed(result)

@@ -50,7 +50,7 @@ def wake_of(scene: Scene) -> Wake | None:
     return wake
 
 
-class Ledger:
+class _Ledger:
     """An independent record of the wake of a scene, from its first sample onwards."""
 
     def __init__(self, scene: Scene) -> None:
@@ -158,7 +158,7 @@ class Drift:
     longest_s: float = 0.0
     _scenes: dict[int, Scene] = field(default_factory=dict)  # not yet seen in samples, by serial
     _serial: int = 0
-    _ledger: Ledger | None = None
+    _ledger: _Ledger | None = None
     _next_tick: int = -1
 
     def expect(self, serial: int, scene: Scene) -> None:
@@ -180,7 +180,7 @@ class Drift:
         if serial != self._serial:
             scene = self._scenes.get(serial)
             self._scenes = {later: it for later, it in self._scenes.items() if later > serial}
-            self._ledger = Ledger(scene) if scene is not None else None
+            self._ledger = _Ledger(scene) if scene is not None else None
             self._serial = serial
         elif samples.tick[0] != self._next_tick:
             self._ledger = None

@@ -144,7 +144,7 @@ _STEADY_GAP: Final = (50, 4000)
 Part: TypeAlias = Literal["rough", "steady", "rest"]
 
 
-class Stretch(NamedTuple):
+class _Stretch(NamedTuple):
     """A part of a round; ``end`` is the tick before which it ends."""
 
     part: Part
@@ -194,7 +194,7 @@ class Soak:
         self._due, self._rests = _Due(), Rests()
         self._recoveries, self._loads, self._stops = 0, 0, 0
         self._presented = self._names[0]
-        self.stretch: Stretch | None = None
+        self.stretch: _Stretch | None = None
         self._still_from = 0
         self._memory: list[int] = []
         self._began_s = self._ticked_s = 0.0
@@ -277,7 +277,7 @@ class Soak:
             stops=self._stops,
         )
 
-    def _at(self, tick: int) -> Stretch:
+    def _at(self, tick: int) -> _Stretch:
         length = round(self._rate_hz * min(max(900 * self.hours, _SHORTEST_ROUND_S), _LONGEST_ROUND_S))
         number = tick // length
         rest = round(_SETTLING_S * self._rate_hz) + self._longest_wake
@@ -290,9 +290,9 @@ class Soak:
             ("rest", first + length),
         )
         part, end = next((part, end) for part, end in ends if tick < end)
-        return Stretch(part, number, end)
+        return _Stretch(part, number, end)
 
-    def _enter(self, stretch: Stretch, tick: int) -> None:
+    def _enter(self, stretch: _Stretch, tick: int) -> None:
         self._due = _Due(motion=tick)
         if stretch.part == "rest":
             self._still_from = tick
@@ -322,7 +322,7 @@ class Soak:
         effects = {effect for liquid in self._scenes[self._presented].liquids for effect in liquid.effects}
         return self.stretch is not None and self.stretch.part == "rest" and not effects - {"drag", "wake"}
 
-    def _act(self, stretch: Stretch, tick: int) -> None:
+    def _act(self, stretch: _Stretch, tick: int) -> None:
         """Carry out the due actions: change the motion or the liquid, stop the force, or release it again."""
         due = self._due
         if 0 <= due.motion <= tick:

@@ -172,18 +172,18 @@ def case_of(
     )
 
 
-class OnRandomMotion(NamedTuple):
+class _OnRandomMotion(NamedTuple):
     """Error of the acting force and least error of a linear estimator [%], on the same random motion."""
 
     error: float
     least: float
 
 
-def acting_on_random_motion(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequency_hz) -> OnRandomMotion:
+def acting_on_random_motion(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequency_hz) -> _OnRandomMotion:
     """Return the error of the acting force of ``scene`` in the loop of ``case`` while the hand moves at random."""
     trace = Bench(case, scene=scene).follow(random_path(frequency_hz, case.rate_hz))
     law_n = law_along(scene, trace) @ DIRECTION
-    return OnRandomMotion(error=_error(trace, law_n), least=_least_error(trace, law_n, case.delay))
+    return _OnRandomMotion(error=_error(trace, law_n), least=_least_error(trace, law_n, case.delay))
 
 
 class Acting(NamedTuple):

@@ -100,7 +100,7 @@ def _error(velocity: Velocity, stroke: Stroke) -> float:
         t_s = np.arange(4000) / _RATE_HZ
         t_s = t_s + random.uniform(-0.5, 0.5, len(t_s)) * math.sqrt(12) * _JITTER_S
         true_mps = stroke.speeds_mps(t_s)[_SETTLED:]
-        found_mps = estimate_velocities(velocity, t_s, stroke.places_m(t_s) + k / PLACES * COUNT_M)[_SETTLED:]
+        found_mps = _estimate_velocities(velocity, t_s, stroke.places_m(t_s) + k / PLACES * COUNT_M)[_SETTLED:]
         wrong += float(np.sum((found_mps * abs(found_mps) - true_mps * abs(true_mps)) ** 2))
         right += float(np.sum(true_mps**4))
     return 100 * math.sqrt(wrong / right)
@@ -115,14 +115,14 @@ def noise_mmps(velocity: Velocity) -> Mapping[float, float]:
         squares = []
         for seed in range(6):
             place_m = np.random.default_rng(seed).uniform(0, COUNT_M)
-            v_mps = estimate_velocities(velocity, t_s, place_m + speed_mps * t_s + tremor_m)
+            v_mps = _estimate_velocities(velocity, t_s, place_m + speed_mps * t_s + tremor_m)
             axes_mps = np.column_stack([v_mps, 0 * v_mps, 0 * v_mps])
             squares.append(fast_part(axes_mps, _RATE_HZ, _NOISE_HZ, 1000, len(t_s)) ** 2)
         noise[speed_mps] = 1e3 * math.sqrt(statistics.mean(squares))
     return noise
 
 
-def estimate_velocities(velocity: Velocity, t_s: Floats, x_m: Floats) -> Floats:
+def _estimate_velocities(velocity: Velocity, t_s: Floats, x_m: Floats) -> Floats:
     """Return the velocities (n,) [m/s] estimated from positions (n,) [m] along one axis."""
     seen_m = np.floor(x_m / COUNT_M + 0.5) * COUNT_M
     motion = Motion(t_s, np.column_stack([seen_m, 0 * seen_m, 0 * seen_m]))

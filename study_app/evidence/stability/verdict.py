@@ -64,7 +64,7 @@ ALLOWANCE_J: Final = 1e-3
 MISJUDGED_ALLOWANCE_J: Final = 10e-3
 """The same where the device's delay is another than the loop believes, or changes."""
 _SLOW_HZ: Final = 12.0
-FAST_HZ: Final = 40.0
+_FAST_HZ: Final = 40.0
 SWING_MPS: Final = 0.04
 _LATE_SWING_MPS: Final = 0.1
 """The same of a force that a study delays: 1 mJ, which the controller tolerates, moves 0.2 kg at this speed."""
@@ -75,7 +75,7 @@ _SUSTAINED: Final = 4
 """Number of successive intervals of `_ONCE_S` in which a sustained force exceeds its limit."""
 _TIRED: Final = 0.8
 _RESTLESS_N: Final = 0.05
-_SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
+_SPREAD_S: Final = math.sqrt(math.log(2.0)) / (2.0 * math.pi * _FAST_HZ)  # a Gaussian mean that halves 40 Hz's power
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,7 +102,7 @@ class Verdict:
         return NOISY if self.reasons == (_NOISE,) else UNSTABLE
 
 
-class Restlessness(NamedTuple):
+class _Restlessness(NamedTuple):
     """The force above 40 Hz [N RMS], that of the control, and whether the excess is beyond its limit and sustained."""
 
     fast_n: float
@@ -126,7 +126,7 @@ def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
     )
 
 
-def reasons_of(*, limit: bool, energy: bool, oscillation: bool, restlessness: Restlessness) -> tuple[str, ...]:
+def reasons_of(*, limit: bool, energy: bool, oscillation: bool, restlessness: _Restlessness) -> tuple[str, ...]:
     """Return the names of the reasons that apply to a finite trace."""
     noise = restlessness.excessive and not restlessness.sustained
     applies = (False, limit, energy, oscillation, restlessness.sustained, noise)
@@ -192,7 +192,7 @@ def windows(case: Case) -> Iterator[tuple[float, float]]:
 
 def swing(trace: Any, case: Case) -> float:
     """Return the least sustained oscillation [m/s] over the last 0.4 s, or over a second of the motion before."""
-    moving = _swing_between(trace, case, FAST_HZ, np.linspace(_SETTLES_S, _SETTLES_S + 1.0, 6))
+    moving = _swing_between(trace, case, _FAST_HZ, np.linspace(_SETTLES_S, _SETTLES_S + 1.0, 6))
     return max(_resting_swing(trace, case, lasts_s(case)), moving)
 
 
@@ -212,7 +212,7 @@ def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> fl
 
 def _restlessness(
     case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None, *, late_share: float
-) -> Restlessness:
+) -> _Restlessness:
     """Compare the force's fast part with that of the same motion without feedback, where they differ most."""
     calm = calm_motion(trace)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
@@ -245,7 +245,7 @@ def undecided(position_m: Any, count_um: float) -> Any:
 
 def compare_fast(
     force_n: Any, controls_n: Sequence[Any], rate_hz: float, first: int, *, late_share: float = 0.0
-) -> Restlessness:
+) -> _Restlessness:
     """Compare the fast part of a force (rows, 3) [N] with the greatest of its controls, from row ``first`` onwards.
 
     The permitted excess is 0.05 N, or ``late_share`` of the control if that is more. Controls may have fewer rows.
@@ -253,7 +253,7 @@ def compare_fast(
 
     def measure(begins: int, ends: int, aside_s: float = 0.0) -> tuple[float, float]:
         fast_n, *calm_n = (
-            fast_part(each, rate_hz, FAST_HZ, begins, min(ends, len(each)), aside_s) for each in (force_n, *controls_n)
+            fast_part(each, rate_hz, _FAST_HZ, begins, min(ends, len(each)), aside_s) for each in (force_n, *controls_n)
         )
         return fast_n, max(calm_n)
 
@@ -261,7 +261,7 @@ def compare_fast(
     rows = range(first, len(force_n) + 1, round(_ONCE_S * rate_hz))
     pairs_n = np.array([measure(*interval) for interval in itertools.pairwise(rows)]).reshape(-1, 2)
     permitted_n = np.maximum(_RESTLESS_N, late_share * pairs_n[:, 1])
-    return Restlessness(
+    return _Restlessness(
         fast_n=fast_n,
         control_n=control_n,
         excessive=fast_n - control_n > max(_RESTLESS_N, late_share * control_n),
@@ -279,7 +279,7 @@ def _is_sustained(excesses_n: Any, permitted_n: Any) -> bool:
     )
 
 
-def worst_of(compared: Sequence[Restlessness]) -> Restlessness:
+def worst_of(compared: Sequence[_Restlessness]) -> _Restlessness:
     """Return the greatest excess; it is sustained if any is."""
     worst = max(compared, key=lambda each: each.fast_n - each.control_n)
     return worst._replace(sustained=any(each.sustained for each in compared))

@@ -60,7 +60,7 @@ def panels_abreast(
 
 _LAYOUT: Final = Layout(height_pt=224, top_pt=36, left_pt=36, gap_pt=30, right_pt=16)
 _LOWEST_US: Final = 1.0
-BINS_A_DECADE: Final = 10
+_BINS_A_DECADE: Final = 10
 
 _LOOKS: Final[dict[Kind, dict[str, Any]]] = {
     "servo": {"color": "#0b65a3", "linestyle": "-", "linewidth": 1.7, "zorder": 5},
@@ -81,7 +81,7 @@ _LOADS: Final = {
 def draw(timing: Timed) -> Figure:
     """Draw the lateness of all loops."""
     caption = (
-        f"Proportion of ticks in each of {BINS_A_DECADE} bins per decade; marks at the bottom show the 99th "
+        f"Proportion of ticks in each of {_BINS_A_DECADE} bins per decade; marks at the bottom show the 99th "
         f"percentile of each loop. {timing.seconds:g} s of each loop at 1 kHz, alternating every quarter of a second, "
         f"{_LOADS[timing.load]}. {timing.machine}."
     )
@@ -102,7 +102,7 @@ def draw(timing: Timed) -> Figure:
 def _panel(axes: Axes, timing: Timed, level: Level, highest_us: float, *, first: bool) -> None:
     """Draw the loops of a class as steps, each with a mark at its 99th percentile."""
     decades = np.log10(highest_us / _LOWEST_US)
-    edges = np.logspace(np.log10(_LOWEST_US), np.log10(highest_us), round(BINS_A_DECADE * decades) + 1)
+    edges = np.logspace(np.log10(_LOWEST_US), np.log10(highest_us), round(_BINS_A_DECADE * decades) + 1)
     loops = [loop for loop in timing.loops if loop.grant.level == level]
     least = 1 / max(loop.ticks for loop in timing.loops)
     axes.set_xscale("log")

@@ -24,7 +24,7 @@ from study_app.store.workstation import DEFAULTS, MachineSettings
 _INSET = 30  # behind a radio's mark
 
 
-class DeviceRow(QWidget):
+class _DeviceRow(QWidget):
     """One device; ``diagnose`` is called with its name."""
 
     def __init__(self, shown: DeviceShown, diagnose: Callable[[str], object]) -> None:
@@ -122,7 +122,7 @@ class DevicesPlace(Place):
         self.dialog: DiagnosisDialog | None = None
         self._group = QButtonGroup(self)
         self.lists = {False: Card("Input devices", gap=6), True: Card("Simulated devices", gap=6)}
-        self.rows: dict[str, DeviceRow] = {}
+        self.rows: dict[str, _DeviceRow] = {}
         self.options = {option.name: _OptionCard(option) for option in remembered_options()}
         self.help = _HelpCard()
         self.refresh = ActionButton("repeat", "Refresh", key="F5")
@@ -207,8 +207,8 @@ class DevicesPlace(Place):
 
     def _add_row(self, device: DeviceShown) -> None:
         card = self.lists[device.simulated]
-        row = self.rows[device.name] = DeviceRow(device, self.diagnose)
-        add_parts(card.column, *([Rule()] if card.findChild(DeviceRow) else []), row)
+        row = self.rows[device.name] = _DeviceRow(device, self.diagnose)
+        add_parts(card.column, *([Rule()] if card.findChild(_DeviceRow) else []), row)
         if isinstance(row.title, Radio):
             self._group.addButton(row.title)
             row.title.clicked.connect(lambda: self.changed.emit({"device": device.name}))

@@ -152,7 +152,7 @@ _GROUP_HINT = "recorded as a property of the participant"
 
 
 @dataclass(frozen=True, slots=True)
-class StudyFolderState:
+class _StudyFolderState:
     """A snapshot of a study's folder: used ids, and the reason if it cannot hold new sessions.
 
     ``held`` are the entries of its participants in groups.
@@ -168,7 +168,7 @@ class StudyFolderState:
         return next((claim.group for claim in self.held if claim.participant == participant), None)
 
 
-def _read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState:
+def _read_study_folder_state(path: Path, protocol: Protocol) -> _StudyFolderState:
     """Read a study's folder; ``fault`` is the reason if it cannot be used."""
     folder, fault = StudyFolder(path), ""
     used = UsedIds(path, frozenset(), ())
@@ -178,7 +178,7 @@ def _read_study_folder_state(path: Path, protocol: Protocol) -> StudyFolderState
         check_conditions(path, protocol)
     except StoreError as error:
         fault = str(error)
-    return StudyFolderState(path, used, tuple(claims(folder)), fault)
+    return _StudyFolderState(path, used, tuple(claims(folder)), fault)
 
 
 class NewSessionDialog(QDialog):
@@ -202,7 +202,7 @@ class NewSessionDialog(QDialog):
     ) -> None:
         super().__init__(parent)
         self.facts, self._all_results = facts, results
-        self._state: StudyFolderState | None = None
+        self._state: _StudyFolderState | None = None
         self._reader = Background(self)
         self._reader.done.connect(self._take_state)
         self.setWindowTitle("New session")
@@ -382,12 +382,12 @@ class NewSessionDialog(QDialog):
         if text := self._value("results"):
             self._reader.run(partial(_read_study_folder_state, Path(text), self.facts.protocol))
 
-    def _take_state(self, state: StudyFolderState) -> None:
+    def _take_state(self, state: _StudyFolderState) -> None:
         if state.path == Path(self._value("results")) and state != self._state:
             self._state = state
             self._show_verdict()
 
-    def _current_state(self) -> StudyFolderState:
+    def _current_state(self) -> _StudyFolderState:
         """Return the last state of the study's folder; read a newly chosen folder at once."""
         path = Path(self._value("results") or ".")
         if self._state is None or self._state.path != path:

@@ -253,7 +253,7 @@ _LEAST_NS = 1.0  # the smallest cost that can be measured next to a running serv
 _LimiterState = Literal["acting", "acted", "quiet"]
 
 
-class CostLine(QWidget):
+class _CostLine(QWidget):
     """An effect, a bar relative to the most expensive effect, and its time in ns."""
 
     def __init__(self) -> None:
@@ -281,7 +281,7 @@ class CostLine(QWidget):
         self.setAccessibleName(f"{self.name.accessibleName()}: measuring")
 
 
-class AbsentLine(QWidget):
+class _AbsentLine(QWidget):
     """An effect without a cost, and the reason."""
 
     def __init__(self) -> None:
@@ -302,8 +302,8 @@ class CostCard(_ReadingCard):
 
     def __init__(self) -> None:
         super().__init__("Time per tick", label("", "small", "text2"), "Computation times would reveal the settings.")
-        self.lines: list[CostLine] = []
-        self.absent: list[AbsentLine] = []
+        self.lines: list[_CostLine] = []
+        self.absent: list[_AbsentLine] = []
         self._costs = vbox(spacing=0)
         self._absent = vbox(spacing=0)
         self.sum_name = label("Sum", "label", weight=600)
@@ -323,8 +323,8 @@ class CostCard(_ReadingCard):
         here = [row for row in view.cost if row.ns is not None]
         away = [row for row in view.cost if row.ns is None]
         most_ns = max((row.ns or 0.0 for row in here), default=0.0)
-        _match_count(self.lines, len(here), CostLine, self._costs)
-        _match_count(self.absent, len(away), AbsentLine, self._absent)
+        _match_count(self.lines, len(here), _CostLine, self._costs)
+        _match_count(self.absent, len(away), _AbsentLine, self._absent)
         for line, row in zip(self.lines, here, strict=True):
             line.show_cost(row, most_ns)
         for gone, row in zip(self.absent, away, strict=True):
@@ -340,7 +340,7 @@ class CostCard(_ReadingCard):
         self.sum.setText(_UNKNOWN)
 
 
-class ErrorLine(QWidget):
+class _ErrorLine(QWidget):
     """A measure and its value."""
 
     def __init__(self) -> None:
@@ -361,7 +361,7 @@ class ErrorCard(_ReadingCard):
     def __init__(self) -> None:
         why = "The errors relative to the reference would reveal the settings."
         super().__init__("Error relative to the reference", label("", "small", "text2"), why)
-        self.lines: list[ErrorLine] = []
+        self.lines: list[_ErrorLine] = []
         self._lines = vbox(spacing=2)
         add_parts(self.content, self._lines, STRETCH)
         self._shown.setMinimumHeight(ERROR_HEIGHT)
@@ -372,12 +372,12 @@ class ErrorCard(_ReadingCard):
         rows = view.errors or (ErrorRow(measure="Not measured yet", value=""),)
         if view.measuring and not view.errors and self.lines and self.lines[0].value.text():
             rows = tuple(ErrorRow(measure=line.name.whole, value=_UNKNOWN) for line in self.lines)
-        _match_count(self.lines, len(rows), ErrorLine, self._lines)
+        _match_count(self.lines, len(rows), _ErrorLine, self._lines)
         for line, row in zip(self.lines, rows, strict=True):
             line.show_error(row)
 
 
-class LimiterLine(Themed, QWidget):
+class _LimiterLine(Themed, QWidget):
     """A limiter: a mark, its name, and the number of ticks in which it acted; tinted while it acts."""
 
     def __init__(self) -> None:
@@ -426,14 +426,14 @@ class LimiterCard(_ReadingCard):
     def __init__(self) -> None:
         why = "Limiters would reveal the settings."
         super().__init__("Limiters", label("ticks, last 10 s", "small", "text2"), why)
-        self.lines: list[LimiterLine] = []
+        self.lines: list[_LimiterLine] = []
         self._lines = vbox(spacing=0, margins=(-8, 0, -8, 0))
         add_parts(self.content, self._lines, STRETCH)
 
     def show_view(self, view: LabView) -> None:
         if self.show_blind(view.workbench.blind):
             return
-        _match_count(self.lines, len(view.limiters), LimiterLine, self._lines)
+        _match_count(self.lines, len(view.limiters), _LimiterLine, self._lines)
         for line, limiter in zip(self.lines, view.limiters, strict=True):
             line.show_limiter(limiter)
 

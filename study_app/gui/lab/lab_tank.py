@@ -54,7 +54,7 @@ _LEAST_FOR_HEAD_PX = 46.0  # minimum length of a segment on the screen
 
 
 @dataclass(frozen=True, slots=True)
-class TailPlaces:
+class _TailPlaces:
     """The screen positions of a tail: runs of one shade from old to new, segment starts, and arrow heads (place, turn).
 
     ``floor`` is the tail's shadow.
@@ -66,7 +66,7 @@ class TailPlaces:
     floor: tuple[QPolygonF, ...]
 
 
-def _tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
+def _tail_places(tail: Tail, camera: Camera, box: Box) -> _TailPlaces:
     """Return the screen positions of a tail."""
     count = len(tail.positions_m)
     inside = (-box.x, box.x), (box.floor, box.water), (-box.z, box.z)
@@ -88,10 +88,10 @@ def _tail_places(tail: Tail, camera: Camera, box: Box) -> TailPlaces:
             place, turn, row = head
             heads.append((place, turn, int(shades[rows[row]])))
     begins = [0, *(bound - 1 for bound in bounds[1:-1])] if count else []
-    return TailPlaces(tuple(runs), tuple(_points(pixels[begins])), tuple(heads), tuple(shadows))
+    return _TailPlaces(tuple(runs), tuple(_points(pixels[begins])), tuple(heads), tuple(shadows))
 
 
-def _paint_floor(painter: QPainter, places: TailPlaces) -> None:
+def _paint_floor(painter: QPainter, places: _TailPlaces) -> None:
     """Paint the tail's shadow on the floor."""
     ink = QColor(TANK.shadow)
     ink.setAlphaF(0.44)
@@ -100,7 +100,7 @@ def _paint_floor(painter: QPainter, places: TailPlaces) -> None:
         painter.drawPolyline(points)
 
 
-def _paint_tail(painter: QPainter, places: TailPlaces) -> None:
+def _paint_tail(painter: QPainter, places: _TailPlaces) -> None:
     """Paint the segments from oldest to newest, heads on those long enough, then the breaks."""
     painter.setBrush(Qt.BrushStyle.NoBrush)
     for shade, points in places.runs:
@@ -363,7 +363,7 @@ class LabTank(Themed, QWidget):
             return "The mouse moves the ball: click or press Esc to release it"
         return "Click to move the ball with the mouse" if self._takes_pointer else ""
 
-    def _paint_words(self, painter: QPainter, places: TailPlaces | None) -> None:
+    def _paint_words(self, painter: QPainter, places: _TailPlaces | None) -> None:
         view = self._view
         if view is None:
             return

@@ -261,7 +261,7 @@ class _FormRow:
         return self.value != self.preset
 
 
-class ParameterRow(QWidget):
+class _ParameterRow(QWidget):
     """Common base of rows: ``changed(name, value, held)``, and a line below for the reason of a rejection."""
 
     changed = Signal(str, object, bool)
@@ -305,7 +305,7 @@ class ParameterRow(QWidget):
         raise NotImplementedError
 
 
-class _NumberRow(ParameterRow):
+class _NumberRow(_ParameterRow):
     """A number: slider and field, followed by the unit; the preset's value is a tick on the slider."""
 
     def __init__(self, parameter: Parameter) -> None:
@@ -401,7 +401,7 @@ class _NumberRow(ParameterRow):
             self.field.restore_text()
 
 
-class _ChoiceRow(ParameterRow):
+class _ChoiceRow(_ParameterRow):
     """A choice between a few values."""
 
     def __init__(self, parameter: Parameter) -> None:
@@ -436,7 +436,7 @@ class _ChoiceRow(ParameterRow):
         self.changed.emit(self.parameter.name, self.choice.itemData(index), False)
 
 
-class _SwitchRow(ParameterRow):
+class _SwitchRow(_ParameterRow):
     """On or off."""
 
     def __init__(self, parameter: Parameter) -> None:
@@ -462,7 +462,7 @@ class _SwitchRow(ParameterRow):
         self.changed.emit(self.parameter.name, ON if on else OFF, False)
 
 
-def _row_for(parameter: Parameter) -> ParameterRow:
+def _row_for(parameter: Parameter) -> _ParameterRow:
     """Return the row that edits a parameter."""
     if not parameter.choices:
         return _NumberRow(parameter)
@@ -480,7 +480,7 @@ def _name_label(text: str) -> QLabel:
 HIDDEN = "Hidden during a blind comparison"
 
 
-class SectionBlock(QWidget):
+class _SectionBlock(QWidget):
     """A heading with its rows, and the number of changed ones; two switches share a line."""
 
     def __init__(self, section: Section) -> None:
@@ -520,8 +520,8 @@ class FormPanel(Card):
         self._liquids: tuple[object, ...] = ()
         self._side = "A"
         self._refused: tuple[str, str] | None = None
-        self.blocks: dict[str, SectionBlock] = {}
-        self.rows: dict[str, ParameterRow] = {}
+        self.blocks: dict[str, _SectionBlock] = {}
+        self.rows: dict[str, _ParameterRow] = {}
         self.badge = _Badge()
         self.liquid = Choice()
         self.liquid.setProperty("dense", "true")
@@ -603,7 +603,7 @@ class FormPanel(Card):
         rows = self.rows.items()
         focused = [(name, at) for name, row in rows for at, part in enumerate(row.parts()) if part.hasFocus()]
         scrolled_px = self.area.verticalScrollBar().value()
-        self.blocks = {section.title: SectionBlock(section) for section in form_sections}
+        self.blocks = {section.title: _SectionBlock(section) for section in form_sections}
         self.rows = {name: row for block in self.blocks.values() for name, row in block.rows.items()}
         for row in self.rows.values():
             row.changed.connect(self.changed)

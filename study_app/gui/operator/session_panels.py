@@ -290,7 +290,7 @@ _LEAST_ROW_HEIGHT = 26
 _DOT = 11
 
 
-class StepLine(Themed, QWidget):
+class _StepLine(Themed, QWidget):
     """One step: a dot on the line that connects all steps, its name, and its time or position."""
 
     def __init__(self) -> None:
@@ -364,7 +364,7 @@ class Rail(Card):
         super().__init__(gap=10)
         self.now, self.tally = _Now(), Tally()
         self.heading = self.now.heading
-        self.lines: list[StepLine] = []
+        self.lines: list[_StepLine] = []
         self._slim = False
         self._steps = QWidget()
         self._steps_column = vbox((STRETCH, 1), spacing=0, parent=self._steps)
@@ -404,7 +404,7 @@ class Rail(Card):
         """Show the steps; ``now`` and ``tally`` are shown separately, since each may fail on its own."""
         rows = view.steps
         while len(self.lines) < len(rows):
-            line = StepLine()
+            line = _StepLine()
             line.set_slim(self._slim)
             self.lines.append(line)
             self._steps_column.insertWidget(len(self.lines) - 1, line)

@@ -175,7 +175,7 @@ _LOOKS: dict[str, tuple[str, Ink, str]] = {
 }
 
 
-class CheckRow(Themed, QWidget):
+class _CheckRow(Themed, QWidget):
     """A check; if it needs a decision, it is tinted and has an advice below."""
 
     def __init__(self, check: Check, *, last: bool) -> None:
@@ -224,11 +224,11 @@ class CheckRow(Themed, QWidget):
         painter.drawLine(24, self.height() - 1, self.width() - 24, self.height() - 1)
 
 
-def _check_rows(checks: Sequence[Check], before: list[CheckRow], column: QBoxLayout) -> list[CheckRow]:
+def _check_rows(checks: Sequence[Check], before: list[_CheckRow], column: QBoxLayout) -> list[_CheckRow]:
     """Return the rows of checks, which replace ``before`` in a column."""
     for row in before:
         remove_widget(row)
-    made = [CheckRow(check, last=check is checks[-1]) for check in checks]
+    made = [_CheckRow(check, last=check is checks[-1]) for check in checks]
     for place, row in enumerate(made):
         column.insertWidget(place, row)
     return made
@@ -264,7 +264,7 @@ class PreflightWindow(QWidget):
         self.who = label("", "label", "text2")
         self.chip = Chip("ok", "check", "")
         self.checks = Card(padding=10, gap=0)
-        self.rows: list[CheckRow] = []
+        self.rows: list[_CheckRow] = []
         self.masking = _MaskingQuestion() if asks_masking else None
         self.plot = LatenessPlot(limit_us)
         describe_plot(self.plot, "Tick lateness", "Histogram of tick lateness over two seconds, in µs.")
@@ -418,7 +418,7 @@ class ComputerWindow(Question):
     asked = Signal()
 
     def __init__(self, parent: QWidget, theme: Theme) -> None:
-        self.rows: list[CheckRow] = []
+        self.rows: list[_CheckRow] = []
         self.state = label(_MEASURING, "body", "text2", wraps=True)
         self.bar = QProgressBar(textVisible=False)
         self.bar.setFixedHeight(8)

@@ -12,7 +12,7 @@ Part: TypeAlias = QWidget | QLayout | int | str | tuple[Any, ...]
 _Margins: TypeAlias = int | tuple[int, int, int, int] | None
 """The same on all sides [px], or left, top, right and bottom; None: the style's."""
 
-B = TypeVar("B", bound=QBoxLayout)
+_B = TypeVar("_B", bound=QBoxLayout)
 
 
 def hbox(
@@ -43,7 +43,7 @@ def grid(
     return made
 
 
-def _box(box: B, parts: tuple[Part, ...], spacing: int | None, margins: _Margins, parent: QWidget | None) -> B:
+def _box(box: _B, parts: tuple[Part, ...], spacing: int | None, margins: _Margins, parent: QWidget | None) -> _B:
     if parent is not None:
         parent.setLayout(box)
     if margins is not None:

@@ -65,7 +65,7 @@ _NO_MEMORY: dict[str, Any] = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") 
 _DEFERS = hasattr(CPUCodegen, "_pass_builder") and hasattr(ModulePassManager, "add_global_dead_code_eliminate_pass")
 """Whether numba is new enough to optimise a step within its callers only; otherwise compiling takes longer."""
 
-F = TypeVar("F", bound=Callable[..., Any])
+_F = TypeVar("_F", bound=Callable[..., Any])
 
 
 def compiled_sources(package: Path) -> dict[str, bytes]:
@@ -355,16 +355,16 @@ def _is_callable(compiled: Any) -> bool:
     return bool(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cpython_wrapper_name))
 
 
-def _compiled(function: F, **options: Any) -> F:
+def _compiled(function: _F, **options: Any) -> _F:
     if vars(numba.config)["DISABLE_JIT"]:
         return function
     dispatcher = _Kernel(function, targetoptions=_OPTIONS | options)
     if CACHE is not None:
         dispatcher.enable_caching()
-    return cast(F, dispatcher)
+    return cast(_F, dispatcher)
 
 
-def kernel(function: F) -> F:
+def kernel(function: _F) -> _F:
     """Compile ``function`` for the servo: no interpreter lock, IEEE arithmetic, division by zero gives infinity.
 
     numba's memory management is off: code that would allocate does not compile, and arrays passed on are not
@@ -373,17 +373,17 @@ def kernel(function: F) -> F:
     return _compiled(function, **_NO_MEMORY)
 
 
-def part(function: F) -> F:
+def part(function: _F) -> _F:
     """Compile ``function`` inline into each kernel that calls it: for the steps of a tick, which pass whole models."""
     return _compiled(function, **_NO_MEMORY, forceinline=True)
 
 
-def evidence_kernel(function: F) -> F:
+def evidence_kernel(function: _F) -> _F:
     """Compile ``function`` for evidence, not for the servo: like `kernel`, but it may allocate arrays."""
     return _compiled(function)
 
 
-def entry_of(function: F, *arguments: Any) -> F:
+def entry_of(function: _F, *arguments: Any) -> _F:
     """Return the specialisation of a compiled function for these types, which calls do not look up again.
 
     The lookup takes 30 µs for records, as long as ten ticks. Calls with other types are undefined.
@@ -391,7 +391,7 @@ def entry_of(function: F, *arguments: Any) -> F:
     dispatcher: Any = function
     if not hasattr(dispatcher, "overloads"):  # not compiled: NUMBA_DISABLE_JIT
         return function
-    return cast(F, dispatcher.compile(tuple(map(dispatcher.typeof_pyval, arguments))))
+    return cast(_F, dispatcher.compile(tuple(map(dispatcher.typeof_pyval, arguments))))
 
 
 EXPECTED: Final = 194

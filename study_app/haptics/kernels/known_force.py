@@ -37,35 +37,35 @@ DAMPING: Final = 0.5
 """Corner frequency and damping ratio of the high-pass filter: a handle of 0.2 kg in a middle grip has 7 Hz and 0.3, in
 a light one 4 Hz and 0.2, in a firm one 11 Hz and 0.5. [choice]"""
 JERK_M2PS5: Final = 0.5
-JERK_OF_SPEED_PS3: Final = 2200.0
+_JERK_OF_SPEED_PS3: Final = 2200.0
 JERK_OF_ACCELERATION_PS: Final = 10.0
-MOST_JERK_M2PS5: Final = 20.0
+_MOST_JERK_M2PS5: Final = 20.0
 """Without this limit the filter was so fast in quick strokes that the loop oscillated at 40 to 60 Hz."""
-SNAP_PS2: Final = 3200.0
+_SNAP_PS2: Final = 3200.0
 """Ratio of the densities of snap and jerk [1/s²]."""
-AHEAD: Final = 0.4
+_AHEAD: Final = 0.4
 """Part of the delay over which the acceleration is predicted: the jerk is too uncertain for all of it."""
 TIMING_S: Final = 20e-6
 FIRST_SPEED_MPS: Final = 0.01
 FIRST_ACCELERATION_MPS2: Final = 1.0
-FIRST_JERK_MPS3: Final = 10.0
-USUAL_SHARE: Final = 0.7
-LEAST_SHARE: Final = 0.05
+_FIRST_JERK_MPS3: Final = 10.0
+_USUAL_SHARE: Final = 0.7
+_LEAST_SHARE: Final = 0.05
 """θ times the least mass of the device: usual and least values."""
-FIRST_VARIANCE_PKG2: Final = 4.0
-MOST_VARIANCE_PKG2: Final = 25.0
+_FIRST_VARIANCE_PKG2: Final = 4.0
+_MOST_VARIANCE_PKG2: Final = 25.0
 LEARNING_PKG2S: Final = 10.0
 """Growth rate of the variance of θ [1/(kg² s)]."""
 FORGETTING_S: Final = 2.0
 """Time in which θ returns to its usual value."""
-SURPRISED: Final = 1.5
+_SURPRISED: Final = 1.5
 """Mean of Σ innovation² / its variance above which the known force is not used: no sine to 3 Hz reaches it, noise of
 3 Hz in glycerin and honey at times. [choice]"""
-MOST_ACCELERATION_MPS2: Final = 15.0
+_MOST_ACCELERATION_MPS2: Final = 15.0
 """Likewise of the handle: a sine of 3 Hz ±42 mm. In faster reversals the passivity controller interrupted the force."""
-REGAINED_S: Final = 1.0
+_REGAINED_S: Final = 1.0
 """Time in which `trust` returns afterwards."""
-WITHHELD: Final = 1.0
+_WITHHELD: Final = 1.0
 """Time before it begins to return, in multiples of that."""
 _NOTHING: Final = 1e-30
 
@@ -93,9 +93,9 @@ def _begin_motion(parameters: Record, filtered: Record) -> None:
     p[0] = 0.5 * parameters.count_m * parameters.count_m
     p[4] = FIRST_SPEED_MPS * FIRST_SPEED_MPS
     p[7] = FIRST_ACCELERATION_MPS2 * FIRST_ACCELERATION_MPS2
-    p[9] = FIRST_JERK_MPS3 * FIRST_JERK_MPS3
-    filtered.compliance_per_kg = USUAL_SHARE / parameters.mass_kg
-    filtered.compliance_variance = FIRST_VARIANCE_PKG2
+    p[9] = _FIRST_JERK_MPS3 * _FIRST_JERK_MPS3
+    filtered.compliance_per_kg = _USUAL_SHARE / parameters.mass_kg
+    filtered.compliance_variance = _FIRST_VARIANCE_PKG2
 
 
 @part
@@ -153,20 +153,20 @@ def track_motion(parameters: Record, state: Record, interval_s: float) -> float:
         response[3, axis] = _or_zero(j - to_j * offset_m)
     uncertain = filtered.compliance_variance
     gain = 0.0 if filtered.repeated else uncertain / (responses_m2 * uncertain + variance_m2)
-    usual = USUAL_SHARE / parameters.mass_kg
+    usual = _USUAL_SHARE / parameters.mass_kg
     per_kg = filtered.compliance_per_kg + gain * products_m2
     per_kg += (usual - per_kg) * t / FORGETTING_S
-    filtered.compliance_per_kg = min(max(per_kg, LEAST_SHARE / parameters.mass_kg), 1.0 / parameters.mass_kg)
+    filtered.compliance_per_kg = min(max(per_kg, _LEAST_SHARE / parameters.mass_kg), 1.0 / parameters.mass_kg)
     learned = uncertain - gain * uncertain * responses_m2 + LEARNING_PKG2S * t
-    filtered.compliance_variance = min(learned, MOST_VARIANCE_PKG2)
-    if filtered.surprise > SURPRISED:
-        filtered.trust = -WITHHELD
+    filtered.compliance_variance = min(learned, _MOST_VARIANCE_PKG2)
+    if filtered.surprise > _SURPRISED:
+        filtered.trust = -_WITHHELD
         _begin_motion(parameters, filtered)
         copy(filtered.sent_n, filtered.asked_n)
-    elif square_m2ps4 > MOST_ACCELERATION_MPS2 * MOST_ACCELERATION_MPS2:
-        filtered.trust = -WITHHELD
+    elif square_m2ps4 > _MOST_ACCELERATION_MPS2 * _MOST_ACCELERATION_MPS2:
+        filtered.trust = -_WITHHELD
     else:
-        filtered.trust = min(filtered.trust + t / REGAINED_S, 1.0)
+        filtered.trust = min(filtered.trust + t / _REGAINED_S, 1.0)
     return float(squares_m2 / (variance_m2 + responses_m2 * uncertain))
 
 
@@ -185,10 +185,10 @@ def _update_covariance(parameters: Record, filtered: Record, t: float, half: flo
     aj = p[8] + t * p[9]
     jj = p[9]
     speed_m2ps2 = square(filtered.estimate_mps)
-    jerk_m2ps5 = JERK_M2PS5 + JERK_OF_SPEED_PS3 * speed_m2ps2
+    jerk_m2ps5 = JERK_M2PS5 + _JERK_OF_SPEED_PS3 * speed_m2ps2
     jerk_m2ps5 += JERK_OF_ACCELERATION_PS * square(filtered.hand_motion[2])
-    jerk_m2ps5 = min(jerk_m2ps5, MOST_JERK_M2PS5)
-    snap = SNAP_PS2 * jerk_m2ps5
+    jerk_m2ps5 = min(jerk_m2ps5, _MOST_JERK_M2PS5)
+    snap = _SNAP_PS2 * jerk_m2ps5
     xx += t * xv + half * xa + third * xj
     xv += t * xa + half * xj
     xa += t * xj
@@ -212,7 +212,7 @@ def solve_inertia(
     parameters: Record, filtered: Record, others_n: Any, inertia_kg: float, delay_ticks: int, acceleration_mps2: Any
 ) -> None:
     """Set dw/dt (3,) [m/s², scene] when the force of this tick acts: F = F₀ − M dw/dt, with ``others_n`` (3,) F₀."""
-    lead_s = AHEAD * parameters.period_s * (delay_ticks + 0.5)
+    lead_s = _AHEAD * parameters.period_s * (delay_ticks + 0.5)
     per_kg, passed = filtered.compliance_per_kg, _feedthrough(parameters.period_s)
     hand, response = filtered.hand_motion, filtered.response_motion
     own = parameters.scale * per_kg * passed

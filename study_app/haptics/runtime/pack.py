@@ -39,8 +39,8 @@ _EXPLICIT: Final = history.BIT | current.BIT | wake.BIT | local_wake.BIT
 _ELASTIC: Final = (non_newtonian.KIND_HERSCHEL_BULKLEY, non_newtonian.KIND_MAXWELL)
 _ARRAYS: Final = tuple(name for kind in KINDS for name in kind.arrays)
 _NEVER_TICKS: Final = MOST_DELAY + 1
-EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
-EffectRows.__doc__ = "The arrays of a model that effects own, by name."
+_EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
+_EffectRows.__doc__ = "The arrays of a model that effects own, by name."
 _Counts: TypeAlias = Mapping[str, int]
 """A number of rows for each of these arrays."""
 _RESOLUTION = 1e-6
@@ -116,7 +116,7 @@ class Model(NamedTuple):
     state: Any  # (1,) STATE
     liquid_states: Any  # (n,) LIQUID_STATE
     forces_n: Any  # (STORED_FORCES, 3) the newest forces [N], if the scene's link delays them; else (0, 3)
-    rows: Any  # `EffectRows`: arrays of the effects, with contiguous rows per liquid
+    rows: Any  # `_EffectRows`: arrays of the effects, with contiguous rows per liquid
 
     @property
     def arrays(self) -> tuple[Any, ...]:
@@ -155,7 +155,7 @@ def pack(
         state=layout.records(layout.STATE, 1),
         liquid_states=layout.records(layout.LIQUID_STATE, liquids),
         forces_n=np.zeros((STORED_FORCES if capacity is not None or scene.link.acts else 0, 3)),
-        rows=EffectRows(
+        rows=_EffectRows(
             **{
                 name: layout.records(layout.record_type(fields), rows[name])
                 for kind in KINDS

@@ -84,7 +84,7 @@ _WITHOUT_REPEATS = ("study.languages", "conditions.*.liquids", "blocks.*.conditi
 _DECIDED_LISTS = ("primary", "names", "rising", "falling")
 
 Document = Mapping[str, Any]
-T = TypeVar("T")
+_T = TypeVar("_T")
 
 
 def _unknown_name(path: Path, name: Any, kind: str, known: Collection[str]) -> Iterator[Fault]:
@@ -319,7 +319,7 @@ def check_questions(document: Document) -> Iterator[Fault]:
                     yield unknown_name((*path, *place), message, name, known)
 
 
-def _valid_or_none(read: Callable[[Any], T], table: Any) -> T | None:
+def _valid_or_none(read: Callable[[Any], _T], table: Any) -> _T | None:
     """Return a valid scale or question, None if it is invalid."""
     try:
         return read(table) if isinstance(table, Mapping) else None

@@ -62,7 +62,7 @@ def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterato
                 yield Fault(("conditions", name, "ball"), message, 'choose a task of type "follow" or "explore"')
     yield from _check_estimator_lag(protocol)
     for blocks in blocks_by_stimulus(protocol):
-        yield from check_clipping(protocol, blocks, delay_ticks)
+        yield from _check_clipping(protocol, blocks, delay_ticks)
     for block in protocol.blocks.values():
         for index, name in enumerate(block.conditions if block.stimulus is None else ()):
             place = ("blocks", block.id, "conditions", index)
@@ -120,7 +120,7 @@ def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: 
     return Fault(("stimuli", str(blocks[0].stimulus), "levels"), message, hint)
 
 
-def check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Iterator[Fault]:
+def _check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Iterator[Fault]:
     """Yield the levels that each limit clips; a level that both clip counts for the slope limit.
 
     The blocks have one stimulus; without a pace, only damping has a limit (`unpaced_clipping_warning`).

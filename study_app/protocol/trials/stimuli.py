@@ -21,7 +21,7 @@ from study_app.protocol.trials.designs import Design
 from study_app.psychophysics.families import Family, Floats
 from study_app.psychophysics.grid import FREE_GUESSES, Grid, Values, evenly, geometric, lapse_prior
 
-Level = TypeVar("Level", float, Floats)
+_Level = TypeVar("_Level", float, Floats)
 """One level or value, or an array of them."""
 _LevelKind: TypeAlias = Literal["weber", "difference", "value"]
 
@@ -147,7 +147,7 @@ class Stimulus(Table):
     def level_kind(self) -> _LevelKind:
         return self.level or ("difference" if self.vary.endswith("_ms") else "weber")
 
-    def comparison(self, standard: float | None, level: Level) -> Level:
+    def comparison(self, standard: float | None, level: _Level) -> _Level:
         """Return the comparison at a level (0 is the standard itself), in the varied number's unit.
 
         ``standard`` is None where the level is the value itself.
@@ -157,7 +157,7 @@ class Stimulus(Table):
         distance = standard * level if self.level_kind == "weber" else level
         return standard + distance if self.direction == "up" else standard - distance
 
-    def level_between(self, standard: float | None, comparison: Level) -> Level:
+    def level_between(self, standard: float | None, comparison: _Level) -> _Level:
         """Return the level of a comparison, the inverse of `comparison`."""
         if standard is None or self.level_kind == "value":
             return comparison

@@ -145,7 +145,7 @@ def test_a_study_of_d_prime_states_only_what_applies_to_it_and_its_precision_onc
     text = preregistration(protocol, "0" * 64)
     assert "- Block prompt: how well can slime be discriminated from water (d′)?" in text
     assert "- Block late: how well can late_slime be discriminated from late_water (d′)?" in text
-    assert "- Questions in after: we describe the answers and do not test them. We report means" in text
+    assert "- We describe the answers to the questions in after and do not test them. We report the mean" in text
     assert "maximum number of attempts to deliver an interval trial (3)" in text
     for other in ("threshold", "speed of the target", "delivered level", "delay difference", "Primary"):
         assert other not in text

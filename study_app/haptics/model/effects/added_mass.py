@@ -24,7 +24,7 @@ BIT = 1 << 6
 SMOOTHING_S: Final = 0.025
 
 
-class AddedMass(Frozen):
+class _AddedMass(Frozen):
     """The mass of the liquid that is accelerated with the body."""
 
     coefficient: Annotated[
@@ -81,8 +81,8 @@ EFFECT = Effect(
     exerted_n=_bound_n,
     extent="volume",
     accelerated_n=_accelerated_n,
-    model=AddedMass,
-    default=AddedMass(),
+    model=_AddedMass,
+    default=_AddedMass(),
     parameters=_PARAMETERS,
     state=_STATE,
     fill=_fill,

@@ -38,7 +38,7 @@ class Tail(Protocol):
     def axes(self) -> Literal["xz", "xyz"]: ...
 
 
-W = TypeVar("W", bound=Tail)
+_W = TypeVar("_W", bound=Tail)
 
 
 class Wake(Frozen):
@@ -82,7 +82,7 @@ class Wake(Frozen):
         return within_scaling(self)
 
 
-def within_scaling(wake: W) -> W:
+def within_scaling(wake: _W) -> _W:
     """Return the wake; raise ValueError if it could move faster than the body (N > S)."""
     if wake.length > wake.scaling:
         raise ValueError(
