@@ -115,8 +115,8 @@ def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path) -> None:
         tmp_path, (sequence, 'sequence = ["stir", "load", "again", "load"]'), (last, f"{last}\n{again}")
     )
     assert [line for line in warnings(load(protocol), simulates=False) if "same title" in line] == [
-        "blocks.again.title: block stir has the same title, “Stir”, so the report adds the IDs to both; give each "
-        "block its own title"
+        "blocks.again.title: block stir has the same title, “Stir”, so the report adds the IDs to both; use a "
+        "different title for each block"
     ]
     folder = rehearse_answers(
         protocol, participants=PEOPLE, seed=1, results=tmp_path / "results", features=made_up(protocol)
