@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any, Final
 
-REASON: Final = "a session is running"
+_REASON: Final = "a session is running"
 CONTINUOUS, SYSTEM, DISPLAY = 0x80000000, 0x1, 0x2  # of SetThreadExecutionState
 USER_INITIATED, LATENCY_CRITICAL, SCREEN_ON = 0x00FFFFFF, 0xFF00000000, 1 << 40  # of NSProcessInfo's activities
 _CONNECTION: Final = "liquid-study-awake"
@@ -56,14 +56,14 @@ def _inhibit_screen_saver() -> bool:
     bus = QDBusConnection.connectToBus(QDBusConnection.BusType.SessionBus, _CONNECTION)
     name = "org.freedesktop.ScreenSaver"
     request = QDBusMessage.createMethodCall(name, "/org/freedesktop/ScreenSaver", name, "Inhibit")
-    request.setArguments(["liquid-study", REASON])
+    request.setArguments(["liquid-study", _REASON])
     reply = bus.call(request, QDBus.CallMode.Block, _PATIENCE_MS)
     return reply.type() == QDBusMessage.MessageType.ReplyMessage
 
 
 def _begin_activity() -> int | None:
     """Begin an activity without App Nap and idle sleep (macOS; never run); return the object to end it with."""
-    reason = _send(_class("NSString"), "stringWithUTF8String:", ctypes.c_char_p(REASON.encode()))
+    reason = _send(_class("NSString"), "stringWithUTF8String:", ctypes.c_char_p(_REASON.encode()))
     options = ctypes.c_uint64(USER_INITIATED | LATENCY_CRITICAL | SCREEN_ON)
     activity = _send(_process_info(), "beginActivityWithOptions:reason:", options, ctypes.c_void_p(reason))
     return _send(activity, "retain") if activity else None

@@ -277,7 +277,7 @@ _INITIAL_A: Final = Choice(source="rek2024", liquid="water", title="Water")
 _INITIAL_B: Final = Choice(source="rek2024", liquid="light_oil", title="Light oil")
 _FRAME_MS: Final = 33
 _APPRAISE_AFTER_MS: Final = 300
-COMPILING: Final = "Compiling the force model (about a minute; only needed after an installation or update)"
+_COMPILING: Final = "Compiling the force model (about a minute; only needed after an installation or update)"
 
 
 class LabController(QObject):
@@ -442,7 +442,7 @@ class LabController(QObject):
         else:
             state = "opening" if opening is not None else "ready" if live is not None else "closed"
         scene = bench.in_hand.scene
-        progress = self._said or (COMPILING if self._opening.elapsed_s > LONG_AFTER_S else "")
+        progress = self._said or (_COMPILING if self._opening.elapsed_s > LONG_AFTER_S else "")
         shown: dict[str, Any] = {}
         if live is not None and reading is not None:
             half_x, half_y, half_z = live.device.workspace_m

@@ -19,7 +19,7 @@ from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.trials import designs, methods
 from study_app.protocol.warnings import delayed_force
 
-PROGRAM = "liquid-study"
+_PROGRAM = "liquid-study"
 _LEAST_DELAY_MS = 10
 _LOOPS = (("kalman", "light"), ("ewma", "light"), ("kalman", "middle"), ("kalman", "firm"))
 _DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "simulated: the hand moves by itself"}
@@ -133,7 +133,7 @@ def commands_markdown() -> str:
     for heading, names in GROUPS.items():
         lines += [f"## {heading}", ""]
         for name in names.split():
-            for path, command in _with_subcommands((PROGRAM, name), commands.commands[name]):
+            for path, command in _with_subcommands((_PROGRAM, name), commands.commands[name]):
                 lines += [*_command_lines(path, command), ""]
     return "\n".join(lines)
 

@@ -150,7 +150,7 @@ _STEPS: Final = ("pages", "blocks", "questionnaires")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _OwnQuestion:
+class OwnQuestion:
     """A question of a template: its key, text, unit, permitted values, and the template's value."""
 
     path: Place
@@ -177,7 +177,7 @@ class TemplateChoice:
     name: str = ""  # short name that a copy gets where none is given
     study_title: str = ""  # title that it gets where none is given
     languages: tuple[str, ...] = ()
-    questions: tuple[_OwnQuestion, ...] = ()  # beyond title, name and languages
+    questions: tuple[OwnQuestion, ...] = ()  # beyond title, name and languages
 
 
 def _languages_offered() -> tuple[tuple[str, str], ...]:
@@ -236,7 +236,7 @@ def _figure_texts(protocol: Protocol) -> Iterator[tuple[str, str]]:
     yield "layers", counted(trials, "trial")
 
 
-def _own_questions(name: str, study: Study) -> Iterator[_OwnQuestion]:
+def _own_questions(name: str, study: Study) -> Iterator[OwnQuestion]:
     for question, path in QUESTIONS.get(name, ()):
         row = row_at(study.document, path)
         if row is not None:
@@ -245,7 +245,7 @@ def _own_questions(name: str, study: Study) -> Iterator[_OwnQuestion]:
             parts = current if isinstance(current, tuple) else (current,)
             value = ", ".join(f"{part:g}" for part in parts if isinstance(part, int | float))
             unit = row.unit or _unit_of(study, path)
-            yield _OwnQuestion(
+            yield OwnQuestion(
                 path=path, words=question, unit=unit, bounds=", ".join(row.bounds), value=value, several=several
             )
 
@@ -534,7 +534,7 @@ class Questions(Themed, QWidget):
         self._show_proposed_name()
         self.title.textChanged.connect(self._show_proposed_name)
         self.languages: dict[str, Check] = {}
-        self.own: dict[_OwnQuestion, QLineEdit] = {}
+        self.own: dict[OwnQuestion, QLineEdit] = {}
         self._grid = grid_of(8, 8, margins=0, parent=self)
         self._grid.setColumnStretch(1, 1)
         for row, (title, field) in enumerate((("Title", self.title), ("Short name", self.name))):

@@ -84,7 +84,7 @@ ElementPath: TypeAlias = Path
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _OutlineRow:
+class OutlineRow:
     """One row of the outline."""
 
     path: Path  # () for the heading of a section
@@ -99,7 +99,7 @@ class _OutlineRow:
     named: bool = False  # whether its title or id matches the search
 
 
-def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[_OutlineRow, ...]:
+def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
     """Return the outline of a study; with a search text only the matching elements.
 
     ``times_s`` are the durations of steps [s] by id, empty while the study has faults; ``find`` is searched for in an
@@ -110,7 +110,7 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
         return (_outline_row(study, only, {}, in_session=False),)
     shown, text = outline(study), find.strip()
     fields = found_in_elements(study, text)
-    rows: list[_OutlineRow] = []
+    rows: list[OutlineRow] = []
     titles = _titles((*shown.parts, *shown.session, *shown.study))
     settings = [element for element in shown.study if element.path != FIRST]
     own = [element for element in shown.study if element.path == FIRST]
@@ -124,7 +124,7 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
             ]
         total = duration(sum(times_s.values())) if times_s and heading == SESSION else ""
         if inner:
-            rows += [*([_OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []), *inner]
+            rows += [*([OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []), *inner]
     return tuple(rows)
 
 
@@ -139,7 +139,7 @@ def _titles(elements: Sequence[Element]) -> dict[Path, str]:
     }
 
 
-def _matching_row(study: Study, row: _OutlineRow, text: str, field: FoundField | None) -> _OutlineRow | None:
+def _matching_row(study: Study, row: OutlineRow, text: str, field: FoundField | None) -> OutlineRow | None:
     """Return a matching row with the label of its matching field; None if the element does not match."""
     named = has_text(study.document, row.path, text, named=True)
     if field is not None and (field.rank == LABEL or not named):
@@ -156,7 +156,7 @@ def icon_of(path: Path, document: Mapping[str, Any]) -> str:
     return "list" if "items" in path else _ICONS.get(str(path[0]), "ring") if path else "ring"
 
 
-def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> _OutlineRow:
+def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *, in_session: bool) -> OutlineRow:
     path, note, kind = element.path, "", str(element.path[0])
     if in_session and len(path) == 1:
         listed = value_at(study.document, path)
@@ -181,7 +181,7 @@ def _outline_row(study: Study, element: Element, times_s: Mapping[str, float], *
         sort = "" if "items" in path else sort
     name = ", ".join(filter(None, (element.title, sort, note, at, faults)))
     title, step = element.title, element.step
-    return _OutlineRow(
+    return OutlineRow(
         path=path,
         title=title,
         icon=icon_of(path, study.document),
@@ -198,7 +198,7 @@ _SECTIONS_OF_TABLES: Final = frozenset(_ICONS) - {
 }  # fmt: skip
 
 
-HELP: Final = {"designs": "2IFC and other trial designs"}
+_HELP: Final = {"designs": "2IFC and other trial designs"}
 """What a section is for, where its name does not say it."""
 
 
@@ -225,7 +225,7 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
             words=label_of(element_noun(path[0])),
             icon=icon_of(path, study.document),
             asks=AddElement(path),
-            help=HELP.get(str(path[0]), ""),
+            help=_HELP.get(str(path[0]), ""),
         )
         for path in sections
     ]
@@ -398,7 +398,7 @@ class _RowPainter(QStyledItemDelegate):
         painter.restore()
 
     def _paint_element(
-        self, painter: QPainter, place: QRectF, row: _OutlineRow, state: QStyle.StateFlag, index: _Index
+        self, painter: QPainter, place: QRectF, row: OutlineRow, state: QStyle.StateFlag, index: _Index
     ) -> None:
         t = self.theme
         assert t is not None  # noqa: S101 - `paint` saw it
@@ -443,7 +443,7 @@ class _RowPainter(QStyledItemDelegate):
         painter.drawText(room, middle, title)
 
 
-def _sign_right(row: _OutlineRow) -> float:
+def _sign_right(row: OutlineRow) -> float:
     """Return the right edge of the sign that shows whether a row is expanded [px]."""
     return 12.0 + _INDENT * row.depth
 
@@ -593,7 +593,7 @@ class OutlineCard(Coloured, Card):
     def __init__(self) -> None:
         super().__init__(padding=12, gap=8)
         self.setAccessibleName("Outline")
-        self.rows: tuple[_OutlineRow, ...] = ()
+        self.rows: tuple[OutlineRow, ...] = ()
         self._opened: set[object] = set()
         self._filling = self._finding = False
         self.words = make_dense(QLineEdit(), "Find in the study", 36)
@@ -635,7 +635,7 @@ class OutlineCard(Coloured, Card):
         self._filling = False
         self.words.clear()
 
-    def show_outline(self, rows: tuple[_OutlineRow, ...], selected: object) -> None:
+    def show_outline(self, rows: tuple[OutlineRow, ...], selected: object) -> None:
         """Show rows; expanded branches stay expanded. If nothing matches, a line says so."""
         self._show_whether_found(rows)
         if rows != self.rows:
@@ -668,7 +668,7 @@ class OutlineCard(Coloured, Card):
             self.mark_row(selected, reveals=selected != before)
         self.mark_row(selected)
 
-    def _show_whether_found(self, rows: tuple[_OutlineRow, ...]) -> None:
+    def _show_whether_found(self, rows: tuple[OutlineRow, ...]) -> None:
         text = self.words.text().strip()
         sentence = f'"{text}" was not found in this study' if text and not rows else ""
         if sentence and sentence != self.nothing.whole:

@@ -47,7 +47,7 @@ _SETTLED: Final = 2 / 3
 """After this share of the strokes the flow no longer depends on their start."""
 
 
-class _Causes(NamedTuple):
+class Causes(NamedTuple):
     """The change in force due to each cause along the same strokes: RMS of the change over RMS of the reference.
 
     The causes lead from the reference to the force sent, one step each: the scene's effects with exact velocities
@@ -70,7 +70,7 @@ class Expected(NamedTuple):
     cost_ns: float
     error_share: float
     error_n: float
-    causes: _Causes
+    causes: Causes
     against: str
 
 
@@ -138,13 +138,13 @@ def _alone(scene: Scene, liquid: Liquid) -> Scene:
     return with_effects(scene.model_copy(update={"liquids": (whole,)}), *kept)
 
 
-def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, _Causes, str]:
+def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
     if not scene.liquids:
-        return 0.0, 0.0, _Causes(), "a scene without liquid"
+        return 0.0, 0.0, Causes(), "a scene without liquid"
     return max((_of_one(scene, index, delay_ticks) for index in range(len(scene.liquids))), key=lambda it: it[1])
 
 
-def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, _Causes, str]:
+def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, Causes, str]:
     """Return the errors of one liquid, as if it filled the scene without a current."""
     alone = _alone(scene, scene.liquids[index])
     liquid = alone.liquids[0]
@@ -170,7 +170,7 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, _
         true_n = _defined_n(alone, motion)
         against = f"the definition of {' and '.join(kept).replace('_', ' ') or 'nothing'}"
     if not true_n.any():
-        return 0.0, 0.0, _Causes(), against
+        return 0.0, 0.0, Causes(), against
     truth = Truth(name="", source="", cases=(Case(motion, true_n, motion.t_s >= _SETTLED * motion.t_s[-1]),))
     steps_n = [true_n, *_forces(alone, motion, Dynamics(delay_ticks / alone.rate_hz, COUNT_M))]
     law, acceleration, velocity, limits = (
@@ -180,13 +180,13 @@ def _of_one(scene: Scene, index: int, delay_ticks: int) -> tuple[float, float, _
     return (
         whole.rms,
         whole.rms_n,
-        _Causes(velocity=velocity, acceleration=acceleration, limits=limits, law=law),
+        Causes(velocity=velocity, acceleration=acceleration, limits=limits, law=law),
         against,
     )
 
 
 def _forces(scene: Scene, motion: Motion, dynamics: Dynamics) -> Iterator[Floats]:
-    """Yield the forces (n, 3) [N], each with one more of the causes in `_Causes` than the previous one."""
+    """Yield the forces (n, 3) [N], each with one more of the causes in `Causes` than the previous one."""
     yield samples_along(scene, motion, dynamics).force_n
     yield samples_along(scene, motion, dynamics, smooths=True).force_n
     step_m = dynamics.count_m * scene.scale

@@ -48,7 +48,7 @@ class _Run:
 
 
 @dataclass(frozen=True, eq=False)
-class _ThesisFigure:
+class ThesisFigure:
     """The content of a figure: its runs, the times of events in them [s], and its statement."""
 
     number: int
@@ -72,10 +72,10 @@ def _scene(liquid: Liquid) -> Scene:
     return Scene(rate_hz=_RATE_HZ, velocity=Given(), liquids=(liquid,))
 
 
-def figure_3() -> _ThesisFigure:
+def figure_3() -> ThesisFigure:
     """Return Fig. 3: three circles with drag alone."""
     motion = paths.circle(_RATE_HZ)
-    return _ThesisFigure(
+    return ThesisFigure(
         3,
         "Three circles, drag alone",
         "The body makes three circles at constant speed and then stops. With drag alone, the force has a constant "
@@ -85,10 +85,10 @@ def figure_3() -> _ThesisFigure:
     )
 
 
-def figure_4() -> _ThesisFigure:
+def figure_4() -> ThesisFigure:
     """Return Fig. 4: three circles with the wake."""
     motion = paths.circle(_RATE_HZ)
-    return _ThesisFigure(
+    return ThesisFigure(
         4,
         "Three circles, drag and wake",
         "The same motion with the wake. The liquid is gradually set in motion: while the tail fills, the relative "
@@ -100,11 +100,11 @@ def figure_4() -> _ThesisFigure:
     )
 
 
-def figure_5() -> _ThesisFigure:
+def figure_5() -> ThesisFigure:
     """Return Fig. 5: three circles, then motion against the flow."""
     motion = paths.reverse(_RATE_HZ)
     turn_s = _stop_s(paths.circle(_RATE_HZ))
-    return _ThesisFigure(
+    return ThesisFigure(
         5,
         "Three circles, then 2 s against the flow",
         "After the circles, the body reverses against the whirlpool that it has created: the force jumps far above "
@@ -114,10 +114,10 @@ def figure_5() -> _ThesisFigure:
     )
 
 
-def _figure_6() -> _ThesisFigure:
+def _figure_6() -> ThesisFigure:
     """Return Fig. 6: steps with 90° turns, for two breaking angles."""
     motion = paths.zigzag(_RATE_HZ)
-    return _ThesisFigure(
+    return ThesisFigure(
         6,
         "Steps alternating by 90°",
         "The body moves toward −z in steps that alternate along x. With a breaking angle of 45°, every step begins a "
@@ -128,11 +128,11 @@ def _figure_6() -> _ThesisFigure:
     )
 
 
-def _figure_7() -> _ThesisFigure:
+def _figure_7() -> ThesisFigure:
     """Return Fig. 7: a straight line at three resolutions of the tail."""
     motion = paths.line(_RATE_HZ, moving_s=12.0)
     labels = ("every tick", "1.5 mm", "3.5 mm")
-    return _ThesisFigure(
+    return ThesisFigure(
         7,
         "A straight line at three resolutions of the tail",
         "The body moves in a straight line at constant speed. A coarser resolution stores fewer elements (here every "
@@ -141,10 +141,10 @@ def _figure_7() -> _ThesisFigure:
     )
 
 
-def figure_8() -> _ThesisFigure:
+def figure_8() -> ThesisFigure:
     """Return Fig. 8: a straight line with five wake responses."""
     motion = paths.line(_RATE_HZ, moving_s=8.0)
-    return _ThesisFigure(
+    return ThesisFigure(
         8,
         "A straight line with five wake responses",
         "The body moves in a straight line at constant speed. The wake is proportional to the filled fraction of the "
@@ -155,7 +155,7 @@ def figure_8() -> _ThesisFigure:
     )
 
 
-FIGURES: Final[tuple[Callable[[], _ThesisFigure], ...]] = (figure_3, figure_4, figure_5, _figure_6, _figure_7, figure_8)
+FIGURES: Final[tuple[Callable[[], ThesisFigure], ...]] = (figure_3, figure_4, figure_5, _figure_6, _figure_7, figure_8)
 
 
 def _stop_s(motion: Motion) -> float:
@@ -200,7 +200,7 @@ def figures(to: Path) -> tuple[Path, ...]:
 
 
 @style.own_settings(style.PLOT_SETTINGS)
-def draw(shown: _ThesisFigure) -> Figure:
+def draw(shown: ThesisFigure) -> Figure:
     """Draw one figure: title, force over time, the path or the liquid's speed, and caption."""
     caption = textwrap.wrap(shown.caption, _CAPTION_LETTERS)
     height_pt = _TOP_PT + _PLOT_PT + _FOOT_PT + _LINE_PT * len(caption)
@@ -225,7 +225,7 @@ def draw(shown: _ThesisFigure) -> Figure:
     return figure
 
 
-def _take_apart(place: Callable[[float, float], Axes], shown: _ThesisFigure) -> None:
+def _take_apart(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
     """Draw the force of each run in its own plot, and their common path."""
     path_pt = _PLOT_PT
     width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - path_pt - _RIGHT_PT) / len(shown.runs) - _GAP_PT
@@ -239,7 +239,7 @@ def _take_apart(place: Callable[[float, float], Axes], shown: _ThesisFigure) -> 
     _path(place(style.PAGE_WIDTH_PT - _RIGHT_PT - path_pt, path_pt), shown.runs[0])
 
 
-def _compare(place: Callable[[float, float], Axes], shown: _ThesisFigure) -> None:
+def _compare(place: Callable[[float, float], Axes], shown: ThesisFigure) -> None:
     """Draw the force of all runs along the straight motion, and the fraction of its speed that the liquid reaches."""
     width_pt = (style.PAGE_WIDTH_PT - _SIDE_PT - _GAP_PT - _RIGHT_PT) / 2
     force, liquid = place(_SIDE_PT, width_pt), place(_SIDE_PT + width_pt + _GAP_PT, width_pt)

@@ -34,7 +34,7 @@ class _Release(NamedTuple):
     event: QKeyEvent
 
 
-class _KeyPresses(QObject):
+class KeyPresses(QObject):
     """Filters the keys of the focused window before the window and its shortcuts receive them.
 
     A repeat reaches only the widget that received the press, and only if it types text or the key moves something; it
@@ -142,11 +142,11 @@ class _KeyPresses(QObject):
         self._sent = None
 
 
-def key_presses() -> _KeyPresses:
+def key_presses() -> KeyPresses:
     """Return the application's filter, creating it on first use."""
     application = QGuiApplication.instance()
     assert isinstance(application, QGuiApplication)  # noqa: S101  # windows need one
-    return application.findChild(_KeyPresses) or _KeyPresses(application)
+    return application.findChild(KeyPresses) or KeyPresses(application)
 
 
 def ignores_clicks(page: QWidget) -> bool:

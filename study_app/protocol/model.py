@@ -208,7 +208,7 @@ class PageText(Table):
 
     kind: Literal["consent", "instructions", "break", "debrief"] = Field(
         description=(
-            "Purpose of the page. consent: what the participant agrees to; instructions: what to do next; break: a "
+            "Purpose of the page. consent: asks for the participant's consent; instructions: what to do next; break: a "
             "rest; debrief: what the study was about."
         )
     )

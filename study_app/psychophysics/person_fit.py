@@ -89,7 +89,7 @@ class Given(NamedTuple):
         parts = _likelihoods(self, shifts, grid)
         found = posterior(grid, np.add.reduce([*parts.values()]))
         for _ in range(_PASSES if two_intervals else 0):
-            moved = preferences(self, found)
+            moved = _preferences(self, found)
             if np.array_equal(moved, shifts):
                 break
             shifts, parts = moved, _likelihoods(self, moved, grid)
@@ -251,7 +251,7 @@ def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
     return np.asarray(np.interp(deviates + np.asarray(shift, float), z, of_z), float)
 
 
-def preferences(given: Given, fitted: Posterior) -> Floats:
+def _preferences(given: Given, fitted: Posterior) -> Floats:
     """Return the shift of each decision between two intervals towards the correct one due to preferences (n,) [SD].
 
     It is a probit regression of the answers, with the contribution of the levels fixed. Its coefficients are the

@@ -56,7 +56,7 @@ class Exclusion:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reversal:
-    """A reversed exclusion: when, by whom and why, and whether the key was open (None: not recorded)."""
+    """An exclusion that was reversed: time, person and reason. ``key_open`` is None if it was not recorded."""
 
     exclusion: Exclusion
     at: str

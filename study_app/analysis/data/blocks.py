@@ -173,11 +173,11 @@ def display_language(protocol: Mapping[str, Any]) -> str:
 
 
 def block_titles(protocol: Mapping[str, Any]) -> dict[str, str]:
-    """Return the title of each block by ID; the ID follows a title that several blocks share."""
+    """Return the title of each block by ID; the ID follows a title that several blocks of one phase share."""
     language = display_language(protocol)
-    titles = {name: text_in(block["title"], language) for name, block in protocol["blocks"].items()}
+    titles = {name: (block["phase"], text_in(block["title"], language)) for name, block in protocol["blocks"].items()}
     counts = Counter(titles.values())
-    return {name: title if counts[title] == 1 else f"{title} ({name})" for name, title in titles.items()}
+    return {name: f"{own[1]} ({name})" if counts[own] > 1 else own[1] for name, own in titles.items()}
 
 
 def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, key: Key | None) -> Block:

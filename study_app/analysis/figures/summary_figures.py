@@ -163,7 +163,7 @@ def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
     measure = contrast.measure_name or contrast.contrast.measure_words
     if contrast.contrast.is_interaction:
-        symbol = {"d_prime": "d′"}.get(contrast.contrast.measure, measure)
+        symbol = "d′" if contrast.contrast.measure == "d_prime" else measure
         return f"{'Ratio' if contrast.ratio else 'Difference'} in {symbol}"
     if contrast.contrast.form is not None:
         return measure

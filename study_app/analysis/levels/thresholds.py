@@ -362,7 +362,7 @@ def _group(
     )
 
 
-PLACES: Final = 40
+_PLACES: Final = 40
 
 
 def psychometric_bands(
@@ -375,7 +375,7 @@ def psychometric_bands(
     assumed, stimulus = block.assumed, block.stimulus
     if assumed is None or stimulus is None:
         return {}
-    u = np.linspace(*ends, PLACES)
+    u = np.linspace(*ends, _PLACES)
     rows = _answered(block, opened)
     fits, _ = _fits(block, assumed, rows[rows["analysed"]])
     return {str(fit.person): np.array([u, *fit.posterior.band(u)]) for fit in fits if fit.person in people}

@@ -49,7 +49,7 @@ BATCH: Final = 10
 _TRACKS_AT_ONCE: Final = 200
 
 _Plan: TypeAlias = ThresholdPlan | MeanPlan
-PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, _Plan]]
+_PrecisionPlans: TypeAlias = Mapping[str, Mapping[int, _Plan]]
 """Block → trials of each standard → what is simulated."""
 
 
@@ -93,7 +93,7 @@ class PrecisionResult:
         return float(np.mean([half[place] <= precision for half in self.halves]))
 
 
-def plans(protocol: Protocol, trials: Sequence[int]) -> PrecisionPlans:
+def plans(protocol: Protocol, trials: Sequence[int]) -> _PrecisionPlans:
     """Return each block's plans by number of trials (default: its own), for thresholds, d′, d_a or exponents.
 
     AnalysisError is raised if a method cannot have so few trials.
@@ -198,7 +198,7 @@ def _estimates(
 
 
 def sweep(
-    planned: PrecisionPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
+    planned: _PrecisionPlans, sizes: Sequence[int], studies: int, seed: int, executor: Executor
 ) -> Iterator[tuple[int, dict[tuple[str, int], PrecisionResult]]]:
     """Yield after every round of batches the number of simulated studies so far, and their results.
 

@@ -25,7 +25,7 @@ from study_app.analysis.statistics.slope_tests import student_test
 from study_app.analysis.statistics.trend import Direction
 from study_app.errors import AnalysisError
 
-MODEL: Final = "cumulative mixed model"
+_MODEL: Final = "cumulative mixed model"
 _REACH: Final = 5.0
 """The grid ends at this many standard deviations of the participants."""
 _NODES: Final = (31, 61, 121)
@@ -89,7 +89,7 @@ def cumulative_model(
     answered: Array = array[takes_part]
     several, n = design.shape[1], len(answered)
     model = CumulativeModel(
-        test=MODEL,
+        test=_MODEL,
         n=n,
         dropped=len(array) - n,
         statistic_name="LR",

@@ -71,7 +71,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
     both = first - second
     differences = both[~np.isnan(both)]
     n, dropped = len(differences), int(np.isnan(both).sum())
-    ranks, signs = signed_ranks(differences)
+    ranks, signs = _signed_ranks(differences)
     v = int(ranks[signs > 0].sum())
     all_ranks = int(ranks.sum())
     effect = (2 * v - all_ranks) / all_ranks if len(ranks) else None
@@ -97,7 +97,7 @@ def paired(x: ArrayLike, y: ArrayLike, *, alpha: float = 0.05) -> Paired:
     )
 
 
-def signed_ranks(differences: Array) -> tuple[Whole, Array]:
+def _signed_ranks(differences: Array) -> tuple[Whole, Array]:
     """Return the (doubled) ranks and the signs of the differences that are not 0."""
     kept = differences[differences != 0.0]
     # Differences of decimals that should tie differ in the last bit: 0.3 - 0.1 and 0.2.

@@ -30,7 +30,7 @@ _SURE: Final = 0.95
 _RATES: Final[Values] = (0.0, 0.02, 0.06, 0.12, 0.2, 0.3, 0.4, 0.5)
 """Rates of guesses and of lapses. People who never agree are lapses of the pooled answers, and may be many of them."""
 
-PLACES: Final = 121
+_PLACES: Final = 121
 """Thresholds of the grid, from one span below the lowest level to one span above the highest."""
 
 _WIDTHS: Final = (1 / 40, 3.0, 12)
@@ -161,7 +161,7 @@ def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, 
     widths = geometric(least * span, most * span, count)
     grid = Grid(
         family="logistic",
-        thresholds=evenly(low - span, low + 2 * span, PLACES),
+        thresholds=evenly(low - span, low + 2 * span, _PLACES),
         widths=widths,
         width_prior=(median * span, factor),
         lapses=_RATES,

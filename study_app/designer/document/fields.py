@@ -20,7 +20,7 @@ from study_app.protocol.json_schema import length_texts, schema
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.source.problems import NO_BOUND, rule_of, shown_value
+from study_app.protocol.source.problems import rule_of, shown_value
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 from study_app.protocol.trials.designs import KINDS as DESIGNS
 from study_app.protocol.trials.designs import Design, default_design
@@ -664,8 +664,12 @@ def _numbers_in(node: _Node) -> _Node:
     return node
 
 
+_NO_BOUND: Final = 1e6
+"""The form says nothing of bounds that no author reaches."""
+
+
 def _bound_texts(node: _Node, numbers: _Node) -> tuple[str, ...]:
-    stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < NO_BOUND}
+    stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < _NO_BOUND}
     phrases = [_OF_NUMBERS[key].format(shown_value(number)) for key, number in stated.items()]
     if "prefixItems" not in node:
         phrases += length_texts(node)

@@ -122,7 +122,7 @@ class _Rows(QListWidget):
         self.dropped.emit(index.row() + below if index.isValid() else self.count())
 
 
-class _EntryRow(QFrame):
+class EntryRow(QFrame):
     """The frame of an entry, with its parts in a line."""
 
     def __init__(self, name: str, parts: Iterable[QWidget | tuple[QWidget, int]], *, faulty: bool) -> None:
@@ -150,7 +150,7 @@ class EntryList(Field):
         self.box.setDirection(QBoxLayout.Direction.TopToBottom)
         self.box.setSpacing(6)
         self.ordered = row.kind != "tables"
-        self.rows: list[_EntryRow] = []
+        self.rows: list[EntryRow] = []
         self._after: int | None = None
         self._filled: object = None
         self.list = _Rows()
@@ -193,8 +193,8 @@ class EntryList(Field):
         if inside:
             self.take_keyboard()
 
-    def add_row(self, name: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> _EntryRow:
-        made, item = _EntryRow(name, parts, faulty=faulty), QListWidgetItem(self.list)
+    def add_row(self, name: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
+        made, item = EntryRow(name, parts, faulty=faulty), QListWidgetItem(self.list)
         item.setData(Qt.ItemDataRole.AccessibleTextRole, name)
         item.setSizeHint(QSize(0, FIELD_PX + 2))
         self.list.setItemWidget(item, made)
@@ -312,7 +312,7 @@ class EntriesField(EntryList):
                     "cross", f"Remove {entry.title} from {label}", partial(self.remove_entry, at), "delete"
                 )
 
-    def add_facts(self, shown: _EntryRow, at: int) -> None:
+    def add_facts(self, shown: EntryRow, at: int) -> None:
         entry = self.row.entries[at]
         if entry.note and entry.note.replace("_", " ") != entry.title.lower():
             note = cut_text(entry.note, "small", "text2", right=True)
@@ -327,7 +327,7 @@ class _ConditionsField(EntriesField):
     def row_content(self) -> object:
         return self.row.entries, self.row.facts
 
-    def add_facts(self, shown: _EntryRow, at: int) -> None:
+    def add_facts(self, shown: EntryRow, at: int) -> None:
         line = self.row.facts[at]
         note, force = Elided("small", "text2"), figures(f"{line.force}, clipped" if line.clipped else line.force)
         note.show_text(line.note)

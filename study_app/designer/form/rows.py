@@ -30,14 +30,14 @@ class QuestionLine:
 
 
 @dataclass(frozen=True, slots=True)
-class _QuestionLines:
+class QuestionLines:
     """Names of the study's languages, and the lines of its questions."""
 
     languages: tuple[str, ...]
     lines: tuple[QuestionLine, ...]
 
 
-def question_lines(study: Study, path: Path) -> _QuestionLines:
+def question_lines(study: Study, path: Path) -> QuestionLines:
     """Return the lines of all questions in the list at ``path``."""
     codes = languages_of(study.document)
     listed = value_at(study.document, path)
@@ -48,7 +48,7 @@ def question_lines(study: Study, path: Path) -> _QuestionLines:
         for at, item in enumerate(items)
         if isinstance(item, Mapping)
     )
-    return _QuestionLines(tuple(language_name(code) for code in codes), lines)
+    return QuestionLines(tuple(language_name(code) for code in codes), lines)
 
 
 def _question_line(
@@ -82,7 +82,7 @@ def _show_if_note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
 
 
 STUDY_LANGUAGES: Final = ("study", "languages")
-NO_QUESTIONS: Final = _QuestionLines((), ())
+NO_QUESTIONS: Final = QuestionLines((), ())
 LEAST, MOST = "at least ", "at most "
 
 
@@ -169,7 +169,7 @@ class Form:
     # its position in the session or list, from 1, and their number; None without an order
     position: tuple[int, int] | None = None
     # the questions of its questionnaire, itself included; none if it is no question
-    questions: _QuestionLines = NO_QUESTIONS
+    questions: QuestionLines = NO_QUESTIONS
     # the section and the elements that it is in, with their titles, and itself
     around: tuple[tuple[Path, str], ...] = ()
     feel: str = ""  # the label of the button that opens the lab with its liquids, "" if it has none

@@ -41,7 +41,7 @@ READ: Final = ("pages", "blocks", "tasks", "designs")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Revealing:
+class Revealing:
     """A text that reveals a condition: its key, the element's title, and the word that reveals it."""
 
     path: Path
@@ -78,7 +78,7 @@ def _translation_warnings(study: Study) -> tuple[str, ...]:
     return tuple(describe_untranslated(study.document, lists_places=False))
 
 
-def revealing_texts(study: Study, protocol: Protocol) -> tuple[_Revealing, ...]:
+def revealing_texts(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
     """Return the texts that name a liquid, condition or delay which participants must not know."""
     telltales = Telltales(_telltale_words(protocol))
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
@@ -90,7 +90,7 @@ def revealing_texts(study: Study, protocol: Protocol) -> tuple[_Revealing, ...]:
         words_there = [word for text in texts if isinstance(text, str) for word in telltales.in_text(text.casefold())]
         if words_there:
             element = title_of(study.document, path[:2])
-            revealing.append(_Revealing(path=path, element=element, key=label_of(path[-1]), word=words_there[0]))
+            revealing.append(Revealing(path=path, element=element, key=label_of(path[-1]), word=words_there[0]))
     return tuple(revealing)
 
 
@@ -135,7 +135,7 @@ _MARK: Final = "\u034f"
 
 
 @dataclass(frozen=True, slots=True)
-class _ValidPart:
+class ValidPart:
     """The study without its broken elements, None where everything depends on what is broken.
 
     It is ``whole`` where no element was left out, so that sums over the session are known; ``forces`` are known where
@@ -148,15 +148,15 @@ class _ValidPart:
 
 
 @lru_cache(maxsize=2)
-def valid_part(study: Study) -> _ValidPart:
+def valid_part(study: Study) -> ValidPart:
     """Return the part of a study without faults that can be measured."""
     return restored_part(study, {})
 
 
-def restored_part(study: Study, before: Mapping[str, Any]) -> _ValidPart:
+def restored_part(study: Study, before: Mapping[str, Any]) -> ValidPart:
     """Return the valid part of a study; faulty values come from the document ``before``, if any."""
     if study.formed is not None or not (study.is_toml or before):
-        return _ValidPart(study.formed, whole=study.formed is not None)
+        return ValidPart(study.formed, whole=study.formed is not None)
     document: Any = study.document
     faults: list[Fault] = list(study.faults) if study.is_toml else validate_document(document)[1]
     whole = forces = True
@@ -169,7 +169,7 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> _ValidPart:
             if not place:
                 place, value = fault.path[:2], _initial_value(document, fault.path[:2])
                 if value is None:
-                    return _ValidPart(None, whole=False)
+                    return ValidPart(None, whole=False)
             if value_at(document, place) is None and value is None:
                 continue  # another fault of the same element already removed it
             whole = whole and known
@@ -179,8 +179,8 @@ def restored_part(study: Study, before: Mapping[str, Any]) -> _ValidPart:
                 document = frozen(meant_document(document, edit))
         protocol, faults = validate_document(document)
         if protocol is not None:
-            return _ValidPart(protocol, whole, forces)
-    return _ValidPart(None, whole=False)
+            return ValidPart(protocol, whole, forces)
+    return ValidPart(None, whole=False)
 
 
 def _restoring_change(document: Any, fault: Fault, before: Mapping[str, Any]) -> tuple[Path, Any] | None:

@@ -19,7 +19,7 @@ from study_app.devices.inverse3.wire import CLOSE, INCOMPLETE, TEXT, VIOLATION, 
 from study_app.errors import DeviceError
 
 _PROFILE: Final = "liquid-study:study"
-PRESET: Final = "arm_front_centered"
+_PRESET: Final = "arm_front_centered"
 """Origin in the middle of the workspace ("Mount & Workspace Transforms", presets)."""
 _BASIS: Final = "XYZ"
 _FORCE_GATE_GAIN: Final = 0.0
@@ -27,7 +27,7 @@ _FORCE_GATE_GAIN: Final = 0.0
 documented: to be tested on the bench."""
 
 _SESSION_SCOPED: Final[Mapping[str, Any]] = {
-    "preset": PRESET,
+    "preset": _PRESET,
     "basis": {"permutation": _BASIS},
     "filters": {"force_gate": {"gain": _FORCE_GATE_GAIN}, "damping": {"scalar": 0.0}},
 }
@@ -51,7 +51,7 @@ def _first_message(device_id: str) -> dict[str, Any]:
     tutorial 01, "first-message-only handshake"); a command goes with it to keep the state coming.
     """
     configure = {
-        "preset": {"preset": PRESET},
+        "preset": {"preset": _PRESET},
         "damping": {"scalar": 0.0, "vector": _ZERO},
         "force_gate": {"gain": _FORCE_GATE_GAIN},
     }

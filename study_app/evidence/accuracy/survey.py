@@ -50,7 +50,7 @@ PUBLISHED: Final[Mapping[str, Callable[[float], float]]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Surveyed:
+class Surveyed:
     """One liquid: its Reynolds number at the scene's greatest speed, its model, and the model's errors.
 
     Errors are relative RMS errors with known velocities, against creeping flow, experiments and the fluid solver. They
@@ -74,7 +74,7 @@ class _Surveyed:
         return self.speed_mps / self.mps_per_reynolds
 
 
-def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[_Surveyed, ...]:
+def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
     """Measure every liquid of a file that has a viscosity, most viscous first."""
     surveyed = []
     for name, scene in scenes.items():
@@ -86,7 +86,7 @@ def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda
     return tuple(sorted(surveyed, key=lambda it: it.reynolds))
 
 
-def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> _Surveyed:
+def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) -> Surveyed:
     models, model = candidates.physical_candidates(scene)
     alone = models[0].scene
 
@@ -99,7 +99,7 @@ def _surveyed(name: str, scene: Scene, liquid: Liquid, viscosity_pa_s: float) ->
     speeds = [float(np.abs(it.velocity_mps).max()) for it in motions if it.velocity_mps is not None]
     speed_mps = scene.motion_in(liquid).speed_mps or math.nan
     creeping = max(share(truths.oscillation_truth(alone)), share(truths.starting_truth(alone)))
-    return _Surveyed(
+    return Surveyed(
         liquid=name,
         speed_mps=speed_mps,
         mps_per_reynolds=mps_per_reynolds,
@@ -120,7 +120,7 @@ def _law_spread(reynolds: float) -> float:
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
 
 
-def evidence(found: tuple[_Surveyed, ...]) -> Evidence:
+def evidence(found: tuple[Surveyed, ...]) -> Evidence:
     """Return tables of the liquids and of drag laws as a function of the Reynolds number, as Markdown."""
     highest = max(it.case.reynolds for it in (*load_tables(), *training(), *held_out()))
     liquids = []

@@ -43,7 +43,7 @@ class _MotionError:
 
 
 @dataclass(frozen=True, eq=False)
-class _Refit:
+class Refit:
     """The constants fitted to all motions, and the errors of each motion."""
 
     constants: Constants
@@ -90,7 +90,7 @@ def refit(
     tables: Sequence[SolvedTable],
     held_out: Sequence[SolvedTable] = (),
     progress: Callable[[str], None] = lambda _: None,
-) -> _Refit:
+) -> Refit:
     """Return the constants fitted to all tables with equal weight, and the error of each table when it is left out.
 
     The errors of the tables that are ``held_out`` come last.
@@ -124,7 +124,7 @@ def refit(
         )
         for it in held_out
     ]
-    return _Refit(constants, tuple(errors))
+    return Refit(constants, tuple(errors))
 
 
 def _as_run(table: SolvedTable) -> tuple[float, float]:
@@ -152,7 +152,7 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
     return Constants._make(np.exp(solution.x).tolist())
 
 
-def evidence(found: _Refit) -> Evidence:
+def evidence(found: Refit) -> Evidence:
     """Return constants and errors as Markdown, and the constants fitted without each motion as CSV."""
     values = zip(Constants._fields, found.constants, CONSTANTS, strict=True)
     constants = [(name, f"{fitted:.3g}", f"{own:g}") for name, fitted, own in values]

@@ -41,7 +41,7 @@ class _Sine(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class _VelocityProfile:
+class VelocityProfile:
     """Speed along one axis over time, from rest: the sum of the steps, multiplied by the sum of the sines if any."""
 
     name: str
@@ -133,21 +133,21 @@ def _slope(x: Floats) -> Floats:
     return found
 
 
-def _oscillation(keulegan_carpenter: float) -> _VelocityProfile:
+def _oscillation(keulegan_carpenter: float) -> VelocityProfile:
     """Return four periods of an oscillation with the Keulegan–Carpenter number U T/D."""
     sine = _Sine(amplitude=1.0, period=keulegan_carpenter, phase=0.0)
     words = f"oscillation, KC {keulegan_carpenter:g}"
-    return _VelocityProfile(
+    return VelocityProfile(
         f"oscillation-kc{keulegan_carpenter:g}", words, (Step(0.0, 1.0),), (sine,), 4 * keulegan_carpenter
     )
 
 
-STOPPING: Final = _VelocityProfile("stop", "stop", (Step(0.0, 1.0), Step(STOP, -1.0)))
-_REVERSAL: Final = _VelocityProfile("reversal", "reversal", (Step(0.0, 1.0), Step(STOP, -2.0)))
-_RETURN: Final = _VelocityProfile(
+STOPPING: Final = VelocityProfile("stop", "stop", (Step(0.0, 1.0), Step(STOP, -1.0)))
+_REVERSAL: Final = VelocityProfile("reversal", "reversal", (Step(0.0, 1.0), Step(STOP, -2.0)))
+_RETURN: Final = VelocityProfile(
     "return", "return after a pause", (Step(0.0, 1.0), Step(STOP, -1.0), Step(13.0, -1.0)), end=23.0
 )
-_MULTI_SINE: Final = _VelocityProfile(
+_MULTI_SINE: Final = VelocityProfile(
     "multi-sine",
     "multi-sine",
     (Step(0.0, 1.0),),
@@ -212,7 +212,7 @@ class Case:
     viscosity_pa_s: float
     diameter_m: float
     speed_mps: float
-    profile: _VelocityProfile = STOPPING
+    profile: VelocityProfile = STOPPING
 
     def __post_init__(self) -> None:
         if self.reynolds > _HIGHEST_REYNOLDS:
@@ -257,7 +257,7 @@ def cases() -> tuple[Case, ...]:
     return tuple(all_cases)
 
 
-def cases_of(motions: Sequence[tuple[_VelocityProfile, str, float]]) -> tuple[Case, ...]:
+def cases_of(motions: Sequence[tuple[VelocityProfile, str, float]]) -> tuple[Case, ...]:
     """Return the cases of motions by profile, liquid and Reynolds number."""
     found = []
     for profile, liquid_id, reynolds in motions:
@@ -266,7 +266,7 @@ def cases_of(motions: Sequence[tuple[_VelocityProfile, str, float]]) -> tuple[Ca
     return tuple(found)
 
 
-def _case(liquid_id: str, speed_mps: float, profile: _VelocityProfile = STOPPING) -> Case:
+def _case(liquid_id: str, speed_mps: float, profile: VelocityProfile = STOPPING) -> Case:
     scene = load_scene(shipped_file(_PROTOCOL), liquid_id)
     (liquid,) = scene.liquids
     return Case(

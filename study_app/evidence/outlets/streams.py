@@ -88,7 +88,7 @@ _MARKER_EVERY_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Streamed:
+class Streamed:
     """The data received in ``seconds``.
 
     ``errors_us`` are the differences between marker times and the servo clock [µs], ``arrivals_ms`` the transmission
@@ -118,7 +118,7 @@ class _Streamed:
 
 def stream(
     seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
-) -> _Streamed:
+) -> Streamed:
     """Stream a servo at 1 kHz and twenty markers per second to a listener in another process."""
     servo = Servo(PlayedHand())
     servo.prepare()
@@ -154,12 +154,12 @@ def _numbered(number: int, now_ns: int, origin_ns: int) -> Marker:
     return marker
 
 
-def _found(seconds: float, samples: _MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> _Streamed:
+def _found(seconds: float, samples: _MeasuredStream, sent: list[Marker], received: dict[str, Any]) -> Streamed:
     times_ns = {marker.text: marker.time_ns for marker in sent}
     markers = received["markers"]
     since_ns = [[it[key] - times_ns[it["text"]] for key in ("time_ns", "arrived_ns")] for it in markers]
     errors_ns, took_ns = np.array(since_ns, np.float64).reshape(-1, 2).T
-    return _Streamed(
+    return Streamed(
         seconds=seconds,
         samples_sent=samples.sent,
         samples_lost=samples.sent - received["samples"],
@@ -258,7 +258,7 @@ def _ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int
     )
 
 
-def evidence(streams: _Streamed, ratios: Sequence[Ratio]) -> Evidence:
+def evidence(streams: Streamed, ratios: Sequence[Ratio]) -> Evidence:
     """Return the results as text."""
     p50_us, p50_ms, p99_ms = (
         float(np.percentile(values, share)) if len(values) else math.nan

@@ -24,7 +24,7 @@ _EVERY_S: Final = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _TriggerDelays:
+class TriggerDelays:
     """The delays from events to their trigger bytes.
 
     ``written_us`` is from each event until its byte is handed to the port [µs], ``read_us`` until another process reads
@@ -76,7 +76,7 @@ class _VirtualPort:
 
 def measure(
     port: str, seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
-) -> _TriggerDelays:
+) -> TriggerDelays:
     """Send twenty events per second to the address of a port, or to a virtual one, and return their delays.
 
     The ``port`` "virtual" is a pair of virtual ports whose other end is read by another process.
@@ -87,14 +87,14 @@ def measure(
         The port cannot be opened, or failed.
     """
     if port != VIRTUAL:
-        return _TriggerDelays(port=port, written_us=_written_us(_send(port, seconds, ending, progress)[1]))
+        return TriggerDelays(port=port, written_us=_written_us(_send(port, seconds, ending, progress)[1]))
     with _VirtualPort() as virtual:
         sent, sink = _send(virtual.address, seconds, ending, progress)
         came = virtual.unplug()
     codes = [one for one in came if one[0]]
     idle_ns = [at_ns for byte, at_ns in came[1:] if not byte]  # the first 0 is from opening the port
     pairs = list(zip(codes, sent, strict=False))
-    return _TriggerDelays(
+    return TriggerDelays(
         port=f"{virtual.address} (virtual)",
         written_us=_written_us(sink),
         read_us=np.array([at_ns - event_ns for (_, at_ns), (_, event_ns) in pairs]) * 1e-3,
@@ -132,7 +132,7 @@ def _send(
     return sent, sink
 
 
-def evidence(delays: _TriggerDelays) -> Evidence:
+def evidence(delays: TriggerDelays) -> Evidence:
     """Return the results as text."""
     lines = [
         f"{len(delays.written_us)} events, 20 per second, on {delays.port}",

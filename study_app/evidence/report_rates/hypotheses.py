@@ -37,7 +37,7 @@ Drawn: TypeAlias = Callable[[np.random.Generator, int], Array]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _DrawnStudies:
+class DrawnStudies:
     """Simulated studies with ``participants``; ``trial`` simulates one and tells whether it makes the ``claim``."""
 
     name: str
@@ -50,7 +50,7 @@ _SHOWN: Final = "shown"
 _EQUIVALENT: Final = "called equivalent"
 
 
-def false_claims() -> Iterator[_DrawnStudies]:
+def false_claims() -> Iterator[DrawnStudies]:
     """Yield studies in which the claim is false."""
     yield from _thresholds()
     yield from _recognition()
@@ -59,9 +59,9 @@ def false_claims() -> Iterator[_DrawnStudies]:
     yield from _trends()
 
 
-def true_claims() -> Iterator[_DrawnStudies]:
+def true_claims() -> Iterator[DrawnStudies]:
     """Yield studies in which the claim is true."""
-    yield _DrawnStudies(
+    yield DrawnStudies(
         name="thresholds in two blocks, ratio 1.5 : 1, 3-down-1-up, 60 trials",
         participants=12,
         claim=_SHOWN,
@@ -82,8 +82,8 @@ DESIGN: Final = ForcedChoice()
 METHOD: Final = UpDown(rule="3down1up", trials=30, tracks=2)
 
 
-def _thresholds() -> Iterator[_DrawnStudies]:
-    yield _DrawnStudies(
+def _thresholds() -> Iterator[DrawnStudies]:
+    yield DrawnStudies(
         name="thresholds in two blocks, equal, 3-down-1-up, 60 trials",
         participants=12,
         claim=_SHOWN,
@@ -119,14 +119,14 @@ def _compares_thresholds(n: int, ratio: float) -> Trial:
 LIQUIDS: Final = ("water", "honey", "oil")
 
 
-def _recognition() -> Iterator[_DrawnStudies]:
+def _recognition() -> Iterator[DrawnStudies]:
     for n in (12, 24, 60):
         for share in (0.5, 0.8):
             name = f"honey known, water and oil both called water in {100 * share:.0f} %"
-            yield _DrawnStudies(
+            yield DrawnStudies(
                 name=name, participants=n, claim="water or oil recognised", trial=_recognises(n, share, known=(1,))
             )
-        yield _DrawnStudies(
+        yield DrawnStudies(
             name="all three liquids guessed",
             participants=n,
             claim="a liquid recognised",
@@ -148,18 +148,16 @@ def _recognises(n: int, share: float, known: tuple[int, ...]) -> Trial:
     return trial
 
 
-def _equivalence() -> Iterator[_DrawnStudies]:
+def _equivalence() -> Iterator[DrawnStudies]:
     for bound in (0.5, 1.0):
         share = bound / STEPS
         for words, others in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
             name = f"one in {1 / share:.0f} differs by 6 points, the others by {words}, bound {bound:g}"
             for n in (14, 20, 30, 40):
-                yield _DrawnStudies(
-                    name=name, participants=n, claim=_EQUIVALENT, trial=_misses(n, share, others, bound)
-                )
+                yield DrawnStudies(name=name, participants=n, claim=_EQUIVALENT, trial=_misses(n, share, others, bound))
     for members in (1, 4, 6):
         words = "one hypothesis" if members == 1 else f"{members} hypotheses"
-        yield _DrawnStudies(
+        yield DrawnStudies(
             name=f"{words} at the bound, normal",
             participants=20,
             claim=f"any {_EQUIVALENT}",
@@ -184,21 +182,21 @@ def _calls_equivalent(n: int, members: int) -> Trial:
     return trial
 
 
-def _contrasts() -> Iterator[_DrawnStudies]:
+def _contrasts() -> Iterator[DrawnStudies]:
     for n in (8, 12, 30):
         for ratio in (1, 3, 6):
             name = f"two groups, sizes 1 : 2, SDs {ratio} : 1"
-            yield _DrawnStudies(
+            yield DrawnStudies(
                 name=name, participants=n, claim=_SHOWN, trial=_compares_groups(round(n / 3), n - round(n / 3), ratio)
             )
     for n in (8, 12, 20, 30):
-        yield _DrawnStudies(
+        yield DrawnStudies(
             name="paired, one in six 5 points higher, the others 1 lower",
             participants=n,
             claim=_SHOWN,
             trial=_compares_pairs(n, _one_in_six),
         )
-        yield _DrawnStudies(
+        yield DrawnStudies(
             name="paired, exponential",
             participants=n,
             claim=_SHOWN,
@@ -224,17 +222,17 @@ _NOISE: Final = 0.7
 _MANY: Final = 20_000
 
 
-def _trends() -> Iterator[_DrawnStudies]:
+def _trends() -> Iterator[DrawnStudies]:
     """Yield skewed individual trends with mean 0, so that ranks fall, and with rank correlation 0."""
     for n in (12, 30):
-        yield _DrawnStudies(
+        yield DrawnStudies(
             name="individual trends, skewed, mean 0: ranks fall",
             participants=n,
             claim="an increase shown",
             trial=_follows(n, 0.0, "rise"),
         )
         name = "individual trends, skewed, mean rank correlation 0"
-        yield _DrawnStudies(
+        yield DrawnStudies(
             name=name, participants=n, claim="a trend shown", trial=_follows(n, _shift_without_trend(), "either")
         )
 

@@ -40,7 +40,7 @@ class Rests:
     force_n: float = 0.0
 
 
-class _InjectedFault(NamedTuple):
+class InjectedFault(NamedTuple):
     """The number of times a fault was injected, of affected readings, and of those that telemetry reports."""
 
     name: str
@@ -82,14 +82,14 @@ class SoakResult:
         return self.memory[-1] - self.memory[0]
 
     @property
-    def faults(self) -> tuple[_InjectedFault, ...]:
+    def faults(self) -> tuple[InjectedFault, ...]:
         """The injected faults of each kind."""
         rows = []
         for kind, name in enumerate(KINDS):
             shown = kind != JUMP or self.virtual  # a tick may take long for other reasons too
             seen = int(self.counts[_SEEN[kind]]) if shown else None
             times, readings = int(self.device.episodes[kind]), int(self.device.injected[kind])
-            rows.append(_InjectedFault(name, times=times, readings=readings, seen=seen))
+            rows.append(InjectedFault(name, times=times, readings=readings, seen=seen))
         return tuple(rows)
 
     @property

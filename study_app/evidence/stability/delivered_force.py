@@ -46,7 +46,7 @@ _TAPS: Final = (*range(200), *range(200, 1200, 40))
 _EVERY: Final = 2
 """Only every second row is fitted."""
 
-Range = tuple[float, float]
+_Range = tuple[float, float]
 _ERROR: Final = {"water": 20.0, "olive_oil": 13.0, "gear_oil": 13.0, "glycerin": 13.0, "honey": 15.0}
 _THICK: Final = ("glycerin", "honey")
 _QUICK_ERROR: Final = 20.0
@@ -72,7 +72,7 @@ class Delivered(NamedTuple):
     withheld: float
 
     @property
-    def limits(self) -> Mapping[str, Range]:
+    def limits(self) -> Mapping[str, _Range]:
         """The permitted ranges, by quantity; empty for liquids and estimators without limits."""
         case, name = self.case, self.case.liquid.removeprefix("physical2_")
         if case.estimator != "kalman" or name == case.liquid or name not in _ERROR:
@@ -172,18 +172,18 @@ def case_of(
     )
 
 
-class _OnRandomMotion(NamedTuple):
+class OnRandomMotion(NamedTuple):
     """Error of the acting force and least error of a linear estimator [%], on the same random motion."""
 
     error: float
     least: float
 
 
-def acting_on_random_motion(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequency_hz) -> _OnRandomMotion:
+def acting_on_random_motion(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequency_hz) -> OnRandomMotion:
     """Return the error of the acting force of ``scene`` in the loop of ``case`` while the hand moves at random."""
     trace = Bench(case, scene=scene).follow(random_path(frequency_hz, case.rate_hz))
     law_n = law_along(scene, trace) @ DIRECTION
-    return _OnRandomMotion(error=_error(trace, law_n), least=_least_error(trace, law_n, case.delay))
+    return OnRandomMotion(error=_error(trace, law_n), least=_least_error(trace, law_n, case.delay))
 
 
 class Acting(NamedTuple):

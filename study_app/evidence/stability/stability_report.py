@@ -160,7 +160,7 @@ _SETTLED_S: Final = 0.2
 _MOVING_S: Final = 1.2
 
 
-class _Fidelity(NamedTuple):
+class Fidelity(NamedTuple):
     """One liquid in one loop, in the worst of its motions.
 
     ``difference_n`` and ``force_n`` are RMS values [N] over a motion; ``beyond`` is the greatest share of ticks whose
@@ -190,7 +190,7 @@ class _Fidelity(NamedTuple):
 
 def fidelities(
     names: Sequence[str] | None = None, loops: Sequence[tuple[float, int]] = LOOPS, *, executor: Executor | None = None
-) -> tuple[_Fidelity, ...]:
+) -> tuple[Fidelity, ...]:
     """Measure how much the safety layer changes the force of liquids (by default all) in each loop.
 
     Each liquid has its own scale and estimator, and is moved by a medium hand (0.55 kg, 135 N/m, 6.5 N·s/m) along
@@ -201,14 +201,14 @@ def fidelities(
     return run(_worst_fidelity, itertools.product(names or liquids(), loops), executor)
 
 
-def _worst_fidelity(liquid: str, loop: tuple[float, int]) -> _Fidelity:
+def _worst_fidelity(liquid: str, loop: tuple[float, int]) -> Fidelity:
     """Return the fidelity of the motion that exceeds its target most."""
     measured = list(_motions(liquid, *loop))
     beyond = max(fidelity.beyond for fidelity in measured)
     return max(measured, key=lambda one: one.difference_n / one.target_n)._replace(beyond=beyond)
 
 
-def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[_Fidelity]:
+def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[Fidelity]:
     scene = liquids()[liquid]
     for motion, speed_mps in itertools.product(_MOTIONS, _SPEEDS_MPS):
         case = Case(
@@ -227,13 +227,13 @@ def _motions(liquid: str, rate_hz: float, delay: int) -> Iterator[_Fidelity]:
         yield _compare(case, trace)
 
 
-def _compare(case: Case, trace: Any) -> _Fidelity:
+def _compare(case: Case, trace: Any) -> Fidelity:
     """Compare the force sent with the model's force, clamped in the same direction."""
     asked_n = np.linalg.norm(trace.asked_n, axis=1)
     clamped_n = trace.asked_n * np.minimum(1.0, FORCE_LIMIT_N / np.maximum(asked_n, 1e-12))[:, None]
     force_n = np.linalg.norm(clamped_n, axis=1)
     off_n = np.linalg.norm(trace.sent_n - clamped_n, axis=1)
-    return _Fidelity(
+    return Fidelity(
         liquid=case.liquid,
         rate_hz=case.rate_hz,
         delay=case.delay,
@@ -327,7 +327,7 @@ def in_words(verdict: Verdict) -> str:
     return f"{said}; proportion of ticks on which each limiter was active: {', '.join(acted)}" if acted else said
 
 
-def summary(swept: Swept, fidelities: Sequence[_Fidelity]) -> str:
+def summary(swept: Swept, fidelities: Sequence[Fidelity]) -> str:
     """Return a summary as text: the number of unstable cases and why, the active limiters, and the force withheld."""
     return "\n".join((*_counts(swept), "", group_table(swept), "", *_limiters(swept), "", *_fidelity(fidelities)))
 
@@ -384,7 +384,7 @@ def _limiters(swept: Swept) -> Iterator[str]:
             yield f"  {name:22} {sum(share > 0 for share in shares) / cases:10.1%}  {sum(shares) / cases:10.2%}"
 
 
-def _fidelity(fidelities: Sequence[_Fidelity]) -> Iterator[str]:
+def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
     yield "RMS difference between the sent force and the model force clamped to 8 N, with the hand attached (worst of"
     yield "twelve motions), as a percentage of the RMS force; * marks more than 5 % and 0.05 N. The second number is"
     yield "the largest proportion of ticks with such a difference."
@@ -394,7 +394,7 @@ def _fidelity(fidelities: Sequence[_Fidelity]) -> Iterator[str]:
         yield f"  {liquid:20}" + "".join(f"{cell:>16}" for cell in cells)
 
 
-def evidence(swept: Swept, fidelities: Sequence[_Fidelity], seed: str) -> Evidence:
+def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidence:
     """Return a summary (or a table of groups), the cases as CSV, the unstable ones as text, and the map."""
     text = f"seed {seed}\n\n{summary(swept, fidelities) if swept.on else group_table(swept)}"
     lines = ("# When the simulation is stable", "", "```", text, "```", "", "![Map](map.png)", "")

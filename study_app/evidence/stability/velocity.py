@@ -40,7 +40,7 @@ _RATE_HZ: Final = 1000.0
 _JITTER_S: Final = 40e-6
 _SETTLED: Final = 500
 """Samples before errors count."""
-PLACES: Final = 4
+_PLACES: Final = 4
 """Motions are repeated from as many positions between two counts."""
 _NOISE_HZ: Final = 20.0
 _TREMOR_M: Final = 20e-6
@@ -95,12 +95,12 @@ def errors(velocity: Velocity) -> Mapping[Stroke, float]:
 
 def _error(velocity: Velocity, stroke: Stroke) -> float:
     wrong = right = 0.0
-    for k in range(PLACES):
+    for k in range(_PLACES):
         random = np.random.default_rng(k)
         t_s = np.arange(4000) / _RATE_HZ
         t_s = t_s + random.uniform(-0.5, 0.5, len(t_s)) * math.sqrt(12) * _JITTER_S
         true_mps = stroke.speeds_mps(t_s)[_SETTLED:]
-        found_mps = _estimate_velocities(velocity, t_s, stroke.places_m(t_s) + k / PLACES * COUNT_M)[_SETTLED:]
+        found_mps = _estimate_velocities(velocity, t_s, stroke.places_m(t_s) + k / _PLACES * COUNT_M)[_SETTLED:]
         wrong += float(np.sum((found_mps * abs(found_mps) - true_mps * abs(true_mps)) ** 2))
         right += float(np.sum(true_mps**4))
     return 100 * math.sqrt(wrong / right)

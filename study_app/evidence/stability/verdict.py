@@ -102,7 +102,7 @@ class Verdict:
         return NOISY if self.reasons == (_NOISE,) else UNSTABLE
 
 
-class _Restlessness(NamedTuple):
+class Restlessness(NamedTuple):
     """The force above 40 Hz [N RMS], that of the control, and whether the excess is beyond its limit and sustained."""
 
     fast_n: float
@@ -126,7 +126,7 @@ def not_finite(case: Case, trace: Any, *, safe: bool) -> Verdict:
     )
 
 
-def reasons_of(*, limit: bool, energy: bool, oscillation: bool, restlessness: _Restlessness) -> tuple[str, ...]:
+def reasons_of(*, limit: bool, energy: bool, oscillation: bool, restlessness: Restlessness) -> tuple[str, ...]:
     """Return the names of the reasons that apply to a finite trace."""
     noise = restlessness.excessive and not restlessness.sustained
     applies = (False, limit, energy, oscillation, restlessness.sustained, noise)
@@ -212,7 +212,7 @@ def _swing_between(trace: Any, case: Case, corner_hz: float, times_s: Any) -> fl
 
 def _restlessness(
     case: Case, trace: Any, before: list[tuple[int, Bench]], limits: DampingLimits | None, *, late_share: float
-) -> _Restlessness:
+) -> Restlessness:
     """Compare the force's fast part with that of the same motion without feedback, where they differ most."""
     calm = calm_motion(trace)
     passive = _passive(case, bool(before[0][1].loop.safe), limits)
@@ -245,7 +245,7 @@ def undecided(position_m: Any, count_um: float) -> Any:
 
 def compare_fast(
     force_n: Any, controls_n: Sequence[Any], rate_hz: float, first: int, *, late_share: float = 0.0
-) -> _Restlessness:
+) -> Restlessness:
     """Compare the fast part of a force (rows, 3) [N] with the greatest of its controls, from row ``first`` onwards.
 
     The permitted excess is 0.05 N, or ``late_share`` of the control if that is more. Controls may have fewer rows.
@@ -261,7 +261,7 @@ def compare_fast(
     rows = range(first, len(force_n) + 1, round(_ONCE_S * rate_hz))
     pairs_n = np.array([measure(*interval) for interval in itertools.pairwise(rows)]).reshape(-1, 2)
     permitted_n = np.maximum(_RESTLESS_N, late_share * pairs_n[:, 1])
-    return _Restlessness(
+    return Restlessness(
         fast_n=fast_n,
         control_n=control_n,
         excessive=fast_n - control_n > max(_RESTLESS_N, late_share * control_n),
@@ -279,7 +279,7 @@ def _is_sustained(excesses_n: Any, permitted_n: Any) -> bool:
     )
 
 
-def worst_of(compared: Sequence[_Restlessness]) -> _Restlessness:
+def worst_of(compared: Sequence[Restlessness]) -> Restlessness:
     """Return the greatest excess; it is sustained if any is."""
     worst = max(compared, key=lambda each: each.fast_n - each.control_n)
     return worst._replace(sustained=any(each.sustained for each in compared))

@@ -75,7 +75,7 @@ _BETWEEN_SESSIONS: Final = 10**SESSION_SD
 
 PEOPLE: Final = 20
 """Of a study: so many, and ±`_NEAR`, are planned in the shipped studies (``analysis.participants``, ``precision``)."""
-REHEARSED: Final = 3
+_REHEARSED: Final = 3
 _ERROR_MOST: Final = 0.05
 _NEAR: Final = 0.15
 _NEAR_SHARE: Final = 0.95
@@ -356,7 +356,7 @@ class KnownThreshold(_KnownValue):
 
         return Measure(
             study=self.name,
-            what=f"threshold of {REHEARSED} participants, {'ms' if self.threshold > 1 else 'Weber fraction'}",
+            what=f"threshold of {_REHEARSED} participants, {'ms' if self.threshold > 1 else 'Weber fraction'}",
             value=self.threshold * math.exp(error),
             interval=ends,
             least=self.threshold,
@@ -483,11 +483,11 @@ def _resistance(scene: Any, fastest_mps: float) -> float:
 
 
 def rehearsed(known: Known, source: bytes, seed: int) -> Rehearsed:
-    """Rehearse `REHEARSED` participants of a protocol in a temporary folder; return the results."""
+    """Rehearse `_REHEARSED` participants of a protocol in a temporary folder; return the results."""
     with tempfile.TemporaryDirectory() as place:
         file, folder = Path(place) / f"{known.name}.toml", Path(place) / "study"
         file.write_bytes(source)
-        rehearse(str(file), participants=REHEARSED, seed=seed, results=folder, observer=known.observer)
+        rehearse(str(file), participants=_REHEARSED, seed=seed, results=folder, observer=known.observer)
         sessions = StudyFolder(folder).sessions()
         findings = len(verify_study(folder, None).errors)
         findings += sum(len(reproduce_session(session.path).differences) for session in sessions)
@@ -597,9 +597,9 @@ def validate(
         found = run(one.simulate, cases, executor, counted)
         every += found
         measures += [*one.measures(found), *coverage(one.name, found)]
-        progress(f"{one.name}: rehearsing {REHEARSED} participants", None)
-        measures += rehearsed_measures(one, rehearsal.result(), one.spread(found, REHEARSED))
-        say(f"{one.name}: {len(cases)} studies and {REHEARSED} simulated participants")
+        progress(f"{one.name}: rehearsing {_REHEARSED} participants", None)
+        measures += rehearsed_measures(one, rehearsal.result(), one.spread(found, _REHEARSED))
+        say(f"{one.name}: {len(cases)} studies and {_REHEARSED} simulated participants")
     measures += coverage("all of them", every)
     of_thresholds = [one for _, one in known if isinstance(one, KnownThreshold)]
     cases = cases[:: max(1, min(_KIND_SHARE, len(cases) // 2))]

@@ -25,7 +25,7 @@ _REACH_M: Final = 0.02
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _DeviceLateness:
+class DeviceLateness:
     """The lateness of ticks with a device; ``low`` and ``high`` are the ends of the 95 % interval of ``ratio``.
 
     ``ratio`` is the 99th percentile relative to the scripted hand's; quarter seconds of both devices are resampled
@@ -64,7 +64,7 @@ def time_devices(
     *,
     ending: threading.Event,
     progress: Callable[[str], object] = lambda _line: None,
-) -> tuple[_DeviceLateness, ...]:
+) -> tuple[DeviceLateness, ...]:
     """Return the lateness of ticks with each device in ``names``, the scripted hand first.
 
     Raises
@@ -92,13 +92,13 @@ def time_devices(
     return tuple(_compared(name, late_ns) for name in names)
 
 
-def _compared(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> _DeviceLateness:
+def _compared(name: str, late_ns: dict[str, list[NDArray[np.int64]]]) -> DeviceLateness:
     own, reference = late_ns[name], late_ns[_REFERENCE]
     rng = np.random.default_rng(1)
     draws = [_ratio(own, reference, rng.integers(0, len(own), len(own))) for _ in range(_DRAWS)]
     p50_ns, p99_ns = np.percentile(np.concatenate(own), [50, 99])
     low, high = np.percentile(draws, [2.5, 97.5])
-    return _DeviceLateness(
+    return DeviceLateness(
         name=name,
         ticks=sum(map(len, own)),
         p50_us=1e-3 * float(p50_ns),
@@ -115,7 +115,7 @@ def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rou
     return late / early
 
 
-def evidence(found: Sequence[_DeviceLateness]) -> Evidence:
+def evidence(found: Sequence[DeviceLateness]) -> Evidence:
     """Return the table as text."""
     lines = [f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {_REFERENCE} (95 % interval)"]
     for lateness in found:

@@ -290,14 +290,14 @@ def _in_a_thread(take: Callable[[], None]) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class _Classes:
+class Classes:
     """The priority classes that this system grants: the best one, and the ordinary one."""
 
     normal: Grant
     best: Grant | None
 
 
-def granted() -> _Classes:
+def granted() -> Classes:
     """Return the priority classes to be timed; the best is None if it is the ordinary one."""
     grants: list[Grant] = []
 
@@ -307,7 +307,7 @@ def granted() -> _Classes:
 
     _in_a_thread(ask)
     normal, best = grants
-    return _Classes(normal, None if best.level == "normal" else best)
+    return Classes(normal, None if best.level == "normal" else best)
 
 
 LATE_NS: Final = 1_000_000

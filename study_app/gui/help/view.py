@@ -58,7 +58,7 @@ _EMPTY_CELL: Final = re.compile(r"(?<=\|) *(?=\|)")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _HelpEntry:
+class HelpEntry:
     """One row of the list of pages: its page, its title, whether it heads a section, and its anchor."""
 
     page: str
@@ -68,22 +68,22 @@ class _HelpEntry:
 
 
 @cache
-def help_entries() -> tuple[_HelpEntry, ...]:
+def help_entries() -> tuple[HelpEntry, ...]:
     """Return the pages in the order of the sections, each page followed by its sections."""
-    rows = [_HelpEntry(page=_FIRST_PAGE, title="Start page", heads=True)]
+    rows = [HelpEntry(page=_FIRST_PAGE, title="Start page", heads=True)]
     for section, pages in documentation.sections().items():
-        rows.append(_HelpEntry(page=section, title=plain(documentation.title(section)), heads=True))
-        rows += [_HelpEntry(page=page, title=plain(documentation.title(page))) for page in pages]
+        rows.append(HelpEntry(page=section, title=plain(documentation.title(section)), heads=True))
+        rows += [HelpEntry(page=page, title=plain(documentation.title(page))) for page in pages]
     return tuple(rows)
 
 
-def matching_entries(text: str) -> tuple[_HelpEntry, ...]:
+def matching_entries(text: str) -> tuple[HelpEntry, ...]:
     """Return the pages that contain the text, best first, each at its best heading; all pages for an empty text."""
     if not text.strip():
         return help_entries()
     titles = {entry.page: entry.title for entry in help_entries()}
     return tuple(
-        _HelpEntry(
+        HelpEntry(
             page=section.page,
             title=titles[section.page],
             anchor="" if section.heading == titles[section.page] else anchor_of(section.heading),
@@ -367,7 +367,7 @@ class HelpPlace(Place):
         self._came_from = ""
         self.back.setEnabled(bool(self._before))
 
-    def _show_rows(self, rows: tuple[_HelpEntry, ...]) -> None:
+    def _show_rows(self, rows: tuple[HelpEntry, ...]) -> None:
         with QSignalBlocker(self.list):
             self.list.clear()
             for row in rows:

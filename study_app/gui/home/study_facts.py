@@ -50,7 +50,7 @@ _FIRST_STUDY: Final = "demo"
 
 
 @dataclass(frozen=True, slots=True)
-class _DraftNote:
+class DraftNote:
     """The note on an unsaved draft, and the time at which it was stored, as ISO 8601."""
 
     words: str
@@ -73,7 +73,7 @@ class StudyFacts:
     duration: str
     needs: str
     origin: str
-    draft: _DraftNote | None = None
+    draft: DraftNote | None = None
 
     @property
     def name(self) -> str:
@@ -93,7 +93,7 @@ class BrokenFacts:
     source: str
     problem: str
     origin: str
-    draft: _DraftNote | None = None
+    draft: DraftNote | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +103,7 @@ class DraftFacts:
     source: str
     title: str
     origin: str
-    draft: _DraftNote
+    draft: DraftNote
 
 
 def known_sources() -> tuple[str, ...]:
@@ -186,7 +186,7 @@ def _draft_facts(file: Path, draft_words: LoadWords) -> DraftFacts | None:
     if draft is None:  # it was saved meanwhile
         return None
     title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
-    note = _DraftNote(f"Draft of {time_text(draft.kept_at)}, never saved", draft.kept_at)
+    note = DraftNote(f"Draft of {time_text(draft.kept_at)}, never saved", draft.kept_at)
     return DraftFacts(source=str(file), title=title or file.stem, origin=_origin_of(str(file)), draft=note)
 
 
@@ -262,7 +262,7 @@ def study_facts(source: str, draft_words: LoadWords = None) -> StudyFacts | Brok
     )
 
 
-def _draft_note(source: str, draft_words: LoadWords) -> _DraftNote | None:
+def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
     """Return the note on a draft: "Draft of today 14:02, not saved: Water"; None if everything is saved."""
     with suppress(ProtocolError, OSError):
         file = protocol_file(source)
@@ -273,7 +273,7 @@ def _draft_note(source: str, draft_words: LoadWords) -> _DraftNote | None:
                 if draft_words
                 else ""
             )
-            return _DraftNote(f"Draft of {time_text(draft.kept_at)}, not saved{edited}", draft.kept_at)
+            return DraftNote(f"Draft of {time_text(draft.kept_at)}, not saved{edited}", draft.kept_at)
     return None
 
 

@@ -33,7 +33,7 @@ STORAGE: Final = 3.0
 """Multiple of ½ M v² that an implicit inertial force may return: less took the force from fast strokes in firm hands,
 where the velocity falls before the force does. [choice]"""
 CORNER_RADPS: Final = 2.0 * math.pi * 5.5
-DAMPING: Final = 0.5
+_DAMPING: Final = 0.5
 """Corner frequency and damping ratio of the high-pass filter: a handle of 0.2 kg in a middle grip has 7 Hz and 0.3, in
 a light one 4 Hz and 0.2, in a firm one 11 Hz and 0.5. [choice]"""
 JERK_M2PS5: Final = 0.5
@@ -102,7 +102,7 @@ def _begin_motion(parameters: Record, filtered: Record) -> None:
 def _feedthrough(interval_s: float) -> float:
     """Return the immediate response of the high-pass filter."""
     x = CORNER_RADPS * interval_s
-    return 1.0 / (1.0 + x * (2.0 * DAMPING + x))
+    return 1.0 / (1.0 + x * (2.0 * _DAMPING + x))
 
 
 @part
@@ -116,7 +116,7 @@ def _pass_fast(passed: Any, force_n: float, axis: int, interval_s: float) -> flo
 
 @part
 def _slow_part(passed: Any, axis: int) -> float:
-    return float(CORNER_RADPS * (2.0 * DAMPING * passed[0, axis] + CORNER_RADPS * passed[1, axis]))
+    return float(CORNER_RADPS * (2.0 * _DAMPING * passed[0, axis] + CORNER_RADPS * passed[1, axis]))
 
 
 @part

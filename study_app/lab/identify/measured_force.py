@@ -55,7 +55,7 @@ class FlowCurve:
         order = np.lexsort((self.stress_pa, self.rate_per_s))
         return FlowCurve(self.rate_per_s[order], self.stress_pa[order])
 
-    def branches(self) -> "_Branches | None":
+    def branches(self) -> "Branches | None":
         """Return two branches, each sorted by shear rate: of repeated rates, or rising and falling rows.
 
         For rates that were measured repeatedly these are the smallest and the largest stresses. None if most rates
@@ -67,12 +67,12 @@ class FlowCurve:
             stresses = [self.stress_pa[self.rate_per_s == rate] for rate in repeated]
             least, greatest = (np.array([end(values) for values in stresses]) for end in (np.min, np.max))
             description = "the largest and smallest stresses at repeated shear rates"
-            return _Branches(description=description, first=(repeated, greatest), second=(repeated, least))
+            return Branches(description=description, first=(repeated, greatest), second=(repeated, least))
         turns = np.flatnonzero(np.diff(np.sign(np.diff(self.rate_per_s))))
         if len(turns) != 1:
             return None
         ways = [self._sorted(slice(turns[0] + 2)), self._sorted(slice(turns[0] + 1, None))]
-        return _Branches(description="the stresses at rising and falling shear rates", first=ways[0], second=ways[1])
+        return Branches(description="the stresses at rising and falling shear rates", first=ways[0], second=ways[1])
 
     def _sorted(self, rows: slice) -> tuple[Floats, Floats]:
         order = np.argsort(self.rate_per_s[rows])
@@ -80,7 +80,7 @@ class FlowCurve:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Branches:
+class Branches:
     """Two branches of a flow curve, each as increasing shear rates and stresses; ``description`` names both."""
 
     description: str

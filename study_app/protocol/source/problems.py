@@ -93,8 +93,8 @@ _BOUNDS = {
     "less_than": ("lt", "less than"),
     "less_than_equal": ("le", "at most"),
 }
-NO_BOUND: Final = 1e6
-"""Numbers so large are limits of the computer, of which forms and messages say nothing."""
+_NO_BOUND: Final = 1e9
+"""Numbers so large are limits of the computer, which a message does not state as permitted values."""
 _LENGTHS = {
     "too_short": "has too few entries ({actual_length}): it needs at least {min_length}",
     "too_long": "has too many entries ({actual_length}): it may have at most {max_length}",
@@ -184,7 +184,7 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
         reason = next(filter(None, hints), "")
-        if abs(bound) >= NO_BOUND:
+        if abs(bound) >= _NO_BOUND:
             return Fault(path, f"is {shown_value(value)}, which is too {'small' if bound < 0 else 'large'}", reason)
         sentence = f"is {shown_value(value)}, but must be {expected} {shown_value(bound)}"
         return Fault(path, sentence, reason, use=(path, bound) if key in {"ge", "le"} else None)

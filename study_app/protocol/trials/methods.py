@@ -375,7 +375,7 @@ class Constant(Method):
 
 
 _Positive = Annotated[float, within(1e-6, 1e6, "a psychometric function is neither a step nor a flat line")]
-Lapse = Annotated[float, Field(ge=0, lt=0.5)]
+_Lapse = Annotated[float, Field(ge=0, lt=0.5)]
 
 
 class Precision(Table):
@@ -408,7 +408,7 @@ class QuestPlus(_Adaptive):
     width_prior: tuple[_Positive, Annotated[float, Field(gt=1, le=1e6)]] | None = Field(
         default=None, description="Median and spread factor of the width's log-normal prior."
     )
-    lapses: Annotated[tuple[Lapse, ...], Field(min_length=1, max_length=10)] = Field(
+    lapses: Annotated[tuple[_Lapse, ...], Field(min_length=1, max_length=10)] = Field(
         default=LAPSES, description="Lapse rates to be considered."
     )
     stop: Precision | None = Field(default=None, description="When a track ends early; default: never.")

@@ -185,7 +185,7 @@ def expected_mean(plan: MeanPlan) -> Expected:
     )
 
 
-OBSERVERS: Final = 200
+_OBSERVERS: Final = 200
 """Of a simulated threshold."""
 PEOPLE: Final = 20
 """Of a study, unless it is said how many."""
@@ -337,8 +337,8 @@ class ThresholdPlan:
         joined = {name: np.concatenate([getattr(it, name) for it in parts], axis=1) for name in Answers._fields}
         answers = Answers(**joined)
         presented = np.unique(answers.levels[~np.isnan(answers.levels)])
-        if len(presented) > OBSERVERS:
-            presented = np.append(presented[presented < low], np.linspace(low, high, OBSERVERS))
+        if len(presented) > _OBSERVERS:
+            presented = np.append(presented[presented < low], np.linspace(low, high, _OBSERVERS))
         grid = analysis_grid(self.stimulus, self.design, self.method.assumed(self.stimulus, self.design))
         return [it.fit(grid, two_intervals=self.two_intervals).flat for it in answers.given(presented)]
 
@@ -392,7 +392,7 @@ def expected(plan: ThresholdPlan) -> Expected:
     trials = min(plan.trials, _MOST_TRIALS, max(10, _MOST_WORK // (per_trial * _FEWEST)))
     simulated = plan if trials == plan.trials else plan.with_trials(trials)
     kinds = plan.kinds
-    observers = max(_FEWEST, min(OBSERVERS, _MOST_WORK // (per_trial * simulated.trials))) // len(kinds)
+    observers = max(_FEWEST, min(_OBSERVERS, _MOST_WORK // (per_trial * simulated.trials))) // len(kinds)
     together = min(PEOPLE, observers)
     observers = observers // together * together
     low, high = plan.stimulus.domain

@@ -9,6 +9,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from study_app.analysis.data.blocks import block_titles
 from study_app.analysis.data.study_tables import Study, group_counts, load_study
 from study_app.errors import StoreError
 from study_app.protocol.load import parse
@@ -259,3 +260,10 @@ def test_groups_are_counted_by_participant_in_the_order_of_their_names() -> None
     groups = pd.array([name for name in ("mid", "zeta", "alpha", "zeta", "mid", "zeta") for _ in range(2)], "string")
     study = replace(found, participants=found.participants.assign(group=groups))
     assert list(group_counts(study).items()) == [("alpha", 1), ("mid", 2), ("zeta", 3)]
+
+
+def test_the_id_follows_a_title_that_blocks_of_one_phase_share() -> None:
+    titled = {"warm": ("practice", "Stir"), "thin": ("main", "Stir"), "late": ("main", "See"), "again": ("main", "See")}
+    blocks = {name: {"phase": phase, "title": {"en": title}} for name, (phase, title) in titled.items()}
+    titles = block_titles({"study": {"languages": ["en"]}, "blocks": blocks})
+    assert titles == {"warm": "Stir", "thin": "Stir", "late": "See (late)", "again": "See (again)"}

@@ -436,7 +436,7 @@ def _answer_picture(look: _OpenLook, ground: str) -> QImage:
     return made
 
 
-class _OptionLook(Button):
+class OptionLook(Button):
     """The appearance of an answer: the whole rectangle is clickable; shape, fill and check mark show the choice.
 
     ``place`` is its index among the answers of its question, which is notified when the pointer enters and leaves.
@@ -545,11 +545,11 @@ class _OptionLook(Button):
         painter.drawText(QRectF(x_words - 1, 0, width + 2, body.height()), _CENTRE, text)
 
 
-class RadioOption(_OptionLook, QRadioButton):
+class RadioOption(OptionLook, QRadioButton):
     """One of several answers."""
 
 
-class CheckOption(_OptionLook, QCheckBox):
+class CheckOption(OptionLook, QCheckBox):
     """One of several answers that can be combined."""
 
 
@@ -563,12 +563,12 @@ class OptionsField(QuestionField):
     """
 
     several = False
-    options: Sequence[_OptionLook] = ()
+    options: Sequence[OptionLook] = ()
     pointed = -1
 
     pointed_at = Signal(int)
 
-    def set_options(self, options: Sequence[_OptionLook]) -> None:
+    def set_options(self, options: Sequence[OptionLook]) -> None:
         self.options = options
         self._group = QButtonGroup(self, exclusive=not self.several)
         # Not the methods themselves: Qt would forget the role of this widget (`give_role`).

@@ -128,7 +128,7 @@ def _statement_height(text: str, scale: float, weight: int, width_px: int) -> fl
     return QFontMetricsF(font("statement", scale=scale, weight=weight)).boundingRect(room, _WRAP_LEFT, text).height()
 
 
-class _StatementField(ScaleField):
+class StatementField(ScaleField):
     """A statement with its cells, whose labels are shown once above the columns of all statements."""
 
     def __init__(
@@ -271,7 +271,7 @@ class _Heading(QWidget):
     """
 
     def __init__(
-        self, labels: tuple[str, ...], judge: str | None, row: Callable[[], _StatementField], parent: QWidget
+        self, labels: tuple[str, ...], judge: str | None, row: Callable[[], StatementField], parent: QWidget
     ) -> None:
         super().__init__(parent)
         self._labels = (*labels, judge) if judge is not None else labels
@@ -354,7 +354,7 @@ class _Heading(QWidget):
 class QuestionnaireWidget(QuestionsPage):
     """Statements that are rated on one scale: rows, with the scale's labels above their columns."""
 
-    fields: tuple[_StatementField, ...]
+    fields: tuple[StatementField, ...]
 
     def __init__(self, page: QuestionnairePage, context: PageContext) -> None:
         super().__init__(page, context)
@@ -364,7 +364,7 @@ class QuestionnaireWidget(QuestionsPage):
             field.pointed_at.connect(self._heading.show_pointed)
 
     def make_field(self, item: ItemView) -> QuestionField:
-        return _StatementField(item, self._page.labels, self._page.cannot_judge, self._words, self)
+        return StatementField(item, self._page.labels, self._page.cannot_judge, self._words, self)
 
     def missing_words(self, numbers: Sequence[int]) -> str:
         return self._words.missing(numbers)
@@ -390,7 +390,7 @@ class QuestionnaireWidget(QuestionsPage):
         few = len(self.parts) == 1 and 2 * needed <= room
         return max(0, self.foot.height() + room - 2 * self.height() // 3) if few else 0
 
-    def _row_shown(self) -> _StatementField:
+    def _row_shown(self) -> StatementField:
         part = self.part
         return next((field for field in self.fields if field in part), self.fields[0])
 

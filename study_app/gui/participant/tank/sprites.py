@@ -15,7 +15,7 @@ SOFT = 1.5  # reach of a shadow, in radii of the ball
 
 
 @dataclass(frozen=True, slots=True)
-class _Sprite:
+class Sprite:
     """An image and the half extents of its place around a centre [logical px]."""
 
     image: QImage
@@ -28,7 +28,7 @@ class _Sprite:
         return QRectF(middle.x() - wide, middle.y() - high, 2 * wide, 2 * high)
 
 
-def _empty_sprite(half_width: float, half_height: float, ratio: float) -> tuple[_Sprite, QPainter]:
+def _empty_sprite(half_width: float, half_height: float, ratio: float) -> tuple[Sprite, QPainter]:
     """Return an empty sprite with a margin for its edge, and a painter with the origin at its centre."""
     wide, high = math.ceil(half_width * ratio) + 1, math.ceil(half_height * ratio) + 1
     image = QImage(2 * wide, 2 * high, QImage.Format.Format_ARGB32_Premultiplied)
@@ -38,7 +38,7 @@ def _empty_sprite(half_width: float, half_height: float, ratio: float) -> tuple[
     painter.setPen(Qt.PenStyle.NoPen)
     painter.translate(wide, high)
     painter.scale(ratio, ratio)
-    return _Sprite(image, wide / ratio, high / ratio), painter
+    return Sprite(image, wide / ratio, high / ratio), painter
 
 
 def _ink(colour: str, alpha: float = 1.0) -> QColor:
@@ -48,7 +48,7 @@ def _ink(colour: str, alpha: float = 1.0) -> QColor:
 
 
 @lru_cache(maxsize=256)
-def ball_sprite(radius: float, ratio: float, haze: float) -> _Sprite:
+def ball_sprite(radius: float, ratio: float, haze: float) -> Sprite:
     """Return the proxy of ``radius`` [logical px]; ``haze`` in 0 … 1 grows with the water in front of it."""
     sprite, painter = _empty_sprite(radius, radius, ratio)
     painter.scale(radius, radius)
@@ -98,7 +98,7 @@ def _paint_rim(painter: QPainter) -> None:
 
 
 @lru_cache(maxsize=256)
-def shadow_sprite(radius: float, ratio: float, flat: float) -> _Sprite:
+def shadow_sprite(radius: float, ratio: float, flat: float) -> Sprite:
     """Return the shadow of a ball of ``radius`` [logical px]; ``flat`` is its ratio of height to width."""
     reach = SOFT * radius
     sprite, painter = _empty_sprite(reach, reach * flat, ratio)
@@ -113,7 +113,7 @@ def shadow_sprite(radius: float, ratio: float, flat: float) -> _Sprite:
 
 
 @lru_cache(maxsize=16)
-def ring_sprite(radius: float, ratio: float, stroke: float) -> _Sprite:
+def ring_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
     """Return the lit target without its dwell arc: light, track and four ticks."""
     reach = GLOW * radius
     sprite, painter = _empty_sprite(reach, reach, ratio)
@@ -137,7 +137,7 @@ def ring_sprite(radius: float, ratio: float, stroke: float) -> _Sprite:
 
 
 @lru_cache(maxsize=32)
-def diamond_sprite(radius: float, ratio: float, stroke: float) -> _Sprite:
+def diamond_sprite(radius: float, ratio: float, stroke: float) -> Sprite:
     """Return a dim target: a dashed diamond of half diagonal ``radius`` [logical px]."""
     reach = radius + 2 * stroke
     sprite, painter = _empty_sprite(reach, reach, ratio)
@@ -161,7 +161,7 @@ def dashed_pen(ink: QColor, stroke: float, side: float, count: int) -> QPen:
 
 
 def draw_sprite(
-    painter: QPainter, sprite: _Sprite, middle: QPointF, *, opacity: float = 1.0, grown: float = 1.0
+    painter: QPainter, sprite: Sprite, middle: QPointF, *, opacity: float = 1.0, grown: float = 1.0
 ) -> None:
     """Draw a sprite around a sub-pixel position, ``grown`` times its size."""
     painter.setOpacity(opacity)
