@@ -1,6 +1,7 @@
 """Measured numbers of the documentation have a day; those older than the code are found by the dates of both."""
 
 import os
+import re
 import subprocess
 from datetime import date
 from pathlib import Path
@@ -60,3 +61,18 @@ def test_sections_older_than_their_code_and_without_a_date_are_told_apart(tmp_pa
 
 def test_every_measured_number_of_the_pages_has_a_day() -> None:
     assert not [row[:3] for row in measured(ROOT) if row.day is None]
+
+
+def test_the_readme_sums_up_the_counts_of_the_page_on_stability() -> None:
+    page = (ROOT / "docs/stability.md").read_text("utf-8")
+    rows = re.findall(r"^\| \d.* cases .*$", page, re.M)
+    without, hard, others = (
+        [int(number.replace(",", "")) for number in re.findall(r"\d+(?:,\d{3})*", row)] for row in rows
+    )
+    seeds = len(others) // 3
+    cases, unstable, noisy = (sum(others[first : first + seeds]) for first in (0, seeds, 2 * seeds))
+    assert sum(hard[1:]) == 0
+    for name in ("README.md", "docs/begin.md"):
+        text = " ".join((ROOT / name).read_text("utf-8").split())
+        assert f"{sum(without[1 : 1 + seeds]):,} of {6000 * seeds:,} hard cases" in text
+        assert f"Of {cases:,} cases of other kinds, {unstable} were unstable and {noisy} were noisy" in text
