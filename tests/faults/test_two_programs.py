@@ -73,7 +73,9 @@ def test_two_programs_leave_a_sound_study(
     pair: tuple[str, str], tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
     study = once(tmp_path_factory, "two-programs", rehearsed) / "demo"
-    forking = multiprocessing.get_context("fork")
+    # Forks of a process without threads: a fork of a test's worker inherits locks that other tests' threads held.
+    forking = multiprocessing.get_context("forkserver")
+    forking.set_forkserver_preload([__name__])
     for number in range(ROUNDS):
         folder = tmp_path / str(number)
         shutil.copytree(study, folder / "study")
