@@ -20,9 +20,10 @@ from study_app.analysis.findings.finding import FOUND, HOLM, TESTS, BlockAnswers
 from study_app.analysis.html_page import bullets, heading, paragraph, table_of
 from study_app.analysis.levels.answers import Settings
 from study_app.analysis.levels.evaluate import READ
+from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic
-from study_app.analysis.levels.thresholds import Exponents, ThresholdEstimate, Thresholds, thresholds_compared
+from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, ContrastSide, LevelsResult, Results

@@ -11,9 +11,10 @@ from study_app.analysis.data.blocks import PlacedScore, QuestionPlace
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import Column, Mean, Panel, mean_of, people_picture
 from study_app.analysis.levels.answers import Answers, Settings
+from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic, level_words
-from study_app.analysis.levels.thresholds import Exponents, Thresholds
+from study_app.analysis.levels.thresholds import Thresholds
 from study_app.analysis.page_layout import Picture, sample_words, try_figures
 from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results

@@ -12,6 +12,7 @@ import pandas as pd
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.levels.columns import RESULTS
+from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.statistic import (
     INTERVAL_2,
     OF_WHOM,
@@ -22,7 +23,7 @@ from study_app.analysis.levels.statistic import (
     mean_over,
     unit,
 )
-from study_app.analysis.levels.thresholds import Exponents, Thresholds
+from study_app.analysis.levels.thresholds import Thresholds
 from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import listed, number

@@ -27,7 +27,8 @@ from scipy.stats import t as student
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import Array
 from study_app.analysis.data.study_tables import load_study
-from study_app.analysis.levels.thresholds import estimate_slope, estimated_exponents, jnd_slope, thresholds
+from study_app.analysis.levels.exponents import estimate_slope, estimated_exponents, jnd_slope
+from study_app.analysis.levels.thresholds import thresholds
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.evidence.table import Evidence, Table, run

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from study_app.analysis.levels.thresholds import ThresholdEstimate, estimated_exponents, weber_exponents
+from study_app.analysis.levels.exponents import estimated_exponents, weber_exponents
+from study_app.analysis.levels.thresholds import ThresholdEstimate
 from tests.analysis.levels.level_studies import block
 
 LEVELS = (0.5, 2.0, 8.0)

@@ -13,8 +13,9 @@ from study_app.analysis.data.blocks import LevelBlock, OwnDynamics
 from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.levels.answers import Answers, LevelAnswers, SettingEstimate
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
+from study_app.analysis.levels.exponents import ExponentEstimate
 from study_app.analysis.levels.sensitivities import SensitivityEstimate
-from study_app.analysis.levels.thresholds import ExponentEstimate, ThresholdEstimate, Thresholds
+from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds
 from study_app.analysis.results import Failures, GroupAnswers, LevelsResult
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import Rated, default_design
