@@ -50,7 +50,11 @@ from study_app.gui.application import application_here
 from study_app.gui.theme.theme import LIGHT
 from study_app.session.start import NewSession
 application_here()
-live = LiveSession(NewSession("demo", "P001", 1, 1, "", "en", "scripted", True, None, Path("/home/session")), LIGHT)
+chosen = NewSession(
+    source="demo", participant="P001", session=1, seed=1, operator="", language="en", device="scripted", windowed=True,
+    screen=None, results=Path("/home/session"),
+)
+live = LiveSession(chosen, LIGHT)
 loop = QEventLoop()
 live.over.connect(loop.quit)
 timer = QTimer(interval=20)

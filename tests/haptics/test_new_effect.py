@@ -49,7 +49,7 @@ EFFECT = Effect(
     default=Spring(),
     parameters=PARAMETERS,
     fill=_fill,
-    controls=(Parameter("spring.stiffness_npm", "Stiffness", "N/m"),),
+    controls=(Parameter(name="spring.stiffness_npm", label="Stiffness", unit="N/m"),),
 )
 '''
 
@@ -71,19 +71,18 @@ def spring_force(parameters, liquid, local, state):
 USES = """
 import sys
 import study_app
-from study_app.lab.identify.parameters import find
+from study_app.lab.identify.parameters import find_parameters
 from study_app.haptics.model.gate import describe_gate
 from study_app.haptics.model.overrides import override_all
-from study_app.haptics.model.motion import path
+from study_app.haptics.model.motion import programmed_motion
 from study_app.haptics.runtime.offline import simulate
-from study_app.lab.parameters import changed
-from study_app.lab.parameters import sections
+from study_app.lab.parameters import sections, with_parameter
 from study_app.protocol.load import load_scene
 
 print(study_app.__file__)
 scene = load_scene(sys.argv[1], "thick")
 stiffer = override_all(scene, {"stiffness_npm": 20})
-motion = path("line", rate_hz=scene.rate_hz)
+motion = programmed_motion("line", rate_hz=scene.rate_hz)
 plain = simulate(override_all(scene, {"effects": "drag"}), motion)
 for one, stiffness_npm in ((scene, 5.0), (stiffer, 20.0)):
     table = simulate(one, motion)
@@ -91,8 +90,8 @@ for one, stiffness_npm in ((scene, 5.0), (stiffer, 20.0)):
     assert table.x_m.any()
 assert any("spring" in line and "named" in line for line in describe_gate(scene))
 assert any(section.title == "Spring" for section in sections(scene))
-assert changed(scene, "effects.spring", "off").liquids[0].effects == ("drag",)
-assert find(scene, "thick", ["stiffness_npm"])[0].most == 100
+assert with_parameter(scene, "effects.spring", "off").liquids[0].effects == ("drag",)
+assert find_parameters(scene, "thick", ["stiffness_npm"])[0].most == 100
 print("used")
 """
 
@@ -119,7 +118,7 @@ def copy(tmp_path: Path) -> Path:
         "from study_app.haptics.kernels.effects.spring import spring_force",
     )
     line = "    if liquid.effects & effects.spring.BIT:\n        spring_force(parameters, liquid, local, state)"
-    tick.write_text(edited(text, "    if liquid.effects & effects.added_mass.BIT:", line), "utf-8")
+    tick.write_text(edited(text, "    if liquid.effects & effects.history.BIT:", line), "utf-8")
     study = (ROOT / "protocols" / "demo.toml").read_text("utf-8")
     study = study.replace(
         'density_kg_m3 = 1400\neffects = ["drag"]', 'density_kg_m3 = 1400\neffects = ["drag", "spring"]'

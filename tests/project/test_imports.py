@@ -1,13 +1,18 @@
 """Modules import one another without a cycle, those for type annotations included, and no more than they need."""
 
 import ast
+import contextlib
+import inspect
 import os
 import pkgutil
 import re
 import subprocess
 import sys
+import textwrap
+from collections.abc import Iterator
 from graphlib import TopologicalSorter
 from pathlib import Path
+from typing import Any
 
 import grimp
 import pytest
@@ -54,6 +59,42 @@ def test_benchmarks_import_names_that_exist() -> None:
                 and not (module / f"{each.name}.py").is_file()
             ]
     assert missing == []
+
+
+def _programs_in_strings(path: Path) -> Iterator[ast.Module]:
+    """Yield the programs that a file starts from a string and that import this package."""
+    for node in ast.walk(ast.parse(path.read_bytes())):
+        text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
+        if "from study_app" in text and "\n" in text:
+            with contextlib.suppress(SyntaxError):
+                yield ast.parse(textwrap.dedent(text))
+
+
+def test_programs_in_strings_call_what_exists() -> None:
+    """Nothing else notices a changed signature there before the program runs."""
+    faults, calls = [], 0
+    for path in (path for folder in ("packaging", "tests", "tools") for path in (ROOT.parent / folder).rglob("*.py")):
+        for program in _programs_in_strings(path):
+            names: dict[str, Any] = {}
+            for node in ast.walk(program):
+                if isinstance(node, ast.ImportFrom) and str(node.module).startswith("study_app"):
+                    for alias in node.names:
+                        try:
+                            names[alias.asname or alias.name] = pkgutil.resolve_name(f"{node.module}.{alias.name}")
+                        except AttributeError as error:
+                            faults.append(f"{path.name}: {error}")
+            for call in (node for node in ast.walk(program) if isinstance(node, ast.Call)):
+                function = names.get(getattr(call.func, "id", ""))
+                given = {keyword.arg: None for keyword in call.keywords}
+                if function is None or None in given or any(isinstance(node, ast.Starred) for node in call.args):
+                    continue
+                calls += 1
+                try:
+                    inspect.signature(function).bind(*call.args, **given)
+                except TypeError as error:
+                    faults.append(f"{path.name}: {ast.unparse(call)}: {error}")
+    assert faults == []
+    assert calls > 20
 
 
 def test_no_module_imports_itself_through_others() -> None:

@@ -29,7 +29,10 @@ from study_app.session.start import NewSession
 
 start.MEASURED_S = 0.1
 application_here()
-chosen = NewSession("demo", "P001", 1, 1, "", "en", "scripted", False, None, Path(sys.argv[1]))
+chosen = NewSession(
+    source="demo", participant="P001", session=1, seed=1, operator="", language="en", device="scripted", windowed=False,
+    screen=None, results=Path(sys.argv[1]),
+)
 live, loop, found = LiveSession(chosen, LIGHT), QEventLoop(), []
 live.settings = live.settings.model_copy(update={"screen": "left", "screen_number": 1})
 

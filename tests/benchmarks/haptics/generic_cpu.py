@@ -18,7 +18,7 @@ PROGRAM = """
 import hashlib, json, sys
 from study_app.evidence.cost import TickTimer
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.motion import path
+from study_app.haptics.model.motion import programmed_motion
 from study_app.haptics.runtime.offline import simulate
 from study_app.protocol.load import load_scenes
 
@@ -26,7 +26,7 @@ benches, forces = {}, {}
 for name in json.loads(sys.argv[1]):
     for title, scene in load_scenes(name).items():
         scene = resolve(scene)
-        motion = simulate(scene, path("stop", rate_hz=scene.rate_hz))
+        motion = simulate(scene, programmed_motion("stop", rate_hz=scene.rate_hz))
         key = f"{name}: {title}"
         force = b"".join(axis.tobytes() for axis in (motion.fx_n, motion.fy_n, motion.fz_n))
         forces[key] = hashlib.sha256(force).hexdigest()

@@ -313,14 +313,14 @@ def test_lines_of_the_list_that_cannot_be_read_are_left_out(tmp_path: Path) -> N
 SAVING = """
 import sys
 from pathlib import Path
-from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, save
+from study_app.store.study_versions import ChangedOutsideError, content_hash, save_study
 from study_app.errors import StoreError
 file, name, saved = Path(sys.argv[1]), sys.argv[2], 0
 while saved < 20:
     before = file.read_bytes()
     text = before.decode() + f"{name}{saved} = 1\\n"
     try:
-        save(file, text, content_hash(before))
+        save_study(file, text, content_hash(before))
     except ChangedOutsideError:
         continue
     except StoreError:
