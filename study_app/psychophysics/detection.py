@@ -38,7 +38,8 @@ class Sensitivity:
     Attributes
     ----------
     d_prime : float
-        Under ``model``; if computed from the share correct, 0 at or below chance.
+        Under ``model``. Below chance it is negative: minus the d′ of a share that is as far above chance. Without this,
+        the mean over observers who guess would be above 0.
     criterion : float or None
         c of yes–no and of two-interval forced choice, k of the differencing model of same–different; else None.
     variance : float or None
@@ -76,8 +77,10 @@ def proportion_correct(task: str, d_prime: float) -> float:
 
 @lru_cache(maxsize=4096)  # 50 ms for oddity
 def d_prime_at(task: str, proportion: float) -> float:
-    """Return d′ at a P(correct), by bisection to 1e-10; 0 at or below chance."""
-    return _inverse(PROPORTIONS[task], proportion)
+    """Return d′ at a P(correct), by bisection to 1e-10; below chance, minus the d′ as far above it."""
+    chance = PROPORTIONS[task](0.0)
+    distance = _inverse(PROPORTIONS[task], chance + abs(proportion - chance))
+    return distance if proportion >= chance else 0.0 - distance
 
 
 def forced_choice(d_prime: float, intervals: int) -> float:
@@ -150,8 +153,9 @@ def same_different(hits: float, differents: float, false_alarms: float, sames: f
     if not differents or not sames:
         return None
     high, low = rate(hits, differents), rate(false_alarms, sames)
-    k = -math.sqrt(2.0) * NORMAL.inv_cdf(low / 2.0)
-    differencing = _inverse(partial(different_rate, k=k), high)
+    k, k_of_fewer = (-math.sqrt(2.0) * NORMAL.inv_cdf(share / 2.0) for share in (low, min(low, high)))
+    distance = _inverse(partial(different_rate, k=k_of_fewer), max(low, high))
+    differencing = distance if high >= low else 0.0 - distance
     unbiased = NORMAL.cdf(0.5 * (NORMAL.inv_cdf(high) - NORMAL.inv_cdf(low)))
     independent = d_prime_at("samedifferent independent", unbiased)
     if model == "differencing":

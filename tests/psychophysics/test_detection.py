@@ -40,11 +40,21 @@ def test_proportion_correct_is_the_worked_one_at_d_prime_1_and_2_and_chance_at_0
 
 
 @pytest.mark.parametrize("task", PROPORTIONS)
-def test_d_prime_inverts_the_proportion_and_is_0_at_or_below_chance(task):
-    for planted in (0.05, 0.7, 1.9, 4.2):
-        assert d_prime_at(task, proportion_correct(task, planted)) == pytest.approx(planted, abs=1e-7)
-    assert d_prime_at(task, CHANCE.get(task, 0.5)) == pytest.approx(0, abs=1e-6)
-    assert d_prime_at(task, 0.1) == 0
+def test_d_prime_inverts_the_proportion_and_is_negative_below_chance(task):
+    chance = CHANCE.get(task, 0.5)
+    for planted in (0.05, 0.4, 0.7):
+        proportion = proportion_correct(task, planted)
+        assert d_prime_at(task, proportion) == pytest.approx(planted, abs=1e-7)
+        assert d_prime_at(task, 2 * chance - proportion) == pytest.approx(-planted, abs=1e-7)
+    assert d_prime_at(task, proportion_correct(task, 4.2)) == pytest.approx(4.2, abs=1e-7)
+    assert d_prime_at(task, chance) == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("task", ["abx differencing", "oddity", "samedifferent independent", "4ifc"])
+def test_the_mean_d_prime_of_observers_who_guess_is_0(task):
+    correct = np.random.default_rng(len(task)).binomial(24, CHANCE.get(task, 0.5), 4000)
+    guessed = np.array([d_prime_at(task, share) for share in correct / 24])
+    assert abs(guessed.mean()) < 4 * guessed.std() / math.sqrt(len(guessed))
 
 
 @pytest.mark.parametrize("task", ["3ifc", "4ifc", "abx differencing", "oddity", "samedifferent differencing"])
@@ -105,7 +115,10 @@ def test_same_different_of_an_unbiased_independent_observer():
     found = same_different(n * share, n, n * (1 - share), n, "independent")
     assert found.d_prime == pytest.approx(d_prime, abs=1e-5)
     assert found.criterion is None
-    assert same_different(3, 20, 12, 20, "independent").d_prime == 0
+    for model in ("independent", "differencing"):
+        more, fewer = same_different(12, 20, 3, 20, model), same_different(3, 20, 12, 20, model)
+        assert fewer.d_prime == pytest.approx(-more.d_prime)
+        assert more.d_prime > 0.5
     assert same_different(20, 20, 0, 20, "differencing").d_prime < 8
     assert same_different(20, 20, 0, 0, "differencing") is None
 

@@ -197,7 +197,8 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "d_prime",
         "number",
-        "Sensitivity across all presented levels; n/a if answers are neither correct nor incorrect.",
+        "Sensitivity across all presented levels, negative below chance; n/a if answers are neither correct nor "
+        "incorrect.",
     ),
     optional(
         "d_prime_model",

@@ -48,7 +48,9 @@ _BIASES: Final = {
         " d′ is calculated from the proportion correct, assuming that participants do not have a response bias. A "
         "bias, which would show as unequal proportions of the possible answers, causes d′ to be underestimated. The "
         "confidence interval for each participant's d′ is derived from the Clopper–Pearson interval for the proportion "
-        "correct; it cannot be calculated if all answers are correct.",
+        "correct; it cannot be calculated if all or no answers are correct. Below chance, d′ is negative, with the "
+        "size of the d′ for a proportion equally far above chance, so the mean is 0 if participants guess. A small "
+        "mean d′ is underestimated if there are few trials.",
     ),
 }
 
@@ -158,9 +160,9 @@ def _of_choices(
 def _with_ends(
     estimate: SensitivityEstimate, design: Design, counts: Mapping[tuple[int, str], int], model: Model | None
 ) -> SensitivityEstimate:
-    """Return an estimate with the d′ interval from that of the share correct; unchanged if all are correct."""
+    """Return an estimate with the d′ interval from that of the share correct; unchanged if all or none are correct."""
     correct, n = design.correct_of(counts)
-    if correct == n:
+    if correct in (0, n):
         return estimate
     share, task = clopper_pearson(correct, n), f"{design.kind}{f' {model}' if model else ''}"
     return replace(estimate, low=d_prime_at(task, share.low), high=d_prime_at(task, share.high))

@@ -130,11 +130,11 @@ sensitivity <- function(row) {
   d <- (qnorm(high) - qnorm(low)) / (if (design == "first") sqrt(2) else 1)
   if (design == "different" && row$d_prime_model %in% "differencing") {
     criterion <- -sqrt(2) * qnorm(low / 2)
-    share <- function(d) pnorm((d - criterion) / sqrt(2)) + pnorm((-d - criterion) / sqrt(2)) - high
-    d <- if (share(0) >= 0) 0 else uniroot(share, c(0, 20), tol = 1e-12)$root
+    k <- -sqrt(2) * qnorm(min(low, high) / 2)
+    share <- function(d) pnorm((d - k) / sqrt(2)) + pnorm((-d - k) / sqrt(2)) - max(low, high)
+    d <- if (high == low) 0 else sign(high - low) * uniroot(share, c(0, 20), tol = 1e-12)$root
   } else if (design == "different") {
-    p <- pnorm(d / 2)
-    d <- if (p <= 0.5) 0 else 2 * qnorm(0.5 + 0.5 * sqrt(2 * p - 1))
+    d <- sign(d) * 2 * qnorm(0.5 + 0.5 * sqrt(2 * pnorm(abs(d) / 2) - 1))
   }
   same(paste(about(row), "d'"), row$d_prime, d)
   same(paste(about(row), "criterion"), row$criterion, criterion)
