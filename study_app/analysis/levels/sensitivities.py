@@ -181,6 +181,11 @@ def _measured(estimate: SensitivityEstimate, sensitivity: Sensitivity) -> Sensit
     )
 
 
+def _is_perfect(estimate: SensitivityEstimate) -> bool:
+    """Return whether all answers were correct: d′ from the share correct then has no interval."""
+    return estimate.d_prime is not None and estimate.d_prime > 0 and estimate.high is None
+
+
 def _where(estimate: SensitivityEstimate) -> str:
     return cell_text(estimate.comparison or (estimate.level if estimate.standard is None else estimate.standard))
 
@@ -250,6 +255,12 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
         )
 
     def limits(self) -> Iterator[str]:
+        if self.found.design in _FROM_SHARE_CORRECT and (perfect := list(filter(_is_perfect, self.own(self.found)))):
+            people = listed([str(estimate.participant) for estimate in perfect])
+            yield (
+                f"{self.found.title}: all answers of {people} were correct, so their d′ is a lower limit, which is "
+                "determined by the number of trials."
+            )
         if self.found.design != "2ifc" or self.found.vary is None:
             return
         if biased := preferences(self.own(self.found)):

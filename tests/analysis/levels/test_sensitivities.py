@@ -116,6 +116,26 @@ def test_designs_without_a_criterion_have_d_prime_from_the_share_correct(design:
     assert [proportion_correct(task, end) for end in (one.low, one.high)] == pytest.approx(list(ends))
 
 
+def test_a_d_prime_from_correct_answers_alone_is_called_a_lower_limit() -> None:
+    kind, found = default_design("abx"), []
+    for person, wrong_trials in (("P001", ()), ("P002", (3,)), ("P003", range(12))):
+        for number in range(12):
+            arrangement = number % len(kind.arrangements)
+            right = str(kind.correct(arrangement))
+            wrong = next(answer for answer in kind.answers if answer != right)
+            letters = arrangement_text(kind, arrangement)
+            answer = wrong if number in wrong_trials else right
+            found.append((person, "b", 8.0, "8/1", 0.2, letters, answer, None, True))
+    _, *people = sensitivities(block("abx", settings=ONE), pd.DataFrame(found, columns=NAMES))
+    perfect, nearly, reversed_ = people
+    assert perfect.d_prime == pytest.approx(-reversed_.d_prime)
+    assert (perfect.low, reversed_.high) == (None, None)
+    assert nearly.low < nearly.d_prime < nearly.high
+    of_block = SimpleNamespace(title="Pairs", design="abx", vary="damping", statistics={Sensitivities.key: people})
+    (limit,) = Sensitivities(cast("Any", of_block)).limits()
+    assert limit.startswith("Pairs: all answers of P001 were correct")
+
+
 def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is() -> None:
     one = SensitivityEstimate(participant="P1", n=40, shares={"first": 0.73}, d_prime=0.0, model="independent")
     of_block = SimpleNamespace(
