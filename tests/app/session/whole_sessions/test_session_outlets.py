@@ -54,7 +54,7 @@ def test_events_are_bytes_and_the_receipt_has_their_table(short_demo, results, p
     assert outlets["Serial port"]["codes"] == dict(CODES)
     said = "\n".join(lines)
     assert "warning  LSL markers     no listener" in said
-    assert "ok       LSL samples     off; in a double-blind study" in said
+    assert "ok       LSL samples     off; because the study is double-blind" in said
     assert "ok       Serial port     ready" in said
     assert not [one for one in threading.enumerate() if one.name.startswith("outlet")]
 

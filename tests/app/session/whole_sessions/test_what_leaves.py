@@ -60,14 +60,15 @@ SETTINGS = {f"zq_{name}" for name in MachineSettings.model_fields} | {"zq_user",
 TYPED = {f"zq_{name}" for name in ("person", "note", "answer", "why", "by", "again", "opened", "withdrawn", "preset")}
 """Needles of the study's texts, of this machine's settings, and of what people typed beside them."""
 SHARED = {f"zq_{name}" for name in ("note", "answer", "why", "by", "opened", "title", "author", "question", "short")}
+REPORTED = SHARED | {"zq_again", "zq_withdrawn"}
 LEAVES = {
     "support": {"zq_screen", "zq_device", "zq_triggers"},
     "log": set[str](),
     "markers": set[str](),
     "receipt": STUDY | {"zq_person"},
     "export": SHARED,
-    "psych-ds": SHARED | STUDY,
-    "report": SHARED,
+    "psych-ds": REPORTED | STUDY,
+    "report": REPORTED | {"zq_intro"},
     "preregistration": {"zq_title", "zq_page", "zq_question"},
     "list": set[str](),
 }
