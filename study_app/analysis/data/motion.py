@@ -6,8 +6,9 @@ Measures of trials stand in the trials' tables; those of reaches come out of the
 first reach of a trial begins wherever the hand was and is left out.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -203,8 +204,7 @@ class Performance:
 
     def medians(self, block: str) -> pd.DataFrame:
         """Return each participant's median of every reaching measure, by (code, participant)."""
-        rows = [{**asdict(trial), **asdict(reach)} for trial in self.reached for reach in trial.found]
-        return _medians(pd.DataFrame(rows, columns=["participant", "block", "code", *OF_REACHES]), block, OF_REACHES)
+        return _medians(_reach_table(self.reached), block, OF_REACHES)
 
     def recorded_in(self, block: str) -> bool:
         """Return whether a block has any reaches."""
@@ -233,10 +233,7 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
     )
     moved = [quartile for block in study.blocks for quartile in _quartiles(block, of_trials, OF_TRIALS)]
     if found:
-        of_reaches = pd.DataFrame(
-            [{**asdict(trial), **asdict(reach)} for trial in found for reach in trial.found],
-            columns=["participant", "block", "code", *OF_REACHES],
-        )
+        of_reaches = _reach_table(found)
         moved += [
             quartile
             for block in study.blocks
@@ -253,6 +250,13 @@ def performance(study: Study, each: Callable[[int, int], object] = lambda _done,
         invalid=int((~rows["valid"].fillna(value=True)).sum()),
         unread=tuple(f"{count} × {reason}" for reason, count in unread.items()),
     )
+
+
+def _reach_table(reached: Iterable[Reached]) -> pd.DataFrame:
+    """Return one row per reach, with the trial's participant, block and code."""
+    of_trial, of_reach = attrgetter("participant", "block", "code"), attrgetter(*OF_REACHES)
+    rows = [(*of_trial(trial), *of_reach(reach)) for trial in reached for reach in trial.found]
+    return pd.DataFrame(rows, columns=["participant", "block", "code", *OF_REACHES])
 
 
 def _targets(protocol: Mapping[str, Any], block: Block) -> Targets | None:
@@ -274,11 +278,9 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
         return "the recording is sealed (liquid-study unblind opens it)"
     except StoreError:
         return "the recording is damaged (liquid-study verify shows which one)"
-    if len(samples):
-        samples = samples[(samples["scene"] == samples["scene"][-1]) & (samples["limiters"] & LIMITER_GLITCH == 0)]
-    if len(samples):
-        end_ns = samples["time_ns"][0] + round(float(row["duration_s"]) * 1e9)
-        samples = samples[samples["time_ns"] <= end_ns]
+    kept = (samples["scene"] == samples["scene"][-1:]) & (samples["limiters"] & LIMITER_GLITCH == 0)
+    times_ns, positions_m = samples["time_ns"][kept], samples["position_m"][kept]
+    is_during = times_ns <= times_ns[:1] + round(float(row["duration_s"]) * 1e9)
     return Reached(
         participant=str(row["participant"]),
         session=int(row["session"]),
@@ -286,7 +288,7 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
         block=str(row["block"]),
         code=str(row["code"]),
         valid=None if pd.isna(row["valid"]) else bool(row["valid"]),
-        found=reaches(samples["time_ns"], samples["position_m"], targets)[1:],
+        found=reaches(times_ns[is_during], positions_m[is_during], targets)[1:],
     )
 
 
