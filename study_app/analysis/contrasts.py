@@ -10,6 +10,7 @@ over the hypotheses with a bound.
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ import numpy as np
 from study_app import number_text
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.findings.finding import FOUND, HOLM, TESTS, BlockAnswers, verdict
-from study_app.analysis.html_page import bullets, heading, paragraph, table_of
+from study_app.analysis.html_page import bullets, ends_of, heading, paragraph, table_of
 from study_app.analysis.levels.answers import Settings
 from study_app.analysis.levels.evaluate import READ
 from study_app.analysis.levels.exponents import Exponents
@@ -62,12 +63,16 @@ _WEIGHTED: Final = (
 _SIZES: Final = (
     "Standardised effects give all participants equal weight: d_z is the mean within-participant difference divided "
     "by the standard deviation of the differences, and g is Hedges' g for two groups. Their 95 % confidence intervals "
-    "are calculated from the noncentral t distribution. Bayes factors are two-sided JZS Bayes factors (Rouder et al., "
-    "2009) that compare the hypothesis of a difference with the null hypothesis, using a Cauchy prior with scale "
-    f"{number(PRIOR_SCALE, 3)}. Between groups, Cliff's delta is the probability that an answer in the first group is "
-    "larger than one in the second, minus the probability that it is smaller. Within participants, it is the "
-    "proportion of participants whose answer is larger in the first condition, minus the proportion whose answer is "
-    "smaller."
+    "are calculated from the noncentral t distribution."
+)
+_DELTA: Final = (
+    " Between groups, Cliff's delta is the probability that an answer in the first group is larger than one in the "
+    "second, minus the probability that it is smaller. Within participants, it is the proportion of participants whose "
+    "answer is larger in the first condition, minus the proportion whose answer is smaller."
+)
+_BAYES: Final = (
+    "Bayes factors are two-sided JZS Bayes factors (Rouder et al., 2009) that compare the hypothesis of a difference "
+    f"with the null hypothesis, using a Cauchy prior with scale {number(PRIOR_SCALE, 3)}."
 )
 _MOST_NAMED: Final = 20
 
@@ -327,7 +332,7 @@ def _tested(
     names = _side_names(study, contrast)
     is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction
     standardised = _standardised(compared, is_ordinal=is_ordinal)
-    effect = ends = p_equal = p = p_bootstrap = p_skewed = statistic = None
+    effect = ends = p_equal = p = p_bootstrap = p_skewed = statistic = error = None
     method, why = "none", _TOO_FEW if means is None else _ALIKE
     if means is not None:
         mean, (low, high) = float(means.mean[0]), (float(end[0]) for end in means.interval(0.95))
@@ -338,7 +343,7 @@ def _tested(
         if means.error[0] > SAME:
             ps = p_differs(means, SIDES[contrast.expected])
             p, p_bootstrap, p_skewed = float(ps.t[0]), float(ps.bootstrap[0]), float(ps.skewed[0])
-            statistic = float(means.t()[0])
+            statistic, error = float(means.t()[0]), float(means.error[0])
             low, high = (math.exp(end) if ratio else end for end in (low, high))
             ends = Interval(low=low, high=high, level=0.95, method=f"t({means.freedom})")
             sides = "two-sided" if contrast.expected is None else f"one-sided ({contrast.expected})"
@@ -383,6 +388,8 @@ def _tested(
         bayes_factor=standardised.bayes_factor,
         within_names=_within_names(study, contrast),
         measure_name=_measure_name(study, contrast),
+        standard_error=error,
+        freedom=None if error is None or means is None else means.freedom,
     )
 
 
@@ -411,9 +418,11 @@ def _within_names(study: Study, contrast: Contrast) -> tuple[str, str] | None:
 def _measure_name(study: Study, contrast: Contrast) -> str:
     """Return the measure with the short text of its statement or question; "" if it has none."""
     if contrast.form is not None:
-        asked = (one for one in study.others.questions if (one.where.id, one.id) == (contrast.form, contrast.measure))
-        question = next(asked, None)
-        return "" if question is None else f"“{question.short}” ({question.where.title})"
+        where, measure = contrast.form, contrast.measure
+        scores = (f"{one.title} score" for one in study.others.scores if (one.where.id, one.name) == (where, measure))
+        questions = (one for one in study.others.questions if (one.where.id, one.id) == (where, measure))
+        named = chain(scores, (f"“{question.short}” ({question.where.title})" for question in questions))
+        return next(named, "")
     items = (item for block in study.blocks if block.id in contrast.blocks for item in block.items)
     item = next((item for item in items if item.id == contrast.measure), None)
     return "" if item is None else f"agreement with “{item.short}”"
@@ -547,13 +556,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
     contrasts = results.contrasts
     if not contrasts:
         return
-    for place, contrast in enumerate(contrasts, start=1):
-        test = t_test_name(contrast.contrast, ratio=contrast.ratio)
-        sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
-        label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
-        yield f"{label} ({contrast.hypothesis}) was tested with a {sides} {test}."
-    if any(contrast.contrast.groups for contrast in contrasts):
-        yield "Comparisons between groups used the degrees of freedom of the smaller group (Hsu 1938)."
+    yield from _tests_used(contrasts)
     yield (
         "Each participant contributed one value to each comparison. In addition to the t test, we used a bootstrap "
         "that adds a participant as extreme as the most extreme one (Gaffke 2005) and a t test corrected for skewness "
@@ -562,7 +565,8 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
     if any(contrast.standardised is not None for contrast in contrasts):
-        yield _SIZES
+        yield _sizes_words(contrasts)
+        yield _BAYES
     if bounds := [contrast for contrast in contrasts if contrast.contrast.bound is not None]:
         adjusted = f", Holm-adjusted across {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
@@ -574,6 +578,17 @@ def contrast_methods(results: Results) -> Iterator[str]:
         f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out
     }:
         yield f"Some participants were excluded from a test because a value was missing ({'; '.join(gone)})."
+
+
+def _tests_used(contrasts: Sequence[ContrastResult]) -> Iterator[str]:
+    """Yield the test of each hypothesis."""
+    for place, contrast in enumerate(contrasts, start=1):
+        test = t_test_name(contrast.contrast, ratio=contrast.ratio)
+        sides = "two-sided" if contrast.contrast.expected is None else "one-sided"
+        label = f"Hypothesis {place}" if len(contrasts) > 1 else "The hypothesis"
+        yield f"{label} ({contrast.hypothesis}) was tested with a {sides} {test}."
+    if any(contrast.contrast.groups for contrast in contrasts):
+        yield "Comparisons between groups used the degrees of freedom of the smaller group (Hsu 1938)."
 
 
 def _left_out_words(contrast: ContrastResult) -> str:
@@ -589,50 +604,114 @@ def _left_out_words(contrast: ContrastResult) -> str:
 
 def contrast_section(results: Results) -> Iterator[str]:
     """Yield the report's section on hypotheses; nothing if there are none."""
-    if not results.contrasts:
+    contrasts = results.contrasts
+    if not contrasts:
         return
+    bounds = any(contrast.contrast.bound is not None for contrast in contrasts)
+    kinds = sorted({"ratio" if contrast.ratio else "difference" for contrast in contrasts})
     yield heading(2, "Hypotheses")
     yield table_of(
-        results.contrasts,
-        ("Hypothesis", question),
-        ("n", lambda result: str(result.n)),
-        ("effect", lambda result: f"{result.effect_name} {number(result.effect)}"),
-        ("95 % interval", lambda result: interval(result.interval)),
-        ("standardised", lambda result: _size_words(result.standardised)),
-        ("ordinal", lambda result: _size_words(result.ordinal))
-        if any(contrast.ordinal for contrast in results.contrasts)
-        else None,
-        ("SD", _sd_words),
-        ("Bayes factor BF₁₀", lambda row: "–" if row.bayes_factor is None else significant(row.bayes_factor)),
-        ("largest p", lambda result: p_value(result.largest_p)),
-        ("adjusted p", lambda result: p_value(result.p_adjusted)),
-        ("Verdict", lambda result: result.verdict),
+        contrasts,
+        ("Comparison", lambda row: _row_words(results, row, row.comparison)),
+        ("n", lambda row: str(row.n)),
+        ("t", lambda row: number(row.statistic)),
+        ("df", lambda row: "–" if row.freedom is None else str(row.freedom)),
+        ("p", lambda row: p_value(row.p)),
+        ("largest p", lambda row: p_value(row.largest_p)),
+        ("adjusted p", lambda row: p_value(row.p_adjusted)) if len(contrasts) > 1 else None,
+        ("equivalence p", lambda row: p_value(row.p_equivalent)) if bounds else None,
+        (f"mean {' or '.join(kinds)}", lambda row: number(row.effect)),
+        ("SE", lambda row: number(row.standard_error)),
+        *ends_of(lambda row: row.interval),
+        ("BF₁₀", lambda row: "–" if row.bayes_factor is None else significant(row.bayes_factor)),
+        ("Verdict", lambda row: row.verdict),
         words=1,
         last=1,
     )
-    weighted = any(contrast.contrast.measure == "threshold" for contrast in results.contrasts)
-    compared = inclusion_words(contrast.contrast for contrast in results.contrasts)
+    weighted = any(contrast.contrast.measure == "threshold" for contrast in contrasts)
+    yield paragraph(" ".join(_tests_used(contrasts)), "soft")
+    yield paragraph(_direction_words(kinds), "soft")
     yield paragraph(
-        "These hypotheses are stated in the study file. Each was tested on one value per participant, using a t test, "
-        "a bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
-        f"The adjusted p value is the largest of the three{_holm_words(results.contrasts)}. “Equivalent” means "
-        "that the sample is large enough and that both the t tests and the bootstrap show that the mean difference "
-        "(or ratio) lies within the stated bounds (Holm-adjusted across the bounds). "
-        f"{_WEIGHTED if weighted else ''}{compared}",
+        "The p value is that of the t test. The largest p value is the largest of the t test, a bootstrap that adds a "
+        "participant as extreme as the most extreme one, and a t test corrected for skewness. The verdict depends on "
+        f"the largest p value{_holm_words(contrasts)}. The last two tests do not assume normal distributions, so "
+        f"normality is not tested. {_BAYES} {_WEIGHTED * weighted}"
+        f"{inclusion_words(contrast.contrast for contrast in contrasts)}",
         "soft",
     )
-    yield paragraph(
-        f"{_SIZES} SD is the standard deviation, across participants, of each of the two values and, for paired "
-        "comparisons, of their difference.",
-        "soft",
-    )
-    if rows := [contrast for contrast in results.contrasts if contrast.left_out]:
+    if bounds:
+        yield paragraph(
+            "“Equivalent” means that the sample is large enough and that both two one-sided t tests and the bootstrap "
+            "show that the mean difference (or ratio) lies within the stated bounds (Holm-adjusted across the bounds).",
+            "soft",
+        )
+    if rows := [contrast for contrast in contrasts if contrast.left_out]:
         yield bullets([f"{question(row)}: excluded {_left_out_words(row)}." for row in rows])
+    sizes = [(row, size) for row in contrasts for size in (row.standardised, row.ordinal) if size is not None]
+    if sizes:
+        yield heading(3, "Effect sizes")
+        yield table_of(
+            sizes,
+            ("Comparison", lambda row: _row_words(results, row[0], row[0].comparison)),
+            ("effect size", lambda row: row[1].name),
+            ("value", lambda row: number(row[1].value)),
+            *ends_of(lambda row: row[1]),
+            words=2,
+        )
+        yield paragraph(_sizes_words(contrasts), "soft")
+    yield heading(3, "Descriptive statistics")
+    yield table_of(
+        [described for contrast in contrasts for described in _described(results, contrast)],
+        ("Values", lambda row: row.name),
+        ("n", lambda row: str(len(row.values))),
+        ("mean", lambda row: number(row.mean)),
+        ("median", lambda row: number(float(np.median(row.values)) if row.values else None)),
+        ("SD", lambda row: number(row.sd)),
+        ("SE", lambda row: number(None if row.sd is None else row.sd / math.sqrt(len(row.values)))),
+    )
+    logs = " For ratios, they are those of natural logarithms." * ("ratio" in kinds)
+    yield paragraph(f"SD is the standard deviation across participants, and SE is SD/√n.{logs}", "soft")
 
 
-def _sd_words(contrast: ContrastResult) -> str:
-    of_sides = listed([number(side.sd) for side in contrast.sides if side.sd is not None])
-    return (of_sides or "–") + ("" if contrast.sd is None else f"; {number(contrast.sd)}") + " (ln)" * contrast.ratio
+def _sizes_words(contrasts: Sequence[ContrastResult]) -> str:
+    logs = " For ratios, they are calculated from natural logarithms." * any(contrast.ratio for contrast in contrasts)
+    return f"{_SIZES}{logs}{_DELTA * any(contrast.ordinal is not None for contrast in contrasts)}"
+
+
+def _row_words(results: Results, contrast: ContrastResult, words: str) -> str:
+    """Return the name of a row: number of the hypothesis, measure, and the sides compared."""
+    place = f"{results.contrasts.index(contrast) + 1}. " if len(results.contrasts) > 1 else ""
+    return f"{place}{number_text.capitalised(contrast.effect_words)}: {words}"
+
+
+class _Described(NamedTuple):
+    """The numbers of one side of a hypothesis, or the differences between its sides."""
+
+    name: str
+    values: Sequence[float]
+    mean: float | None
+    sd: float | None
+
+
+def _described(results: Results, contrast: ContrastResult) -> Iterator[_Described]:
+    for side in contrast.sides:
+        yield _Described(_row_words(results, contrast, side.name), [*side.values.values()], side.mean, side.sd)
+    if differences := [*contrast.differences.values()]:
+        name = _row_words(results, contrast, contrast.comparison)
+        yield _Described(name, differences, contrast.effect, contrast.sd)
+
+
+_DIRECTIONS: Final = {"difference": "differences are first − second", "ratio": "ratios are first ÷ second"}
+
+
+def _direction_words(kinds: Sequence[str]) -> str:
+    """Return which way differences and ratios go, and what their standard errors are."""
+    logs = ", or of the mean logarithm for a ratio" * ("ratio" in kinds)
+    return (
+        f"In text, figures and tables, {listed([_DIRECTIONS[kind] for kind in kinds])}, in the order of the "
+        "hypothesis; effect sizes are positive if the first is higher. SE is the standard error of the mean "
+        f"difference{logs}, and CI is the confidence interval of the t test."
+    )
 
 
 def contrast_rows(results: Results) -> Iterator[dict[str, Any]]:

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from study_app import figure_style as style
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import Failure, Failures
+from study_app.analysis.wording import number
 
 _T = TypeVar("_T")
 
@@ -47,6 +48,7 @@ _VARIABLES = {
 }
 """The colours of figures that the page has by name, since they change with light and dark."""
 _COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
+_D_Z = re.compile(r"\bd_z\b")
 _LETTERS = re.compile(r"(<text.*?</text>)", re.DOTALL)
 HEAD = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>", re.DOTALL)
 _SIZE = re.compile(r'<svg [^>]*?viewBox="0 0 ([0-9.]+) ([0-9.]+)"[^>]*>')
@@ -56,7 +58,16 @@ _SIZE = re.compile(r'<svg [^>]*?viewBox="0 0 ([0-9.]+) ([0-9.]+)"[^>]*>')
 def _environment() -> Environment:
     """Return the template environment; HTML templates are escaped, and undefined values raise an error."""
     loader = PackageLoader("study_app.analysis.report", "templates")
-    return Environment(loader=loader, autoescape=select_autoescape(), undefined=StrictUndefined, trim_blocks=True)
+    return Environment(
+        loader=loader, autoescape=select_autoescape(), undefined=StrictUndefined, trim_blocks=True, finalize=_typeset
+    )
+
+
+def _typeset(value: Any) -> Any:
+    """Return a text with the subscript of d_z; other values are unchanged."""
+    if isinstance(value, Markup) or not isinstance(value, str) or not _D_Z.search(value):
+        return value
+    return Markup(_D_Z.sub("d<sub>z</sub>", Markup.escape(value)))  # noqa: S704 - the text is escaped
 
 
 def render(template: str, **values: Any) -> Markup:
@@ -120,6 +131,14 @@ def table_of(
     shown = [column for column in columns if column is not None]
     cells = [[cell(row) for _, cell in shown] for row in rows]
     return table([head for head, _ in shown], cells, words=words, last=last)
+
+
+def ends_of(interval: Callable[[_T], object], level: float = 0.95) -> tuple[tuple[str, Callable[[_T], str]], ...]:
+    """Return two columns with the ends of each row's confidence interval; dashes where it is None."""
+    return (
+        (f"{100 * level:g} % CI lower", lambda row: number(getattr(interval(row), "low", None))),
+        (f"{100 * level:g} % CI upper", lambda row: number(getattr(interval(row), "high", None))),
+    )
 
 
 def _width(words: str) -> str:

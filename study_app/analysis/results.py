@@ -277,7 +277,8 @@ class ContrastResult(Outcome):
     that differ by more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the
     differences within participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a
     statement, and ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the
-    names of the blocks or conditions of an interaction, ``measure_name`` is the measure in words.
+    names of the blocks or conditions of an interaction, ``measure_name`` is the measure in words. ``standard_error`` is
+    that of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of freedom of t.
     """
 
     contrast: Contrast
@@ -300,6 +301,21 @@ class ContrastResult(Outcome):
     bayes_factor: float | None = None
     within_names: tuple[str, str] | None = None
     measure_name: str = ""
+    standard_error: float | None = None
+    freedom: int | None = None
+
+    @property
+    def comparison(self) -> str:
+        """The direction of the effect: "A − B", or "A ÷ B" for a ratio."""
+        return f" {'÷' if self.ratio else '−'} ".join(self.compared)
+
+    @property
+    def differences(self) -> dict[str, float]:
+        """The difference or ratio of each participant; empty between groups."""
+        if self.contrast.groups is not None or not self.sides:
+            return {}
+        first, second = (side.values for side in self.sides)
+        return {who: first[who] / second[who] if self.ratio else first[who] - second[who] for who in first}
 
     @property
     def effect_words(self) -> str:
@@ -385,8 +401,12 @@ def lead_phrase(result: BlockResult) -> str:
 
 def statistic(outcome: Outcome) -> str:
     """Return a statistic with its sign."""
-    text = {"chi2": "χ²", "sum of chi2": "sum of χ²"}.get(outcome.statistic_name, outcome.statistic_name)
-    return f"{text} {number(outcome.statistic)}"
+    return f"{statistic_symbol(outcome)} {number(outcome.statistic)}"
+
+
+def statistic_symbol(outcome: Outcome) -> str:
+    """Return the symbol of a statistic: "χ²"."""
+    return outcome.statistic_name.replace("chi2", "χ²")
 
 
 def said_of_presentations(result: BlockResult) -> tuple[str, ...]:

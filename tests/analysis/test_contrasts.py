@@ -44,6 +44,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.unblinding import unblind
 from tests.analysis.made_up import ITEMS, everybody, liquids, study
 from tests.analysis.power.test_power import felt_in
+from tests.analysis.report.read_report import seen
 from tests.protocol.edited_studies import text_of
 from tests.studies import quick_pdfs
 
@@ -223,6 +224,11 @@ LOADED = (
 )
 
 
+def _shown(value: float) -> str:
+    """Return a number below 100 with at most three digits, two of them decimals."""
+    return f"{value:.{2 if abs(value) < 9.5 else 1}f}".replace("-", "−")
+
+
 def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) -> None:
     (tmp_path / "loaded.toml").write_text(LOADED, encoding="utf-8", newline="\n")
     folder = rehearse_answers(tmp_path / "loaded.toml", participants=6, seed=11, results=tmp_path / "s", features={})
@@ -234,12 +240,34 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
     load = rows[rows["form"] == "load"].astype({"value": float})
     raw = load.pivot_table("value", "participant", "after_block", aggfunc="mean")  # mean of the six ratings
     assert load.groupby(["participant", "after_block"]).size().tolist() == [6] * 12
-    expected = ttest_rel(raw["late"], raw["prompt"])
+    expected, differences = ttest_rel(raw["late"], raw["prompt"]), raw["late"] - raw["prompt"]
     assert (result.statistic, result.p) == pytest.approx((expected.statistic, expected.pvalue))
-    assert result.effect == pytest.approx((raw["late"] - raw["prompt"]).mean())
+    assert (result.effect, result.standard_error) == pytest.approx((differences.mean(), differences.sem()))
     with quick_pdfs():
         page = report(folder, tmp_path / "report")[0].read_text(encoding="utf-8")
-    assert "“raw” of load differs between late and prompt" in page.lower()
+    told, comparison = seen(page).replace("\u00a0", " "), "NASA-TLX raw score: Late − Prompt"
+    assert "NASA-TLX raw score differs between Late and Prompt" in told
+    ends = [_shown(end) for end in expected.confidence_interval()]
+    tested = [
+        _shown(expected.statistic),
+        "5",
+        *(f"{p:.3f}".removeprefix("0") for p in (expected.pvalue, result.largest_p)),
+    ]
+    bayes = f"{result.bayes_factor:.3g}"
+    row = [comparison, "6", *tested, _shown(differences.mean()), _shown(differences.sem()), *ends, bayes]
+    assert " ".join(row) in told
+    for name, values in (
+        (comparison, differences),
+        *((f"NASA-TLX raw score: {block.capitalize()}", raw[block]) for block in raw),
+    ):
+        assert " ".join([name, "6", *map(_shown, (values.mean(), values.median(), values.std(), values.sem()))]) in told
+    assert "NASA-TLX, after each block" in told
+    assert (
+        f"The mean difference (after Late − after Prompt) was {_shown(differences.mean())} [{', '.join(ends)}]" in told
+    )
+    assert "d<sub>z</sub>" in page
+    assert "d_z" not in page
+    assert "dz is the mean" in (tmp_path / "report" / "methods.txt").read_text("utf-8")
     assert (tmp_path / "report" / "hypothesis-1.svg").is_file()
 
 
@@ -346,6 +374,14 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
     assert f"The {difference} was higher in one than in two" in answer(result)
     assert f"the {difference} differs between one and two" in methods(made, evaluate(made))
     assert [len(side.values) for side in result.sides] == [len(one), len(two)]
+    figure = next(
+        picture
+        for picture in write_report.summary_pictures(made, evaluate(made), {}, ("svg",))
+        if "hypothesis" in picture.name
+    )
+    drawn = figure.files["svg"].decode()
+    assert f"Difference in agreement with “{ITEMS[0].capitalize()}”: c2 − c1<" in drawn
+    assert ">one − two<" in drawn
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from study_app.protocol.blocks import Compared, Phase
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of, follows_in
 from study_app.protocol.presented.presentation import link_descriptions
-from study_app.protocol.questionnaires import Score
+from study_app.protocol.questionnaires import Score, instruments, published_name
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.table import text_in
 from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
@@ -582,6 +582,15 @@ class PlacedScore:
     score: Score
     questions: tuple[PlacedQuestion, ...]
 
+    @property
+    def title(self) -> str:
+        """Its name after that of its standard questionnaire: "SUS", "NASA-TLX raw"."""
+        name = self.name.replace("_", " ")
+        if self.instrument is None or self.instrument not in instruments():
+            return name
+        published = published_name(self.instrument)
+        return published if name.upper() == published else f"{published} {name}"
+
 
 @dataclass(frozen=True, slots=True)
 class OtherQuestions:
@@ -613,7 +622,7 @@ def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuesti
 
 
 def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tuple[QuestionPlace, Mapping[str, Any]]]:
-    language, titles = display_language(protocol), block_titles(protocol)
+    titles = block_titles(protocol)
     for step in every_step_of(protocol):
         if step in protocol["blocks"]:
             block = protocol["blocks"][step]
@@ -621,13 +630,21 @@ def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tu
                 where = QuestionPlace(step, titles[step], False, _settings_in(protocol, step, key))
                 yield where, protocol["questionnaires"][block["questionnaire"]]
         elif step in protocol["questionnaires"]:
-            table = protocol["questionnaires"][step]
-            titled = table["title"] is not None
-            title = text_in(table["title"], language) if titled else step.replace("_", " ").capitalize()
-            after = follows_in(protocol, step)
+            table, after = protocol["questionnaires"][step], follows_in(protocol, step)
             labels = ((START, "At the start") if name is None else (name, f"{AFTER}{titles[name]}") for name in after)
             settings = tuple(Setting(code=name, condition=name, label=label) for name, label in labels)
-            yield QuestionPlace(step, title, True, settings), table
+            yield QuestionPlace(step, _form_title(protocol, step), True, settings), table
+
+
+def _form_title(protocol: Mapping[str, Any], form: str) -> str:
+    """Return the name of a form for readers: its standard questionnaire, otherwise the title that participants see."""
+    forms = protocol["questionnaires"]
+    title, instrument = forms[form]["title"], forms[form].get("instrument")
+    words = form.replace("_", " ").capitalize() if title is None else text_in(title, display_language(protocol))
+    if instrument not in instruments():
+        return words
+    is_alone = sum(other.get("instrument") == instrument for other in forms.values()) == 1
+    return published_name(instrument) if is_alone else f"{published_name(instrument)} ({words})"
 
 
 def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:

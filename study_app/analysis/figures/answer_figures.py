@@ -182,7 +182,7 @@ _PERSON_SPREAD: Final = 0.5
 """How far apart the points of participants at one delay are at most, as a share of the distance of delays."""
 _CURVE_LEFT_PT: Final = 30.0
 _CURVE_FOOT_PT: Final = 30.0
-_HEIGHT_PT: Final = 196.0
+_HEIGHT_PT: Final = 150.0
 _CURVE_TOP_PT: Final = 34.0
 _RIGHT_PT: Final = 26.0
 

@@ -25,14 +25,16 @@ _A_ROW: Final = 3
 WIDTH_PT: Final = 420.0
 """Of a figure that stands beside its answer."""
 _PANEL_PT: Final = 128.0
-_SMALL_PANEL_PT: Final = 88.0
-_LEAST_PANEL_PT: Final = 66.0
+_SMALL_PANEL_PT: Final = 72.0
+_LEAST_PANEL_PT: Final = 52.0
 """Of a panel in one row, in two, and in more."""
 _MOST_COLUMN_PT: Final = 120.0
 _NARROW_PT: Final = 290.0
 """Least width of a figure: its heading must fit."""
 _OF_MANY_PT: Final = 300.0
 """Most width of a column, and of one in which each participant has an interval."""
+MOST_LETTERS: Final = 64
+"""Of the title of a scale; a longer one would reach the legend."""
 _ROW_GAP_PT: Final = 6.0
 _LEFT_PT: Final = 34.0
 _GAP_PT: Final = 12.0

@@ -7,9 +7,9 @@ from typing import Any, Final, NamedTuple
 import pandas as pd
 
 from study_app import figure_style as style
-from study_app.analysis.data.blocks import PlacedScore, QuestionPlace
+from study_app.analysis.data.blocks import QuestionPlace
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.people_figures import Column, Mean, Panel, mean_of, people_picture
+from study_app.analysis.figures.people_figures import MOST_LETTERS, Column, Mean, Panel, mean_of, people_picture
 from study_app.analysis.levels.answers import Answers, Settings
 from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities
@@ -20,7 +20,6 @@ from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
 from study_app.number_text import capitalised
 from study_app.protocol.groups import EACH_GROUP
-from study_app.protocol.questionnaires import instruments, published_name
 
 _MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
     (Thresholds, "threshold", "threshold"),
@@ -128,7 +127,7 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
     panels.append(
         Panel(
             title="",
-            columns=(Column(name=_effect_name(contrast), values=_differences(contrast) if within else {}, mean=mean),),
+            columns=(Column(name=contrast.comparison, values=contrast.differences, mean=mean),),
             joined=False,
             line=1.0 if log else 0.0,
             bound=None if bound is None else (1 / bound, bound) if log else (-bound, bound),
@@ -140,7 +139,7 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
     weighted = " Means are weighted as in the test." if is_weighted else ""
     lines = "Each line joins a participant's two values. " if within else ""
     caption = (
-        f"{capitalised(contrast.hypothesis)}. {lines}Right: {_effect_name(contrast)}"
+        f"{capitalised(contrast.hypothesis)}. {lines}Right: {contrast.comparison}"
         f"{', for each participant and on average' if within else ''}; dashed line: no difference.{band}{weighted} "
         f"{sample_words(study, len({who for side in contrast.sides for who in side.values} & {*study.people}))}"
     )
@@ -149,23 +148,14 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
     return people_picture(study, contrast.contrast.blocks[0], name, title, caption, panels, forms, above=above)
 
 
-def _effect_name(contrast: ContrastResult) -> str:
-    first, second = contrast.compared
-    return f"{first} {'÷' if contrast.ratio else '−'} {second}"
-
-
-def _differences(contrast: ContrastResult) -> dict[str, float]:
-    """Return the difference, or ratio, of each participant."""
-    first, second = (side.values for side in contrast.sides)
-    return {who: first[who] / second[who] if contrast.ratio else first[who] - second[who] for who in first}
-
-
 def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
     measure = contrast.measure_name or contrast.contrast.measure_words
     if contrast.contrast.is_interaction:
         symbol = "d′" if contrast.contrast.measure == "d_prime" else measure
-        return f"{'Ratio' if contrast.ratio else 'Difference'} in {symbol}"
+        of = (" ÷ " if contrast.ratio else " − ").join(contrast.within_names or contrast.contrast.within or ())
+        words = f"{'Ratio' if contrast.ratio else 'Difference'} in {symbol}"
+        return whole if len(whole := f"{words}: {of}") <= MOST_LETTERS else words
     if contrast.contrast.form is not None:
         return measure
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:
@@ -217,12 +207,15 @@ def numbers_of(study: Study) -> dict[str, list[Numbers]]:
 
 
 def _numbers_at(study: Study, where: str) -> list[Numbers]:
-    """Return the scores of a questionnaire or, if it has none, the numeric answers to its questions."""
+    """Return the scores of a questionnaire or, if it has none, the numeric answers to its questions.
+
+    Two settings that a hypothesis compares are in its order.
+    """
     scores = [score for score in study.others.scores if score.where.id == where]
     tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
     if scores:
         tables = [
-            (_score_name(score), None, score.where, scored(study, score).rename(columns={"score": "value"}))
+            (score.title, None, score.where, scored(study, score).rename(columns={"score": "value"}))
             for score in scores
         ]
     else:
@@ -241,8 +234,11 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
             for question in asked
         ]
     numbers = []
+    in_hypotheses = [contrast.within for contrast in study.contrasts]
     for title, bounds, place, rows in tables:
         settings: list[tuple[str | None, str]] = [(it.code, place.name(it)) for it in place.settings]
+        if tuple(it.condition for it in reversed(place.settings)) in in_hypotheses:
+            settings.reverse()
         by_setting = []
         for code, words in settings or [(None, "")]:
             here = (rows if code is None else rows[rows["code"] == code]).dropna(subset=["value"])
@@ -251,15 +247,6 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
         if any(values for _, values in by_setting):
             numbers.append(Numbers(title, bounds, bool(scores), tuple(by_setting)))
     return numbers
-
-
-def _score_name(score: PlacedScore) -> str:
-    """Return the name of a score after that of its standard questionnaire: "SUS", "NASA-TLX raw"."""
-    name = score.name.replace("_", " ")
-    if score.instrument is None or score.instrument not in instruments():
-        return name
-    published = published_name(score.instrument)
-    return published if name.upper() == published else f"{published} {name}"
 
 
 def _with_room(low: float, high: float) -> tuple[float, float]:

@@ -26,7 +26,7 @@ from study_app.analysis.findings.finding import (
     test_row,
 )
 from study_app.analysis.findings.statement_tests import ONE_DELAY, DelayTrend
-from study_app.analysis.html_page import heading, paragraph, table, table_of
+from study_app.analysis.html_page import ends_of, heading, paragraph, table, table_of
 from study_app.analysis.page_layout import Drawing, Picture, tab_separated
 from study_app.analysis.results import (
     BlockResult,
@@ -225,10 +225,10 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         yield table_of(
             self.value,
             ("Statement", lambda tested: short_text(self.found, tested.item)),
-            ("Delay", lambda tested: ms(tested.delay_ms)),
+            ("Comparison", lambda tested: f"{ms(tested.delay_ms)} − {control}"),
             ("n", lambda tested: str(tested.found.n)),
-            ("difference", lambda tested: number(tested.found.effect)),
-            ("interval", lambda tested: interval(tested.found.interval)),
+            ("mean difference", lambda tested: number(tested.found.effect)),
+            *ends_of(lambda tested: tested.found.interval, level=1 - 2 * self.value[0].found.alpha),
             ("participants outside the bounds", lambda tested: beyond_phrase(tested.found)),
             ("p (t tests)", lambda tested: p_value(tested.found.p)),
             ("p (bootstrap)", lambda tested: p_value(tested.found.p_bootstrap)),

@@ -22,7 +22,7 @@ from study_app.analysis.findings.finding import (
     test_row,
 )
 from study_app.analysis.findings.statement_tests import Effects, Pairs, SettingsDiffer
-from study_app.analysis.html_page import heading, paragraph, table_of
+from study_app.analysis.html_page import ends_of, heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture, tab_separated
 from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short_text
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
@@ -91,7 +91,7 @@ class LiquidRecognition(Finding[RecognitionResult | None]):
             ("of", lambda rate: str(rate.n)),
             ("undecided", lambda rate: str(named.found.table[rate.setting][_UNDECIDED_COLUMN])),
             ("proportion", lambda rate: number(rate.rate)),
-            ("95 % interval", lambda rate: interval(rate.interval)),
+            *ends_of(lambda rate: rate.interval),
             ("closest other liquid", lambda rate: "–" if rate.rival is None else self.found.names[rate.rival]),
             ("p", lambda rate: p_value(rate.p)),
             ("adjusted p", lambda rate: p_value(rate.p_adjusted)),

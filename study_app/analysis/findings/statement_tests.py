@@ -1,6 +1,7 @@
 """Tests of statements: whether settings differ, in which pairs, with the delay and between sessions."""
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -12,7 +13,7 @@ import numpy as np
 from study_app import number_text
 from study_app.analysis.data.blocks import KINDS, TRENDS
 from study_app.analysis.data.measures import LEVELS, by_participant, medians
-from study_app.analysis.figures.people_figures import Column, Panel, mean_of, people_picture
+from study_app.analysis.figures.people_figures import MOST_LETTERS, Column, Panel, mean_of, people_picture
 from study_app.analysis.findings.finding import (
     FDR,
     HOLM,
@@ -26,7 +27,7 @@ from study_app.analysis.findings.finding import (
     rows_alone,
     test_row,
 )
-from study_app.analysis.html_page import heading, paragraph, table_of
+from study_app.analysis.html_page import ends_of, heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture
 from study_app.analysis.results import (
     BlockResult,
@@ -37,13 +38,14 @@ from study_app.analysis.results import (
     settings_noun,
     short_text,
     statistic,
+    statistic_symbol,
     test_name,
 )
 from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm, student_interval
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
 from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
 from study_app.analysis.statistics.trend import trend
-from study_app.analysis.wording import all_of, counted, interval, listed, number, p_equals, p_value, significant
+from study_app.analysis.wording import all_of, counted, listed, number, p_equals, p_value, significant
 
 ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare it with"
 
@@ -66,27 +68,43 @@ def table_of_tests(
     two = isinstance(first.outcome, Paired) and len(compared) == 2
     above = f", above 0 if {compared[0]} was rated higher than {compared[1]}" if two else ""
     exact = f" ({'; '.join(methods)})" if methods else ""
+    effect = first.outcome.effect_name
     yield heading(3, title)
     yield table_of(
         tests,
         ("Statement", lambda test: short_text(result, test.item)),
         ("n", lambda test: f"{test.outcome.n}" + (f" (−{test.outcome.dropped})" if test.outcome.dropped else "")),
-        ("Statistic", lambda test: statistic(test.outcome)),
+        (statistic_symbol(first.outcome), lambda test: number(test.outcome.statistic)),
+        ("df", lambda test: _freedom(test.outcome)) if any(map(_freedom, outcomes)) else None,
         ("p", lambda test: p_value(test.outcome.p)),
         ("adjusted p", lambda test: p_value(test.p_adjusted)),
-        ("smallest p", lambda test: p_value(test.outcome.smallest_p)),
-        ("Effect", lambda test: number(test.outcome.effect)),
-        ("Interval", lambda test: interval(test.outcome.interval)),
+        ("smallest p", lambda test: p_value(test.outcome.smallest_p)) if _has(outcomes, "smallest_p") else None,
+        (effect if len(effect) <= _MOST_NAME else "effect size", lambda test: number(test.outcome.effect))
+        if _has(outcomes, "effect")
+        else None,
+        *(ends_of(lambda test: test.outcome.interval) if intervals else ()),
         ("Verdict", _verdict),
         last=1,
     )
-    yield paragraph(
-        f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}. Effect size: {first.outcome.effect_name}"
-        f"{above}." + (f" Confidence intervals (95 %): {'; '.join(intervals)}." if intervals else ""),
-        "soft",
-    )
-    if reasons and not intervals:
+    size = f" Effect size: {effect}{above}." if _has(outcomes, "effect") else ""
+    ends = f" Confidence intervals (95 %): {'; '.join(intervals)}." if intervals else ""
+    yield paragraph(f"Test: {test_name(first.outcome)}{exact}; {'; '.join(family)}.{size}{ends}", "soft")
+    if reasons and size and not intervals:
         yield paragraph(f"{'; '.join(map(number_text.capitalised, reasons))}.", "soft")
+
+
+_MOST_NAME: Final = 16
+"""A heading names an effect size of so many letters; longer names are below the table."""
+
+
+def _freedom(outcome: Outcome) -> str:
+    """Return the degrees of freedom of t or F, "" if there are none."""
+    given = re.match(r"[tF]\(([^)]*)\)", outcome.method)
+    return given[1] if given else ""
+
+
+def _has(outcomes: Sequence[Outcome], field: str) -> bool:
+    return any(getattr(outcome, field) is not None for outcome in outcomes)
 
 
 def _verdict(test: Tested) -> str:
@@ -338,14 +356,10 @@ class Effect:
     high: float | None
 
 
-_MOST_LETTERS: Final = 64
-"""Of the ends of a scale; longer ones would reach the legend."""
-
-
 def _scale_words(labels: Sequence[str]) -> str:
     """Return the title of a scale, with its ends if there is room."""
     words = f"Points from {LEVELS[0]} ({labels[0]}) to {LEVELS[-1]} ({labels[-1]})"
-    return words if len(words) <= _MOST_LETTERS else "Points on the scale"
+    return words if len(words) <= MOST_LETTERS else "Points on the scale"
 
 
 class Effects(Finding[tuple[Effect, ...]]):
@@ -502,14 +516,14 @@ class Pairs(Finding[tuple[Pair, ...]]):
         yield table_of(
             pairs,
             ("Statement", lambda pair: short_text(self.found, pair.tested.item)),
-            ("Pair", lambda pair: f"{name(self.found, pair.first)} – {name(self.found, pair.second)}"),
+            ("Pair", lambda pair: f"{name(self.found, pair.first)} − {name(self.found, pair.second)}"),
             ("n", lambda pair: f"{pair.tested.outcome.n} ({_differing(pair)} differ)"),
             ("V", lambda pair: number(pair.tested.outcome.statistic, 1)),
             ("p", lambda pair: p_value(pair.tested.outcome.p)),
             ("adjusted p", lambda pair: p_value(pair.tested.p_adjusted)),
             ("smallest p", lambda pair: p_value(pair.tested.outcome.smallest_p)),
             ("rank-biserial", lambda pair: number(pair.tested.outcome.effect)),
-            ("Interval", _pair_interval),
+            *ends_of(lambda pair: pair.tested.outcome.interval),
             ("Verdict", lambda pair: pair.tested.verdict),
             words=2,
             last=1,
@@ -539,13 +553,6 @@ def _differing(pair: Pair) -> int:
     return outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
 
 
-def _pair_interval(pair: Pair) -> str:
-    """Return the interval of the effect or, if all participants differ in one direction, their number."""
-    outcome = pair.tested.outcome
-    one_way = outcome.effect is not None and abs(outcome.effect) == 1.0
-    return f"– (all {_differing(pair)} in one direction)" if one_way else interval(outcome.interval)
-
-
 class MeanTests(StatementTests):
     """The mean test of every statement: exploratory, unless it is the planned trend test."""
 
@@ -569,25 +576,32 @@ class MeanTests(StatementTests):
 
     def section(self) -> Iterator[str]:
         yield from super().section()
-        effects = [
-            f"{short_text(self.found, test.item)}: "
-            + listed(
-                [
-                    f"{number(slope)} {interval(ends)} (SD {number(sd)})"
-                    for slope, ends, sd in zip(it.slopes, it.intervals, it.sds, strict=True)
-                ]
-            )
-            + (f", intercept SD {number(it.intercept_sd)}" if it.intercept_sd is not None else "")
+        first, *others = self.found.names
+        over_delay = bool(self.found.delays_ms)
+        effects = ["per 100 ms"] if over_delay else [f"{other} − {first}" for other in others]
+        rows = [
+            (test.item, effect, test.outcome.n, *numbers)
             for test in self.value
-            if isinstance(it := test.outcome, SlopeTest) and it.slopes
-        ]
-        if effects:
-            what = "Slopes per 100 ms of delay" if self.found.delays_ms else "Differences from the first condition"
-            yield paragraph(
-                f"{what}, in points, with 95 % confidence intervals and between-participant standard deviations: "
-                f"{'; '.join(effects)}.",
-                "soft",
+            if isinstance(test.outcome, SlopeTest) and test.outcome.slopes
+            for effect, *numbers in zip(
+                effects, test.outcome.slopes, test.outcome.sds, test.outcome.intervals, strict=True
             )
+        ]
+        if not rows:
+            return
+        what = "Mean slopes per 100 ms of delay" if over_delay else f"Mean differences from {first}"
+        yield paragraph(f"{what}, in points; SD is the standard deviation between participants:", "soft")
+        yield table_of(
+            rows,
+            ("Statement", lambda row: short_text(self.found, row[0])),
+            ("Effect", lambda row: row[1]),
+            ("n", lambda row: str(row[2])),
+            ("mean slope" if over_delay else "mean difference", lambda row: number(row[3])),
+            ("SD", lambda row: number(row[4])),
+            ("SE", lambda row: number(row[4] / math.sqrt(row[2]))),
+            *ends_of(lambda row: row[5]),
+            words=2,
+        )
 
     @classmethod
     def tested(cls, result: BlockResult) -> bool:

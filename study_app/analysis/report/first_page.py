@@ -17,7 +17,7 @@ from study_app.analysis.figures.summary_figures import MOST_PANELS, Numbers, est
 from study_app.analysis.findings import all_findings
 from study_app.analysis.html_page import picture, render
 from study_app.analysis.page_layout import Picture
-from study_app.analysis.report.sections import answers, empty_studies, none_found
+from study_app.analysis.report.sections import answers, empty_studies, none_found, place_title
 from study_app.analysis.results import BlockResult, LevelsResult, QuestionResult, Results
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, number, significant
@@ -162,14 +162,14 @@ def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) ->
         numbers = numbers_at.get(where, ())
         if not asked:
             continue
-        title, figures = asked[0].title, [f"answers-{where}"]
+        figures = [f"answers-{where}"]
         sentences = [_number_words(one) for one in numbers[:MOST_PANELS]]
         chosen = [result for result in asked if result.measure == "counts"]
         sentences += [_choice_words(result) for result in chosen]
         figures += [f"question-{where}-{result.item}" for result in chosen]
         if sentences:
             yield Card(
-                question=title,
+                question=place_title(asked[0], results),
                 verdict="",
                 sentences=tuple(sentences),
                 block=where,
@@ -190,10 +190,10 @@ def _number_words(numbers: Numbers) -> str:
     if len(means) != 2:
         return text
     (first, one), (second, other) = numbers.by_setting
-    away = mean_of(np.array([other[who] - one[who] for who in one if who in other]))
+    away = mean_of(np.array([one[who] - other[who] for who in one if who in other]))
     if away is None or away.low is None:
         return text
-    pair = " − ".join(_setting_words(name).removeprefix("for ") for name in (second, first))
+    pair = " − ".join(_setting_words(name).removeprefix("for ") for name in (first, second))
     return f"{text} The mean difference ({pair}) was {number(away.value)}{_mean_ends(away)}."
 
 

@@ -1,6 +1,7 @@
 """The parts of the page and its texts: findings, limits, methods, the first page, blocks, and how the study was run."""
 
 import math
+import statistics
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -9,7 +10,7 @@ from typing import Any, Final, NamedTuple
 import pandas as pd
 
 from study_app.analysis.contrasts import answer, equality_limits, question
-from study_app.analysis.data.measures import number_or_none
+from study_app.analysis.data.measures import LEVELS, number_or_none
 from study_app.analysis.data.motion import (
     OF_REACHES,
     OF_TRIALS,
@@ -357,14 +358,22 @@ def _measures(result: BlockResult) -> str:
         sorted(result.measures, key=lambda row: order.index(str(row["item"]))),
         ("Statement", lambda row: short_text(result, str(row["item"]))),
         (settings_noun(result).capitalize(), lambda row: name(result, str(row["code"]))),
-        *((str(level), lambda row, level=level: str(row[f"count_{level}"])) for level in range(1, 8)),
+        *((str(level), lambda row, level=level: str(row[f"count_{level}"])) for level in LEVELS),
         ("n", lambda row: str(row["n"])),
         ("missing", lambda row: str(row["missing"] + row["cannot_judge"])),
+        ("mean", lambda row: number(_mean_and_sd(row)[0])),
+        ("SD", lambda row: number(_mean_and_sd(row)[1])),
         ("median", lambda row: number(row["median"], 1)),
         ("quartiles", lambda row: "–" if row["q1"] is None else f"{number(row['q1'], 1)} – {number(row['q3'], 1)}"),
         ("agree %", lambda row: number(row["agree_percent"], 0)),
         words=2,
     )
+
+
+def _mean_and_sd(row: Mapping[str, Any]) -> tuple[float | None, float | None]:
+    """Return the mean and the standard deviation of the answers with these counts; None if they are too few."""
+    answers = [level for level in LEVELS for _ in range(int(row[f"count_{level}"]))]
+    return statistics.mean(answers) if answers else None, statistics.stdev(answers) if len(answers) > 1 else None
 
 
 def places(results: Results) -> dict[str, str]:
@@ -376,7 +385,15 @@ def places(results: Results) -> dict[str, str]:
     def kind(result: QuestionResult) -> str:
         return "form" if result.is_form else levels.get(result.where, "other questions")
 
-    return {result.where: f"{result.title}: {kind(result)}" for result in results.questions}
+    return {result.where: f"{place_title(result, results)}: {kind(result)}" for result in results.questions}
+
+
+def place_title(result: QuestionResult, results: Results) -> str:
+    """Return the title of the place of a question; of a form after every main block it says so."""
+    others = {asked.where for asked in results.questions if not asked.is_form}
+    main = {one.id for one in results.blocks} | {level.block for level in results.levels} | others
+    is_repeated = result.is_form and len(main) > 1 and {group.code for group in result.groups} == main
+    return f"{result.title}, after each block" if is_repeated else result.title
 
 
 def question_section(where: str, study: Study, results: Results, drawn_: Sequence[Picture]) -> Iterator[str]:
@@ -428,6 +445,7 @@ def _scores(scores: Sequence[ScoreResult]) -> Iterator[str]:
         ("n", lambda row: str(row[2]["n"])),
         ("mean", lambda row: number(row[2]["mean"], 1)),
         ("SD", lambda row: number(row[2]["sd"], 1)),
+        ("SE", lambda row: number(None if row[2]["sd"] is None else row[2]["sd"] / math.sqrt(row[2]["n"]))),
         ("range", lambda row: ends(row[2])),
         words=2,
     )

@@ -317,7 +317,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     files: dict[str, bytes] = {}
     for file, make in (
         ("report.R", lambda: r_script(study).encode()),
-        ("methods.txt", f"{texts['methods']}\n".encode),
+        ("methods.txt", f"{texts['methods']}\n".replace("d_z", "dz").encode),
         ("tests.csv", lambda: tests_csv(results)),
         ("motion.csv", lambda: motion_csv(results)),
     ):

@@ -402,6 +402,7 @@ class FigureCard(Card):
         self.drawing: _FigureView | None = None
         self.question = label("", "card", wraps=True)
         self.answer = label("", "body", wraps=True)
+        self.answer.setTextFormat(Qt.TextFormat.RichText)
         self.answer.setTextInteractionFlags(
             Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
         )
@@ -441,7 +442,7 @@ class FigureCard(Card):
         self._title.setVisible(not has_figure and not figure.question)  # a figure has its own
         self.question.setText(figure.question)
         self.question.setVisible(bool(figure.question))
-        self.answer.setText(figure.answer)
+        self.answer.setText(re.sub(r"\bd_z\b", "d<sub>z</sub>", html.escape(figure.answer, quote=False)))
         self.answer.setVisible(bool(figure.answer))
         self._show_verdict(figure.verdict)
         for button in self.buttons:

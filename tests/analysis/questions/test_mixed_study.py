@@ -106,6 +106,26 @@ def test_a_form_after_each_block_is_analysed_block_by_block(tmp_path: Path, orde
     assert "After Again" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
 
 
+def test_readers_see_the_name_of_a_standard_questionnaire_in_place_of_its_title(tmp_path: Path) -> None:
+    before = '[questionnaires.before]\ninstrument = "nasa-tlx"\ntitle.en = "At first"\n\n[questionnaires.load]'
+    sequence = 'sequence = ["start", "stir", "load", "usability", "end"]'
+    protocol = mixed_file(
+        tmp_path, (sequence, sequence.replace('"stir"', '"before", "stir"')), ("[questionnaires.load]", before)
+    )
+    folder = rehearse_answers(
+        protocol, participants=1, seed=1, results=tmp_path / "results", features=made_up(protocol)
+    )
+    places = {question.where.id: question.where.title for question in load_study(folder).others.questions}
+    assert places == {
+        "start": "Start",
+        "before": "NASA-TLX (At first)",
+        "stir": "Stir",
+        "load": "NASA-TLX (Task load)",
+        "usability": "SUS",
+        "end": "End",
+    }
+
+
 @pytest.mark.usefixtures("figures_of_the_page")
 def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path) -> None:
     again = '[blocks.again]\ntitle = "Stir"\nconditions = ["thin", "thick"]'
@@ -129,7 +149,7 @@ def test_blocks_that_share_a_title_are_told_apart(tmp_path: Path) -> None:
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     for name, mean in means.items():
         assert re.search(rf"score was [^.]*{re.escape(mean)}\b.* {re.escape(name.replace('After', 'after'))}", page)
-    assert "The mean difference (after Stir (again) − after Stir (stir)) was" in page
+    assert "The mean difference (after Stir (stir) − after Stir (again)) was" in page
 
 
 @pytest.mark.parametrize("order", ["balanced", "random"])

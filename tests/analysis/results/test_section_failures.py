@@ -87,7 +87,7 @@ def test_a_report_with_failures_is_written_and_ends_with_three(
         "Do answers change with the delay?",
         "Lowest delay",
         "How the study was run",
-        "Not available: its computation failed",
+        "Not available: the computation failed",
     ):
         assert title in page
     names = {path.name for path in to.iterdir()}
