@@ -133,7 +133,7 @@ def table_of(
     return table([head for head, _ in shown], cells, words=words, last=last)
 
 
-def ends_of(interval: Callable[[_T], object], level: float = 0.95) -> tuple[tuple[str, Callable[[_T], str]], ...]:
+def ends_of(interval: Callable[[Any], object], level: float = 0.95) -> tuple[tuple[str, Callable[[Any], str]], ...]:
     """Return two columns with the ends of each row's confidence interval; dashes where it is None."""
     return (
         (f"{100 * level:g} % CI lower", lambda row: number(getattr(interval(row), "low", None))),

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import Any, ClassVar, Final
+from typing import Any, ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -41,7 +41,7 @@ from study_app.analysis.results import (
     statistic_symbol,
     test_name,
 )
-from study_app.analysis.statistics.outcome import Outcome, false_discovery, holm, student_interval
+from study_app.analysis.statistics.outcome import Interval, Outcome, false_discovery, holm, student_interval
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
 from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
 from study_app.analysis.statistics.trend import trend
@@ -553,6 +553,18 @@ def _differing(pair: Pair) -> int:
     return outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
 
 
+class _MeanEffect(NamedTuple):
+    """The mean difference from the first setting, or slope per 100 ms, in one statement."""
+
+    item: str
+    effect: str
+    n: int
+    mean: float
+    sd: float
+    intercept_sd: float | None
+    interval: Interval
+
+
 class MeanTests(StatementTests):
     """The mean test of every statement: exploratory, unless it is the planned trend test."""
 
@@ -580,26 +592,30 @@ class MeanTests(StatementTests):
         over_delay = bool(self.found.delays_ms)
         effects = ["per 100 ms"] if over_delay else [f"{other} − {first}" for other in others]
         rows = [
-            (test.item, effect, test.outcome.n, *numbers)
+            _MeanEffect(test.item, effect, it.n, mean, sd, it.intercept_sd, ends)
             for test in self.value
-            if isinstance(test.outcome, SlopeTest) and test.outcome.slopes
-            for effect, *numbers in zip(
-                effects, test.outcome.slopes, test.outcome.sds, test.outcome.intervals, strict=True
-            )
+            if isinstance(it := test.outcome, SlopeTest) and it.slopes
+            for effect, mean, sd, ends in zip(effects, it.slopes, it.sds, it.intervals, strict=True)
         ]
         if not rows:
             return
         what = "Mean slopes per 100 ms of delay" if over_delay else f"Mean differences from {first}"
-        yield paragraph(f"{what}, in points; SD is the standard deviation between participants:", "soft")
+        at = "without delay" if over_delay else f"for {first}"
+        yield paragraph(
+            f"{what}, in points; SD is the standard deviation between participants, and “intercept SD” that of their "
+            f"answers {at}:",
+            "soft",
+        )
         yield table_of(
             rows,
-            ("Statement", lambda row: short_text(self.found, row[0])),
-            ("Effect", lambda row: row[1]),
-            ("n", lambda row: str(row[2])),
-            ("mean slope" if over_delay else "mean difference", lambda row: number(row[3])),
-            ("SD", lambda row: number(row[4])),
-            ("SE", lambda row: number(row[4] / math.sqrt(row[2]))),
-            *ends_of(lambda row: row[5]),
+            ("Statement", lambda row: short_text(self.found, row.item)),
+            ("Effect", lambda row: row.effect),
+            ("n", lambda row: str(row.n)),
+            ("mean slope" if over_delay else "mean difference", lambda row: number(row.mean)),
+            ("SD", lambda row: number(row.sd)),
+            ("SE", lambda row: number(row.sd / math.sqrt(row.n))),
+            ("intercept SD", lambda row: number(row.intercept_sd)),
+            *ends_of(lambda row: row.interval),
             words=2,
         )
 
