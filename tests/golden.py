@@ -22,7 +22,7 @@ CHANGING = re.compile(
 )
 """Dates, versions, hashes and fingerprints."""
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
-MASKED = re.compile(r"(?:(?<![\w.])-)?\d+(?:[.,:]\d+)*(?:e[+-]?\d+)?")
+MASKED = re.compile(r"(?:(?<![\w.])[-−])?\d+(?:[.,:]\d+)*(?:e[+-]?\d+)?")
 HEADINGS = ("== ", "-- ")
 SHOWN = 40
 """Most lines of a difference that are printed."""

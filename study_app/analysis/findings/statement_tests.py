@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
@@ -51,9 +51,13 @@ ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare
 
 
 def table_of_tests(
-    title: str, result: BlockResult, tests: Sequence[Tested], compared: Sequence[str] = ()
+    title: str,
+    result: BlockResult,
+    tests: Sequence[Tested],
+    compared: Sequence[str] = (),
+    *more: tuple[str, Callable[[Tested], str]] | None,
 ) -> Iterator[str]:
-    """Yield a table of tests; ``compared`` names what each of them compares."""
+    """Yield a table of tests with ``more`` columns; ``compared`` names what each of them compares."""
     if not tests:
         return
     first, outcomes = tests[0], [test.outcome for test in tests]
@@ -83,6 +87,7 @@ def table_of_tests(
         if _has(outcomes, "effect")
         else None,
         *(ends_of(lambda test: test.outcome.interval) if intervals else ()),
+        *more,
         ("Verdict", _verdict),
         last=1,
     )
@@ -553,16 +558,21 @@ def _differing(pair: Pair) -> int:
     return outcome.n - (outcome.zeros if isinstance(outcome, Paired) else 0)
 
 
-class _MeanEffect(NamedTuple):
-    """The mean difference from the first setting, or slope per 100 ms, in one statement."""
+class _Difference(NamedTuple):
+    """The mean difference of the ``other`` setting from the first one in one statement."""
 
     item: str
-    effect: str
+    other: str
     n: int
     mean: float
     sd: float
-    intercept_sd: float | None
     interval: Interval
+
+
+def _spread(test: Tested, field: str) -> str:
+    """Return the standard deviation between participants of their slopes or intercepts."""
+    sds = getattr(test.outcome, field)
+    return number((sds[0] if sds else None) if isinstance(sds, tuple) else sds)
 
 
 class MeanTests(StatementTests):
@@ -587,34 +597,38 @@ class MeanTests(StatementTests):
         return in_family(slope_tests(answers), answers, family, false_discovery, FDR, primary=False), ()
 
     def section(self) -> Iterator[str]:
-        yield from super().section()
-        first, *others = self.found.names
-        over_delay = bool(self.found.delays_ms)
-        effects = ["per 100 ms"] if over_delay else [f"{other} − {first}" for other in others]
+        over_delay, first, others = bool(self.found.delays_ms), self.found.names[0], self.found.names[1:]
+        slopes = ("slope SD", lambda test: _spread(test, "sds")) if over_delay else None
+        intercepts = ("intercept SD", lambda test: _spread(test, "intercept_sd"))
+        yield from table_of_tests(self._said(self.title), self.found, self.value, (), slopes, intercepts)
+        if not any(isinstance(test.outcome, SlopeTest) and test.outcome.slopes for test in self.value):
+            return
+        if over_delay:
+            yield paragraph(
+                "Slopes are in points per 100 ms of delay. SDs are the standard deviations between participants of "
+                "their slopes, and of their answers without delay (intercepts).",
+                "soft",
+            )
+            return
         rows = [
-            _MeanEffect(test.item, effect, it.n, mean, sd, it.intercept_sd, ends)
+            _Difference(test.item, other, it.n, mean, sd, ends)
             for test in self.value
             if isinstance(it := test.outcome, SlopeTest) and it.slopes
-            for effect, mean, sd, ends in zip(effects, it.slopes, it.sds, it.intervals, strict=True)
+            for other, mean, sd, ends in zip(others, it.slopes, it.sds, it.intervals, strict=True)
         ]
-        if not rows:
-            return
-        what = "Mean slopes per 100 ms of delay" if over_delay else f"Mean differences from {first}"
-        at = "without delay" if over_delay else f"for {first}"
         yield paragraph(
-            f"{what}, in points; SD is the standard deviation between participants, and “intercept SD” that of their "
-            f"answers {at}:",
+            f"The intercept SD is the standard deviation between participants of their answers for {first}. Mean "
+            f"differences from {first}, in points:",
             "soft",
         )
         yield table_of(
             rows,
             ("Statement", lambda row: short_text(self.found, row.item)),
-            ("Effect", lambda row: row.effect),
+            ("Comparison", lambda row: f"{row.other} − {first}"),
             ("n", lambda row: str(row.n)),
-            ("mean slope" if over_delay else "mean difference", lambda row: number(row.mean)),
+            ("mean difference", lambda row: number(row.mean)),
             ("SD", lambda row: number(row.sd)),
             ("SE", lambda row: number(row.sd / math.sqrt(row.n))),
-            ("intercept SD", lambda row: number(row.intercept_sd)),
             *ends_of(lambda row: row.interval),
             words=2,
         )
