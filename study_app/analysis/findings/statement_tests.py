@@ -597,12 +597,13 @@ class MeanTests(StatementTests):
         return in_family(slope_tests(answers), answers, family, false_discovery, FDR, primary=False), ()
 
     def section(self) -> Iterator[str]:
+        if not any(isinstance(test.outcome, SlopeTest) and test.outcome.slopes for test in self.value):
+            yield from super().section()
+            return
         over_delay, first, others = bool(self.found.delays_ms), self.found.names[0], self.found.names[1:]
         slopes = ("slope SD", lambda test: _spread(test, "sds")) if over_delay else None
         intercepts = ("intercept SD", lambda test: _spread(test, "intercept_sd"))
         yield from table_of_tests(self._said(self.title), self.found, self.value, (), slopes, intercepts)
-        if not any(isinstance(test.outcome, SlopeTest) and test.outcome.slopes for test in self.value):
-            return
         if over_delay:
             yield paragraph(
                 "Slopes are in points per 100 ms of delay. SDs are the standard deviations between participants of "

@@ -9,17 +9,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import t as student
 
 from study_app.analysis.data.study_tables import Study, load_study, pool_sites
+from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings import all_findings
+from study_app.analysis.report import sections
 from study_app.analysis.report.sections import answers
 from study_app.analysis.report.write_report import report
 from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import FigureDrawn, ReadStudy
 from study_app.store.unblinding import unblind
 from tests.analysis.conftest import HIDDEN, SAMPLE, Results, twelve
-from tests.analysis.made_up import delays, everybody, liquids, study
+from tests.analysis.made_up import ITEMS, delays, everybody, liquids, study
 from tests.analysis.random_studies import drawn, keeps_contract
+from tests.analysis.report.read_report import seen
 from tests.plug_in_packages import forget, install
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
@@ -128,3 +132,26 @@ def test_a_finding_that_is_one_file_stands_in_every_output(tmp_path: Path) -> No
     carry_out(ReadStudy(folder), told_window.append, lambda: False)
     drawn = {one.title for one in told_window if isinstance(one, FigureDrawn) and one.name.startswith("highest")}
     assert drawn == {"<Highest> answers"}
+
+
+def test_mean_differences_are_shown_with_their_spread_and_interval() -> None:
+    """Differences are those of the other liquids from the first one."""
+    settings, given = liquids(3), np.random.default_rng(8).integers(1, 8, size=(17, 3, 2))
+    trials = [
+        (f"P{person:03}", 1, setting.code, given[person, place].tolist())
+        for person in range(17)
+        for place, setting in enumerate(settings)
+    ]
+    results = evaluate(study(settings, trials))
+    (found,) = results.blocks
+    told = seen("".join(sections.block(found, results, ())))
+    assert len(set(found.names)) == 3
+    for item, of_item in zip(ITEMS, np.moveaxis(given, 2, 0), strict=True):
+        for other in (1, 2):
+            differences = of_item[:, other] - of_item[:, 0]
+            error = differences.std(ddof=1) / 17**0.5
+            reach = student.ppf(0.975, 16) * error
+            mean = differences.mean()
+            numbers = (mean, differences.std(ddof=1), error, mean - reach, mean + reach)
+            row = [item.capitalize(), f"{found.names[other]} − {found.names[0]}", "17", *map("{:.2f}".format, numbers)]
+            assert " ".join(row).replace("-", "−") in told
