@@ -23,7 +23,7 @@ from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, number, significant
 from study_app.protocol.model import quoted_title
 
-_BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] ")
+_BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] |\b(?:d_z|g) (?=[−\d])")
 """Where a line must not break: in an interval, before a percent sign, in "n = 12" and "p < .001"."""
 _LIMITS_SHOWN: Final = 6
 """So many limits are listed on the first page; the others are folded."""

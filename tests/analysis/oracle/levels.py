@@ -178,6 +178,7 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
     p = {"higher": above, "lower": below}.get(contrast.get("expected", ""), 2 * min(above, below))
     n = sum(map(len, samples))
     own = {"n": n, "dropped": len(members) - n, "statistic": mean / error, "p": p, "effect": scale(mean)}
+    own |= {"standard_error": error, "freedom": freedom}
     own |= named("interval", {"low": scale(mean - reach), "high": scale(mean + reach), "level": 0.95})
     if not groups:
         own |= {"higher": (samples[0]["value"] > 0).sum(), "sd": samples[0]["value"].std()}
