@@ -70,7 +70,7 @@ def test_codes_of_sealed_sites_are_never_pooled(sealed: Path, tmp_path: Path) ->
     assert (rows["code"].str.partition("-")[0] == rows["participant"].str.partition("-")[0]).all()
     report(sealed, tmp_path, failed=pytest.fail)
     page = read(tmp_path)
-    assert "Each site has a key of its own" in page
+    assert "Each site has its own key" in page
     for condition in ("light_oil", "delay_75"):
         assert condition not in page
 
@@ -198,7 +198,9 @@ def test_a_merged_study_of_levels_is_reported_sealed_and_opened(tmp_path: Path) 
         assert {one.condition for one in own[1].settings} == {one.condition for one in own[0].settings}
     assert set(found.intervals["participant"]) == {"A-P001", "A-P002", "B-P001", "B-P002"}
     report(tmp_path / "pooled", tmp_path / "opened", failed=pytest.fail)
-    assert "Merged sites: A with" in read(tmp_path / "opened")
+    assert "The results from these sites are merged: A (two participants) and B (two participants)" in read(
+        tmp_path / "opened"
+    )
 
 
 def site_folders(root: Path) -> list[Path]:
