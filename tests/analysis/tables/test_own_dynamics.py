@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.signal import butter, find_peaks, sosfiltfilt
 
 from study_app.analysis.data import blocks
 from study_app.analysis.data.blocks import OwnDynamics
@@ -160,6 +161,22 @@ def test_peaks_of_speed_are_counted_where_enough_samples_are_fast_enough(
     positions = np.zeros((samples, 3))
     positions[:, 1] = np.cumsum(speed) / rate_hz
     assert submovements(seconds, positions) == found
+
+
+@pytest.mark.parametrize("rate_hz", [24.0, 125.0, 1000.0, 4000.0])
+def test_speed_is_filtered_with_a_butterworth_low_pass_at_10_hz(rate_hz: float) -> None:
+    draws = np.random.default_rng(4)
+    design = butter(2, 10, fs=rate_hz, output="sos")
+    counts = []
+    for _ in range(20):
+        seconds = np.arange(round(2 * rate_hz)) / rate_hz
+        velocities = np.stack([np.interp(seconds, np.linspace(0, 2, 60), draws.normal(size=60)) for _ in "xyz"], axis=1)
+        positions = velocities.cumsum(axis=0) / rate_hz
+        speed = np.linalg.norm(np.gradient(positions, seconds, axis=0), axis=1)
+        smooth = sosfiltfilt(design, speed)
+        counts.append(max(1, len(find_peaks(smooth, prominence=0.1 * smooth.max())[0])))
+        assert submovements(seconds, positions) == counts[-1]
+    assert len(set(counts)) > 3
 
 
 def test_a_dwell_that_is_too_short_is_no_reach() -> None:
