@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 import re
 import string
@@ -447,6 +448,7 @@ _LABELS: Final = {
     "feedback_s": "Feedback duration",
     "go_on": "Continue",
     "group_assignment": "Group assignment",
+    "herschel-bulkley": "Herschel–Bulkley",
     "id": "ID",
     "intro": "Introduction",
     "latin": "Latin square",
@@ -569,16 +571,13 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
             Choice(tag, (" ".join(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0].split())))
             for tag, node in named.items()
         )
-        part = around.get("properties", {}).get(key, {})
-        default = part.get("default", None if None in named else part.get("const"))
-        required = key in around.get("required", ())
         return Row(
             path=path,
             kind="kind",
             label=label_of(key),
             value=value,
-            default=default,
-            required=required,
+            default=around.get("properties", {}).get(key, {}).get("default") if None in named else None,
+            required=None not in named,  # the schema has a default for each kind, but validation needs the key
             choices=options,
             model=around.get("title", ""),
         )
@@ -816,4 +815,6 @@ def _initial_number(node: _Node, otherwise: float) -> float:
     wanted = next(iter(node.get("examples", ())), otherwise)
     least, most = node.get("minimum", node.get("exclusiveMinimum", wanted)), node.get("maximum", wanted)
     number = min(max(wanted, least), most)
+    if number <= node.get("exclusiveMinimum", -math.inf):
+        number += 1
     return int(number) if float(number).is_integer() else number

@@ -575,13 +575,18 @@ def index_of(path: Path) -> int:
 
 
 def _first_value(study: Study, path: Path) -> Any:
-    """Return the default of a key, or an initial value; for a table with its required keys."""
+    """Return the default of a key, or an initial value; for a table with the keys without which it is incomplete."""
     value = _as_written(initial_value(study.document, path))
     if value != {}:
         return value
     after, _ = study.with_edits(Set(path, {}))
-    needed = (row for row in rows(after.document, path) if row.required)
-    return {str(row.path[-1]): _as_written(initial_value(after.document, row.path)) for row in needed}
+    needed = [row.path for row in rows(after.document, path) if row.required]
+    while needed:
+        value |= {str(place[-1]): _as_written(initial_value(after.document, place)) for place in needed}
+        after, _ = study.with_edits(Set(path, value))
+        inner = (fault.path for fault in after.faults if fault.path[:-1] == path)
+        needed = [place for place in inner if value_at(after.document, place) is None]
+    return value
 
 
 def _as_written(value: Any) -> Any:

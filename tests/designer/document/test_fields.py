@@ -7,14 +7,16 @@ from typing import Any
 import pytest
 
 from study_app.designer.document.elements import element_of
-from study_app.designer.document.fields import Row, rows, unit_of
+from study_app.designer.document.fields import Row, label_of, row_at, rows, unit_of
+from study_app.designer.document.steps import AddKey, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.form.form import form_of
 from study_app.protocol.json_schema import schema
-from study_app.protocol.source.document import Path
+from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, rule_of, shown_value
 from study_app.store.workstation import MachineSettings
-from tests.protocol.edited_studies import FAULTY, Case
+from tests.designer.document.grown import PROTOCOLS
+from tests.protocol.edited_studies import FAULTY, Case, text_of
 
 DEFS = schema()["$defs"]
 
@@ -107,6 +109,22 @@ def test_every_value_that_can_be_chosen_has_its_sentence() -> None:
         and not all(choice.sentence for choice in row.choices)
     }
     assert lacking == set()
+
+
+def test_an_added_table_has_what_it_needs_and_no_required_choice_is_called_a_default() -> None:
+    study = read_study(text_of("sound").encode(), PROTOCOLS)
+    item = next(path for path, item in entries(study.document, "questionnaires.*.items.*") if "show_if" not in item)
+    liquid = ("liquids", next(iter(study.document["liquids"])))
+    kinds = {"region": "everywhere", "current": "uniform", "non_newtonian": "herschel-bulkley"}
+    for path in (*((*liquid, key) for key in kinds), (*item, "show_if")):
+        step = AddKey(path).step(Situation(study))
+        after, _ = study.with_edits(*step.edits)
+        assert [fault for fault in after.faults if fault.path[:-1] == path and fault not in study.faults] == []
+        kind = row_at(after.document, (*path, "kind"))
+        if path[-1] in kinds:
+            assert kind is not None
+            assert (kind.value, kind.default, kind.required) == (kinds[path[-1]], None, True)
+    assert label_of("herschel-bulkley") == "Herschel–Bulkley"
 
 
 OF_THE_ELEMENT = {
