@@ -652,7 +652,7 @@ class OutlineCard(Coloured, Card):
                 item.setData(row.name, Qt.ItemDataRole.AccessibleTextRole)
                 item.setToolTip(plain_tip(row.title))  # it may be cut
                 if not row.path:
-                    item.setFlags(Qt.ItemFlag.ItemIsEnabled)
+                    item.setFlags(Qt.ItemFlag.NoItemFlags)  # the arrow keys skip it
                 depth = max(row.depth - 1, 0)
                 del above[depth + 1 :]
                 above[-1].appendRow(item)

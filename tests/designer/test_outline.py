@@ -95,6 +95,24 @@ def test_down_leads_from_an_empty_search_to_the_outline(designer: Any) -> None:
     assert designer.place.form_path == ("blocks", "liquids")
 
 
+def test_arrow_keys_skip_the_headings_and_each_row_shows_its_form(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    outline = designer.place.outline
+    outline.tree.setFocus()
+    rows = [index.data(ROW_ROLE) for index in outline.indexes() if not index.parent().isValid()]
+    elements = [row.path for row in rows if row.path]
+    assert len(rows) - len(elements) == 3
+    visited = [designer.place.form_path]
+    for key, stops in (("Down", elements[1:]), ("Up", elements[-2::-1])):
+        for _ in stops:
+            index = outline.tree.currentIndex()
+            outline.tree.collapse(index)
+            designer.hit(key)
+            visited.append(designer.place.form_path)
+            assert outline.tree.selectedIndexes() == [outline.tree.currentIndex()]
+    assert visited == [*elements, *elements[-2::-1]]
+
+
 def test_a_list_that_is_clicked_after_an_id_was_typed_stays_open(qtbot: Any, designer: Any) -> None:
     designer.open()
     type_id(qtbot, designer, ("conditions", "thick"), "honey")
