@@ -350,11 +350,15 @@ class _Arrangement(QWidget):
         self.header.study.setFocus(_SHORTCUT)
 
     def focus_form(self) -> None:
-        """Focus the field of the current problem if the form shows it, otherwise the first row."""
+        """Focus the field of the current problem if the form shows it, otherwise the first field."""
         self.show_side("form")
         form, row = self.form.form, self.problems.current
         if form is None or row is None or row.element != form.path or not self.form.focus_row(row.fault.path):
-            self.form.focus_first()
+            self.form.focus_first_field()
+
+    def focus_first_field(self) -> None:
+        self.show_side("form")
+        self.form.focus_first_field()
 
     def focus_field(self, path: ElementPath) -> None:
         """Focus a field of the form and select its value; without its row, the first row."""
@@ -486,8 +490,8 @@ class DesignerPlace(Place):
         outline.chosen.connect(partial(self.finish, "select"))
         outline.words.textChanged.connect(partial(self.ask, "find"))
         outline.field_asked.connect(self.parts.focus_field)
-        outline.form_asked.connect(self.parts.focus_form)
-        outline.element_clicked.connect(lambda: self.parts.focus_form() if self.parts.drawer else None)
+        outline.form_asked.connect(self.parts.focus_first_field)
+        outline.element_clicked.connect(lambda: self.parts.focus_first_field() if self.parts.drawer else None)
         outline.tree.dropped.connect(lambda entry, to: self.asked.emit(MoveTo(entry, index_of(to))))
         self.adding.chosen.connect(lambda entry: self._handle_request(entry.asks))
         self.parts.path.open_asked.connect(partial(self.finish, "select"))

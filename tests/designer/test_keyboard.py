@@ -7,6 +7,8 @@ import pytest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
+from study_app.designer.form.fields import TypedLine, TypedText
+from study_app.designer.outline import ROW_ROLE
 from study_app.designer.window import focus_stops
 from study_app.gui.kit.commands import COMMANDS
 
@@ -98,6 +100,39 @@ def test_tab_goes_to_each_stop_of_a_form_once(dutch: Any, editors: None, path: t
     assert [part.accessibleName() for part in seen if form.inside.isAncestorOf(part)] == [
         part.accessibleName() for part in focus_stops(form.inside) if part.isVisible() and part.isEnabled()
     ]
+
+
+def test_enter_in_the_outline_leads_to_the_first_field_to_type_in_of_each_element(designer: Any) -> None:
+    designer.open()
+    designer.editing.handle_request(ChangeLanguage("add", "nl"))  # whose texts are missing
+    text = designer.text
+    outline = designer.place.outline
+    landed = {}
+    for path in dict.fromkeys(index.data(ROW_ROLE).path for index in outline.indexes()):
+        if len(path) != 2 and path != ("study",):
+            continue
+        designer.go_to(*path)
+        outline.tree.setFocus()
+        field = designer.hit("Return")
+        stops = focus_stops(designer.place.form.inside)
+        assert field is next((stop for stop in stops if isinstance(stop, TypedLine | TypedText)), field), path
+        landed[path] = field.accessibleName()
+    assert landed["study",] == "Name"
+    assert landed["pages", "welcome"] == "Title, English"
+    assert landed["blocks", "liquids"] == "Title, English"
+    assert landed["questionnaires", "liquid"] == "Introduction, English"
+    assert designer.text == text
+
+
+def test_a_letter_at_the_button_that_removes_a_key_is_typed_in_the_field(designer: Any) -> None:
+    designer.open()
+    path = ("pages", "welcome", "button")
+    designer.go_to(*path[:2])
+    before = designer.value(*path)
+    designer.form_row(*path).remove.setFocus()
+    field = designer.hit("x")
+    assert designer.field(*path).isAncestorOf(field)
+    assert (field.words(), designer.value(*path)) == (f"x{before}", before)
 
 
 def test_the_button_that_removes_a_key_is_reached_by_tab_and_pressed_by_space(designer: Any) -> None:

@@ -242,6 +242,8 @@ class _RowWidget(Themed, QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if removes_key(event) and self.row.is_removable and self.remove.isEnabled():
             self._ask_to_remove()
+        elif self.remove.hasFocus() and event.text().strip() and event.text().isprintable():
+            self._type_letter(event)  # it is meant for the field
         else:
             super().keyPressEvent(event)
 
@@ -800,21 +802,36 @@ class FormCard(Card):
         if self.rows:
             self.focus_row(self.rows[0].row.path)
 
+    def focus_first_field(self) -> None:
+        """Focus the first field to type in, in the first language, or the first row in a form without such a field."""
+        if (field := next(self._typed_fields(), None)) is not None:
+            self._focus_typed(field)
+        else:
+            self.focus_first()
+
     def focus_first_text(self, *, filled: bool) -> None:
         """Focus the first text and select it; empty texts are preferred unless all are filled in.
 
         In a form without texts the first row gets the focus.
         """
-        texts = [part for row in self.rows for part in row.field.findChildren(QWidget)]
-        lines = [part for part in texts if isinstance(part, TypedLine | TypedText)]
-        text_lines = [part for part in lines if isinstance(part.parent(), LanguagesField)]
-        empty = (part for part in lines if not filled and not part.words() and not part.placeholderText())
-        field = next(iter((*empty, *text_lines)), None)
+        fields = list(self._typed_fields())
+        texts = [field for field in fields if isinstance(field.parent(), LanguagesField)]
+        empty = (field for field in fields if not filled and not field.words() and not field.placeholderText())
+        field = next(iter((*empty, *texts)), None)
         if field is None:
             self.focus_first()
             return
-        field.setFocus(Qt.FocusReason.OtherFocusReason)
+        self._focus_typed(field)
         field.selectAll()
+
+    def _typed_fields(self) -> Iterator[TypedLine | TypedText]:
+        for row in self.rows:
+            for part in row.field.findChildren(QWidget):
+                if isinstance(part, TypedLine | TypedText) and part.isVisibleTo(self) and part.isEnabled():
+                    yield part
+
+    def _focus_typed(self, field: TypedLine | TypedText) -> None:
+        field.setFocus(Qt.FocusReason.OtherFocusReason)
         row = next(row for row in self.rows if row.isAncestorOf(field))
         self._show_focused_row(row)
         self._scroll_to(row)
