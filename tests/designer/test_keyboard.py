@@ -4,10 +4,9 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
-from study_app.designer.form.fields import TypedLine, TypedText
 from study_app.designer.outline import ROW_ROLE
 from study_app.designer.window import focus_stops
 from study_app.gui.kit.commands import COMMANDS
@@ -115,7 +114,7 @@ def test_enter_in_the_outline_leads_to_the_first_field_to_type_in_of_each_elemen
         outline.tree.setFocus()
         field = designer.hit("Return")
         stops = focus_stops(designer.place.form.inside)
-        assert field is next((stop for stop in stops if isinstance(stop, TypedLine | TypedText)), field), path
+        assert field is next((stop for stop in stops if isinstance(stop, QLineEdit | QPlainTextEdit)), field), path
         landed[path] = field.accessibleName()
     assert landed["study",] == "Name"
     assert landed["pages", "welcome"] == "Title, English"

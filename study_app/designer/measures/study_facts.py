@@ -54,12 +54,14 @@ def texts_by_language(study: Study) -> dict[str, tuple[int, int]]:
     """Return for each language the numbers of its present and its required texts."""
     languages = languages_of(study.document)
     counted = {code: [0, 0] for code in languages}
+    lacking = {(fault.path, fault.missing_language) for fault in study.faults if fault.kind == "no text"}
     for path, value in texts_of(study):
-        is_instrument = value_at(study.document, (*path[:2], "instrument")) is not None  # the program has its texts
+        is_instrument = value_at(study.document, (*path[:2], "instrument")) is not None
         for place, code in enumerate(languages):
             counted[code][1] += 1
             text = value.get(code) if isinstance(value, Mapping) else value if place == 0 else ""
-            counted[code][0] += is_instrument or bool(text.strip() if isinstance(text, str) else text)
+            of_program = is_instrument and (path, code) not in lacking
+            counted[code][0] += of_program or bool(text.strip() if isinstance(text, str) else text)
     return {code: (present, wanted) for code, (present, wanted) in counted.items()}
 
 

@@ -267,7 +267,7 @@ def test_copies_in_two_languages_are_counted_until_each_is_edited_and_a_missing_
         assert copied_texts(edited) == {"nl": dutch - 1, "de": count}
         assert missing_texts(edited) == ({"nl": 1} if isinstance(edit, Unset) else {})
     in_dutch = {"instrument": "nasa-tlx", "intro": {"nl": "Beoordeel de taak."}}
-    assert missing_texts(translated.with_edits(Set(("questionnaires", "load"), in_dutch))[0]) == {}
+    assert missing_texts(translated.with_edits(Set(("questionnaires", "load"), in_dutch))[0]) == {"de": 1}
     plain, _ = translated.with_edits(*(Set((*TITLE, code), "7") for code in ("en", "nl")))
     assert copied_texts(plain) == {"nl": dutch - 1, "de": count}, "7 is the same in all; the German is English"
 

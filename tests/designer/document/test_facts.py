@@ -11,6 +11,7 @@ from study_app.analysis.planning import threshold_studies
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import outline
+from study_app.designer.document.steps import AddInstrument, ChangeLanguage, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import (
@@ -185,6 +186,14 @@ def test_texts_are_counted_by_language() -> None:
     assert texts_by_language(without) == {"en": (wanted, wanted), "nl": (labels - 2, wanted)}
     assert facts(without).missing == {"nl": 2}
     assert {"title", "body", "setting_label", "instruction"} <= text_keys()
+
+
+def test_texts_that_the_program_lacks_in_a_language_are_missing_and_each_is_a_problem() -> None:
+    study = template("two-liquids-abx")
+    for request in (ChangeLanguage("add", "fr"), ChangeLanguage("copy", "fr"), AddInstrument("nasa-tlx")):
+        study, _ = study.with_edits(*request.step(Situation(study)).edits)
+    assert facts(study).missing == {"fr": 1 + 6 * 3}, "the introduction, and of each item its text and two ends"
+    assert [fault.kind for fault in study.faults] == ["no text"] * 19
 
 
 @pytest.mark.parametrize(("text", "word"), [("Now comes Light Oil", "light oil"), ("Seen 50 ms late", "50 ms")])
