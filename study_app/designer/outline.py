@@ -198,7 +198,10 @@ _SECTIONS_OF_TABLES: Final = frozenset(_ICONS) - {
 }  # fmt: skip
 
 
-_HELP: Final = {"designs": "2IFC and other trial designs"}
+_HELP: Final = {
+    "designs": "2IFC and other trial designs",
+    "liquids": "A liquid whose values you enter. To copy a shipped liquid, such as water or slime, type its name.",
+}
 """What a section is for, where its name does not say it."""
 
 
@@ -213,7 +216,10 @@ class Addable:
 
 
 def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
-    """Return what can be added: for lists of the selected element, its section, then the other sections."""
+    """Return what can be added: for lists of the selected element, its section, then the other sections.
+
+    Shipped liquids follow the liquid to be filled in if a liquid is selected, otherwise the sections.
+    """
     document = study.document
     around = selected[:2] if len(selected) > 1 else ()
     lists = [row.path for row in rows(document, around) if row.kind == "list"] if around else []
@@ -229,8 +235,10 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
         )
         for path in sections
     ]
+    first = 1 if selected[:1] == ("liquids",) else len(entries)
+    entries[first:first] = _addable_liquids(study)
     entries += _addable_questions(study, around) if not any(path[0] == _QUESTIONNAIRES for path in lists) else ()
-    return (*entries, *_addable_liquids(study), *_addable_instruments())
+    return (*entries, *_addable_instruments())
 
 
 def _addable_liquids(study: Study) -> tuple[Addable, ...]:

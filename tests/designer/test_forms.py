@@ -87,6 +87,14 @@ def test_the_next_element_has_no_selected_entries_and_shows_the_field_with_the_k
     assert area.viewport().rect().contains(designer.keyboard.mapTo(area.viewport(), designer.keyboard.rect().center()))
 
 
+def test_the_form_of_the_liquids_adds_a_shipped_one(designer: Any) -> None:
+    designer.open("kitchen", "liquids")
+    names = designer.field("liquids").add
+    names.activated.emit(names.findText("Slime liquid", Qt.MatchFlag.MatchStartsWith))
+    assert designer.editing.selected == ("liquids", "slime")
+    assert designer.value("liquids", "slime", "non_newtonian", "kind") == "maxwell"
+
+
 def test_the_help_is_that_of_the_row_with_the_keyboard(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids")
     for key in ("title", "conditions", "phase", "task"):

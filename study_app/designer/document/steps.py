@@ -285,7 +285,7 @@ class AddLiquid(Request):
         numbers = {**table, **table.get("drag", {})}.items()
         facts = [f"{value:.4g} {unit_of(key)}" for key, value in numbers if isinstance(value, int | float)]
         kind, effects = table.get("non_newtonian", {}).get("kind"), table.get("effects")
-        named = (kind,) if kind else effects if isinstance(effects, tuple) else ()
+        named = (label_of(kind),) if kind else effects if isinstance(effects, tuple) else ()
         return ", ".join((f"{label_of(self.name)} liquid", *facts, *named))
 
     def help(self, study: Study) -> str:

@@ -31,6 +31,7 @@ from study_app.designer.document.fields import (
     sections_of,
 )
 from study_app.designer.document.steps import (
+    AddElement,
     AddNamed,
     AddToSession,
     Request,
@@ -268,7 +269,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         entries=tuple(_entries(study, row)),
         target=named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         notes=tuple(_notes(document, row)),
-        additions=tuple(_additions(study, row)) if row.kind in {"reference", "references"} else (),
+        additions=tuple(_additions(study, row)),
         number=number,
         facts=facts(study, row) if (facts := _facts_of(row)) is not None else None,
     )  # fmt: skip
@@ -294,10 +295,13 @@ def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
 
 
 def _additions(study: Study, row: Row) -> Iterator[tuple[str, Request]]:
-    """Yield the labels and requests that add an element to which a reference then refers."""
+    """Yield the labels and requests that add a liquid, or an element to which a reference then refers."""
     for section in row.sections:
         yield new_element_label(section), AddNamed(row.path, section)
-    if row.kind == "reference" and row.sections == ("liquids",):
+    if row.path == ("liquids",):
+        yield new_element_label("liquids"), AddElement(row.path)
+        yield from ((asked.words, asked) for asked in shipped_liquids_to_add(study))
+    elif row.kind == "reference" and row.sections == ("liquids",):
         yield from ((asked.words, asked) for asked in shipped_liquids_to_add(study, row.path))
 
 

@@ -275,7 +275,7 @@ class EntriesField(EntryList):
     def __init__(self, row: FormRow) -> None:
         super().__init__(row)
         name = f"Add to {row.label}"
-        self.names = _NamesList(name, "Add …") if row.kind == "references" else None
+        self.names = _NamesList(name, "Add …") if row.kind == "references" or row.additions else None
         if self.names is not None:
             self.names.chosen.connect(self.asked)
             self.add: QWidget = self.names

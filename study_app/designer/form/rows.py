@@ -110,7 +110,7 @@ class FormRow(Row):
     entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
     target: Path | None = None  # what a reference names
     notes: tuple[tuple[str, str], ...] = ()  # elements that a reference can name, each with its `short_note` fact
-    additions: tuple[tuple[str, Request], ...] = ()  # the labels of new elements that a reference can name
+    additions: tuple[tuple[str, Request], ...] = ()  # the labels of elements that can be added here
     number: int | None = None  # of alternatives ("either"), which one the value is
     # keys of which exactly one is given, with their labels: this row's and the other one
     keys: tuple[tuple[str, str], ...] = ()

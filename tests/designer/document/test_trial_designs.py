@@ -146,7 +146,7 @@ def test_another_liquid_and_another_delay_are_warned_of_and_a_drawn_order_is_not
 
 def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study) -> None:
     entries = {entry.words: entry for entry in addable_elements(study, ())}
-    slime = entries["Slime liquid, 1020 kg/m³, maxwell"]
+    slime = entries["Slime liquid, 1020 kg/m³, Maxwell"]
     told_apart = {words for words in entries if words.startswith(("Water liquid", "Damper liquid"))}
     assert told_apart == {
         "Water liquid, 1000 kg/m³, drag, wake", "Water liquid, 998.2 kg/m³, 0.001002 Pa·s",
@@ -175,9 +175,17 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert added.document["conditions"]["slime_2"] == {"liquid": "slime_2"}
     conditions = form_of(study, ("conditions", "water")).sections[0].rows
     chosen = next(dict(row.additions) for row in conditions if row.path[-1] == "liquid")
-    named = after(study, chosen["Slime liquid, 1020 kg/m³, maxwell"])
+    named = after(study, chosen["Slime liquid, 1020 kg/m³, Maxwell"])
     assert (named.faults, named.document["conditions"]["water"]) == ((), {"liquid": "slime_2"})
     assert "New liquid …" in chosen
+    (listed,) = form_of(study, ("liquids",)).sections[0].rows
+    assert dict(listed.additions)["Slime liquid, 1020 kg/m³, Maxwell"] == slime.asks
+    liquids = after(study, dict(listed.additions)["New liquid …"]).document["liquids"]
+    assert len(liquids) == len(study.document["liquids"]) + 1
+    beside = [entry.words for entry in addable_elements(study, ("liquids", "slime"))]
+    assert beside[0] == "Liquid"
+    assert {words for words in beside[1:21] if " liquid, " in words} == set(beside[1:21])
+    assert "such as water or slime" in entries["Liquid"].help
     for source, name in shipped_liquids():
         assert after(study, AddLiquid(source, name)).faults == ()
 
