@@ -61,6 +61,7 @@ from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted, duration
 from study_app.protocol.checks.cross_references import OWN
 from study_app.protocol.questionnaires import instrument, instruments
+from study_app.protocol.questions import STATEMENT
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import languages_of
 
@@ -218,7 +219,7 @@ class Addable:
 def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
     """Return what can be added: for lists of the selected element, its section, then the other sections.
 
-    Shipped liquids follow the liquid to be filled in if a liquid is selected, otherwise the sections.
+    Shipped liquids come right after a new liquid if a liquid is selected, otherwise after the sections.
     """
     document = study.document
     around = selected[:2] if len(selected) > 1 else ()
@@ -235,10 +236,9 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
         )
         for path in sections
     ]
-    first = 1 if selected[:1] == ("liquids",) else len(entries)
-    entries[first:first] = _addable_liquids(study)
     entries += _addable_questions(study, around) if not any(path[0] == _QUESTIONNAIRES for path in lists) else ()
-    return (*entries, *_addable_instruments())
+    first = 1 if selected[:1] == ("liquids",) else len(entries)
+    return (*entries[:first], *_addable_liquids(study), *entries[first:], *_addable_instruments())
 
 
 def _addable_liquids(study: Study) -> tuple[Addable, ...]:
@@ -278,7 +278,7 @@ def _addable_instruments() -> tuple[Addable, ...]:
 def _addable_entry(study: Study, path: Path) -> Addable:
     """Return the entry that adds to a list; a search finds it by each of its kinds."""
     known = distinguishing_key(node_at(study.document, (*path, 0)))[1]
-    kinds = ", ".join(label_of(kind).lower() for kind in known if kind)
+    kinds = ", ".join(label_of(kind or STATEMENT).lower() for kind in known)
     to = f"To {title_of(study.document, path[:2])}{kinds and f'; kinds: {kinds}'}"
     return Addable(
         words=label_of(element_noun(path[-1])), icon=icon_of(path, study.document), asks=AddElement(path), help=to
@@ -347,7 +347,8 @@ class AddList(Themed, QFrame):
             self.list.addItem(item)
         self.list.setCurrentRow(0)
         if not self.list.count():
-            self.help.setText(f"No item with this name can be added here. {command_tip('find')}")
+            find = keys_of("find")[0]
+            self.help.setText(f"No element with this name can be added. Press {find} to find an element in the study.")
 
     def _choose(self) -> None:
         if (item := self.list.currentItem()) is not None:
@@ -630,7 +631,7 @@ class OutlineCard(Coloured, Card):
         self.tree.clicked.connect(self._click)
         self.tree.expanded.connect(lambda index: None if self._finding else self._opened.add(self._row_key(index)))
         self.tree.collapsed.connect(lambda index: self._opened.discard(self._row_key(index)))
-        self.tree.entered_row.connect(lambda: None if self._open_field() else self.form_asked.emit())
+        self.tree.entered_row.connect(self._enter_row)
 
     def apply_theme(self, theme: Theme) -> None:
         self._sign.setIcon(icon("search", theme.text2, 16))
@@ -735,6 +736,12 @@ class OutlineCard(Coloured, Card):
             self.tree.expand(index)
             if not self._open_field():
                 self.element_clicked.emit()
+            self.words.clear()
+
+    def _enter_row(self) -> None:
+        if not self._open_field():
+            self.form_asked.emit()
+        self.words.clear()
 
     def _open_field(self) -> bool:
         """Go to the matching field of the current row; return whether there is one."""
@@ -755,9 +762,18 @@ class OutlineCard(Coloured, Card):
         return first is not None
 
     def _open_first(self) -> None:
-        """Select the first matching element and go to its field."""
-        if self.words.text().strip() and self._go_to_first() and not self._open_field():
-            self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
+        """Select the first matching element, go to its field, and show the whole study again."""
+        if self.words.text().strip() and self._go_to_first():
+            if not self._open_field():
+                self.tree.setFocus(Qt.FocusReason.OtherFocusReason)
+            self.words.clear()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """Let Esc end a search; without one, the key is the page's."""
+        if event.key() == Qt.Key.Key_Escape and self.words.text():
+            self.words.clear()
+        else:
+            super().keyPressEvent(event)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         down = event.type() == QEvent.Type.KeyPress and isinstance(event, QKeyEvent) and event.key() == Qt.Key.Key_Down

@@ -672,6 +672,8 @@ class DesignerPlace(Place):
         if step.said:
             announce(self, step.said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
+        if step.fresh:
+            self.outline.words.clear()  # a search would hide it
         if step.fresh and not (step.fresh == "copy" and beside):  # after a copy in an open outline, the focus stays
             self.parts.show_side("form")
             self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts

@@ -95,6 +95,24 @@ def test_down_leads_from_an_empty_search_to_the_outline(designer: Any) -> None:
     assert designer.place.form_path == ("blocks", "liquids")
 
 
+@pytest.mark.parametrize(
+    ("keys", "selected"),
+    [("Return", "welcome"), ("Down Return", "welcome"), ("Escape", ""), ("Down Escape", "welcome"),
+     ("Down ctrl+d", "welcome_2")],
+)  # fmt: skip
+def test_a_search_ends_with_its_result_esc_or_a_new_element(designer: Any, keys: str, selected: str) -> None:
+    designer.open("kitchen", "study")
+    outline = designer.place.outline
+    whole = len(outline.rows)
+    designer.hit("ctrl+f")
+    QTest.keyClicks(outline.words, "welcome")
+    assert 0 < len(outline.rows) < whole
+    for key in keys.split():
+        designer.hit(key)
+    assert (outline.words.text(), len(outline.rows)) == ("", whole + 2 * (selected == "welcome_2"))
+    assert designer.editing.selected == (("pages", selected) if selected else ("study",))
+
+
 def test_arrow_keys_skip_the_headings_and_each_row_shows_its_form(designer: Any) -> None:
     designer.open("kitchen", "study")
     outline = designer.place.outline

@@ -20,7 +20,7 @@ from study_app.designer.document.fields import Row
 from study_app.designer.document.steps import Do, LeaveText, RemoveKey, SetText, SetValue, SwitchKind
 from study_app.designer.document.study import Study
 from study_app.designer.form.design_list import DesignList
-from study_app.designer.form.rows import STATEMENT, FormRow, choice_label, is_right_to_left
+from study_app.designer.form.rows import FormRow, choice_label, is_right_to_left
 from study_app.designer.parts import FIELD_PX, Segments, cut_text, make_dense, small_button
 from study_app.gui.kit.commands import keys_of, with_key
 from study_app.gui.theme.theme import font
@@ -30,6 +30,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
 from study_app.gui.widgets.labels import Elided, label, set_property
 from study_app.number_text import number_of, typed_numbers, unclear_number
+from study_app.protocol.questions import STATEMENT
 from study_app.protocol.wording.languages import language_name
 
 HAND_ON_MS = 150

@@ -7,12 +7,12 @@ from typing import Any, Final
 from study_app.designer.document.fields import Choice, Row, element_noun, label_of, name_label
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
+from study_app.protocol.questions import STATEMENT
 from study_app.protocol.source.document import Path, value_at
 from study_app.protocol.warnings.untranslated import UntranslatedText
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 _ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
-STATEMENT: Final = "statement"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -186,6 +186,7 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert beside[0] == "Liquid"
     assert {words for words in beside[1:21] if " liquid, " in words} == set(beside[1:21])
     assert "such as water or slime" in entries["Liquid"].help
+    assert entries["Question"].help.endswith("; kinds: choice, number, rating, slider, statement, text")
     for source, name in shipped_liquids():
         assert after(study, AddLiquid(source, name)).faults == ()
 
