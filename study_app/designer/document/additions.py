@@ -30,6 +30,7 @@ from study_app.ids import MAX_ID, free_id
 from study_app.number_text import MINUS, exact_text, number_of
 from study_app.protocol.checks.cross_references import TEXTS
 from study_app.protocol.checks.force_limits import check_paced
+from study_app.protocol.groups import ASSIGNMENT
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import Fault, rule_of, shown_value
@@ -213,6 +214,7 @@ def _text_in(value: Any, language: str) -> str | None:
 
 
 _HALVINGS: Final = 12
+_GROUPS: Final[Path] = ("groups",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -266,6 +268,8 @@ def _repairs_by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
         with suppress(Refused):
             yield Repair("Add it", (Set(path, initial_value(study.document, path)),))
     elif fault.kind in {"surplus", "unknown key"}:
+        if path in {ASSIGNMENT, _GROUPS}:
+            yield _groups_repair(study)
         yield Repair("Remove", (Unset(path),))
     elif fault.kind == "other language":
         yield Repair("Remove this text", (Unset(path),))
@@ -282,6 +286,16 @@ def _repairs_by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
         first = next(iter(value))
         sentence = f"Copy {language_name(first)} to {language_name(lacking)}"
         yield Repair(sentence, (Set((*path, lacking), value[first]),))
+
+
+def _groups_repair(study: Study) -> Repair:
+    """Return the repair that adds groups until there are two."""
+    known = names(study.document, _GROUPS[0])
+    taken = list(known)
+    while len(taken) < 2:
+        taken.append(free_id(taken, element_noun(_GROUPS[0])))
+    edits = tuple(Set((*_GROUPS, name), {}) for name in taken[len(known) :])
+    return Repair("Add another group" if known else "Add two groups", edits)
 
 
 def _level_repairs(study: Study, fault: Fault) -> Iterator[Repair]:

@@ -11,7 +11,7 @@ from study_app.analysis.planning import threshold_studies
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import outline
-from study_app.designer.document.steps import AddInstrument, ChangeLanguage, Situation
+from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import (
@@ -186,6 +186,22 @@ def test_texts_are_counted_by_language() -> None:
     assert texts_by_language(without) == {"en": (wanted, wanted), "nl": (labels - 2, wanted)}
     assert facts(without).missing == {"nl": 2}
     assert {"title", "body", "setting_label", "instruction"} <= text_keys()
+
+
+def test_a_study_gets_two_groups_at_once() -> None:
+    study, _ = template("two-liquids-abx").with_edits(Set(("study", "group_assignment"), "pre-existing"))
+    (fault,) = study.faults
+    add, remove = repairs(study, fault)
+    assert (add.words, remove.words) == ("Add two groups", "Remove")
+    grouped, _ = study.with_edits(*add.edits)
+    assert (grouped.faults, len(grouped.document["groups"])) == ((), 2)
+    single, _ = grouped.with_edits(Unset(("groups", "group")))
+    (fault,) = single.faults
+    again = repairs(single, fault)[0]
+    assert again.words == "Add another group"
+    assert single.with_edits(*again.edits)[0].document["groups"].keys() == {"group", "group_2"}
+    step = AddElement(("groups",)).step(Situation(template("two-liquids-abx")))
+    assert (step.select, template("two-liquids-abx").with_edits(*step.edits)[0].faults) == (("groups", "group"), ())
 
 
 def test_texts_that_the_program_lacks_in_a_language_are_missing_and_each_is_a_problem() -> None:
