@@ -422,13 +422,15 @@ def _untitled_forms(protocol: Protocol) -> Iterator[str]:
 
 
 def _shared_titles(protocol: Protocol) -> Iterator[str]:
-    """Yield the main blocks whose title is that of an earlier main block in some language."""
+    """Yield the main blocks whose title is that of an earlier main block in some language, each once."""
+    alike: set[str] = set()
     for language in protocol.study.languages:
         titled: dict[str, str] = {}
         for block in protocol.main_blocks:
             title = protocol.text(block.title, language)
             other = titled.setdefault(title, block.id)
-            if other != block.id:
+            if other != block.id and block.id not in alike:
+                alike.add(block.id)
                 yield (
                     f"blocks.{block.id}.title: block {other} has the same title, “{title}”, so the report adds the "
                     "IDs to both; use a different title for each block"

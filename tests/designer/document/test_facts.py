@@ -188,6 +188,15 @@ def test_texts_are_counted_by_language() -> None:
     assert {"title", "body", "setting_label", "instruction"} <= text_keys()
 
 
+def test_blocks_with_one_title_are_named_once_whatever_the_number_of_languages() -> None:
+    title = {"en": "A common title", "nl": "Eén titel"}
+    study, _ = study_of("rek2024").with_edits(
+        *(Set(("blocks", block, "title"), title) for block in ("liquids", "delays"))
+    )
+    (warning,) = [sentence for sentence in facts(study).warnings if "same title" in sentence]
+    assert warning.startswith("blocks.delays.title: block liquids has the same title, “A common title”")
+
+
 def test_a_study_gets_two_groups_at_once() -> None:
     study, _ = template("two-liquids-abx").with_edits(Set(("study", "group_assignment"), "pre-existing"))
     (fault,) = study.faults
