@@ -181,6 +181,10 @@ def _read_study_folder_state(path: Path, protocol: Protocol) -> _StudyFolderStat
     return _StudyFolderState(path, used, tuple(claims(folder)), fault)
 
 
+class _ChoiceMissing(ValueError):
+    """A choice is still to be made."""
+
+
 class NewSessionDialog(QDialog):
     """Asks for participant, seed, language, device and screen of a new session.
 
@@ -240,7 +244,7 @@ class NewSessionDialog(QDialog):
         fields = (
             Field("participant", "Participant", aside="letters and digits, not a name"),
             Field("session", "Session", "count", limits=(1, MAX_SESSION)),
-            seed_field("determines all orders and is recorded"),
+            seed_field("determines all random orders and is recorded"),
             Field("operator", "Operator", longest=40, placeholder="Initials, such as AK"),
             choice_field("language", "Language of the participant's pages", languages),
             choice_field("device", "Device", {name: device_label(name) for name in devices}),
@@ -407,16 +411,18 @@ class NewSessionDialog(QDialog):
             self._free = min(max(numbers) + 1, MAX_SESSION), used.suggested()
             self.ways[0].show_action("", f"Session {self._free[0]} of {participant}")
             self.ways[1].show_action("", f"New participant {self._free[1]}")
-        fault = ""
+        fault, sign, ink = "", "check", "ok"
         try:
             self._raise_if_refused()
+        except _ChoiceMissing as missing:  # what is still to be done is not a mistake
+            fault, sign, ink = str(missing), "info", "text2"
         except (StudyError, ValueError) as error:
-            fault = str(error)
+            fault, sign, ink = str(error), "warning", "bad"
         sentence = fault or f"{participant} is available for session {session}"
         by_id = sentence.startswith(f"{participant} ")  # an id is kept as typed
         self.verdict.setText(sentence if by_id else sentence[:1].upper() + sentence[1:])
-        set_ink(self.verdict, "bad" if fault else "ok")
-        self.verdict_icon.show_icon(*(("warning", "bad") if fault else ("check", "ok")))
+        set_ink(self.verdict, ink)
+        self.verdict_icon.show_icon(sign, ink)
         self.begin.setEnabled(not fault)
         self._fit_height()
 
@@ -442,7 +448,7 @@ class NewSessionDialog(QDialog):
         check_row(row_of, protocol)
         check_session_number(protocol, session)
         if protocol.asks_group and group is None:
-            raise ValueError("choose the participant's group")
+            raise _ChoiceMissing("choose the participant's group")
         check_choice(protocol, state.held, participant, group=group, row_of=row_of)
         self.chosen()
 

@@ -215,6 +215,10 @@ def test_a_preexisting_group_is_chosen_before_a_session_begins_and_kept_in_the_n
     assert group.value is None
     assert not made.begin.isEnabled()
     assert made.verdict.text() == "Choose the participant's group"
+    assert made.verdict.property("role") == "text2", "nothing is wrong yet"
+    made.editors["participant"].control.setText("P 3")
+    assert made.verdict.property("role") == "bad"
+    made.editors["participant"].control.setText("P002")
     qtbot.keyClicks(group.control, "first_thin")
     assert made.begin.isEnabled()
     assert (made.chosen().participant, made.chosen().group) == ("P002", "first_thin")
