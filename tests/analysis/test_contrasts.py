@@ -518,13 +518,20 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
     half, least = (0.9 * end for end in detectable(8, 8, tail=0.015))
     assert 1.3 < least < 1.7
     few = told(16, 1.3)
-    assert f"**The planned 16 participants are too few to find a difference smaller than ±{least:.2f} with 80%" in few
+    assert f"**The planned 16 participants are too few to find a difference in d′ smaller than ±{least:.2f} with" in few
     assert "would find even a fall of d′ from 1.3 to 0 in one block of one group (a difference of 1.3)." in few
     assert f"| 20 | 16 (planned) | 90% | ±{half:.2f} | ±{least:.2f} |" in few
     assert "| 20 | 5 | 90% | too few | too few |" in few  # a t test of groups of 2 has one degree of freedom
     assert "“Too few” means that fewer studies would detect even a difference of 3 SD." in few
     assert "even a fall" not in told(16, 1.7)
-    assert "**The planned 5 participants are too few to find a difference of 3 SD with 80% power.**" in told(5, 1.3)
+    points = smallest_differences(
+        contrast, (16,), 0.06, 2, [("20", "90%", 0.9)], "trials", "SD.", "±{:.2f}".format, (0.5, 0.5), planned=16,
+        unit=" points",
+    )  # fmt: skip
+    assert f"find a difference smaller than ±{least:.2f} points with 80% power" in "\n".join(points)
+    assert "**The planned 5 participants are too few to find a difference in d′ of 3 SD with 80% power.**" in told(
+        5, 1.3
+    )
 
 
 def test_the_smallest_difference_is_that_of_published_tables() -> None:

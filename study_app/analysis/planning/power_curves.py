@@ -428,7 +428,7 @@ def _preface(power: Powers) -> list[str]:
         + f". {_SOURCES}",
     ]
     if not power.complete:
-        lines += ["", f"**Ended early, after {power.studies} of {power.asked} studies.**"]
+        lines += ["", f"**Preliminary: {power.studies} of {power.asked} studies were simulated.**"]
     if power.plan.unknown:
         named = ", ".join(power.plan.unknown)
         lines += [
@@ -508,7 +508,7 @@ def _between(power: Powers) -> Iterator[str]:
         yield from smallest_differences(
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
             said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan),
-            largest=equality_limits(contrast, 1.0, ratio=False)[1], planned=plan.participants,
+            largest=equality_limits(contrast, 1.0, ratio=False)[1], planned=plan.participants, unit=" points",
         )  # fmt: skip
     for contrast, of_groups in plan.of_forms:
         members = len(plan.contrasts) + plan.untested
@@ -567,6 +567,7 @@ def smallest_differences(
     largest: float | None = None,
     planned: int | None = None,
     assumed: tuple[str, float] | None = None,
+    unit: str = "",
 ) -> Iterator[str]:
     """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies show.
 
@@ -575,7 +576,7 @@ def smallest_differences(
     are the shares of participants in the two groups; None: within participants. ``bound`` is the equivalence bound, on
     the scale of the standard deviation, which ``bounds`` hypotheses state; ``largest`` is the largest difference of a
     participant that the scale permits, None without a limit. ``planned`` participants have a verdict before the table;
-    ``assumed`` is a measure that can fall to 0 with its simulated mean.
+    ``assumed`` is a measure that can fall to 0 with its simulated mean; ``unit`` follows the difference in the verdict.
     """
 
     def groups_of(n: int) -> list[int]:
@@ -609,7 +610,10 @@ def smallest_differences(
     if planned is not None:
         name, _, spread = rows[0]
         given = f" ({first}: {name})" if len(rows) > 1 else ""
-        yield from ("", _verdict(contrast, planned, given, differences(planned, spread), written, assumed))
+        yield from (
+            "",
+            _verdict(contrast, planned, given, differences(planned, spread), lambda end: written(end) + unit, assumed),
+        )
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
         for n in sizes:
@@ -631,7 +635,8 @@ def _verdict(
     assumed: tuple[str, float] | None,
 ) -> str:
     """Return the smallest difference that the planned sample finds, compared with a measure that falls to 0."""
-    too_few = f"The planned {planned} participants{given} are too few to find a difference"
+    of = "" if assumed is None else f" in {assumed[0]}"
+    too_few = f"The planned {planned} participants{given} are too few to find a difference{of}"
     if reached is None:
         return f"**{too_few} of {MOST_SD:g} SD with {WANTED:.0%} power.**"
     _, least = reached

@@ -321,7 +321,7 @@ def threshold_markdown(precisions: Precisions) -> str:
         "deviation). Estimates are computed as in the report.",
     ]
     if precisions.studies < precisions.asked:
-        lines += ["", f"**Ended early, after {precisions.studies} of {precisions.asked} studies.**"]
+        lines += ["", f"**Preliminary: {precisions.studies} of {precisions.asked} studies were simulated.**"]
     participants = None if precisions.protocol.analysis is None else precisions.protocol.analysis.participants
     wanted = [] if precision is None else [f"studies within ±{100 * precision:g} %"]
     heads = ["participants", "SD for one participant", "half-width of the group's 95 % interval", *wanted]

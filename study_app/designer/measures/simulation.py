@@ -90,7 +90,7 @@ class _OneProcess(Executor):
 def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
     """Run a simulation, and send what is known so far; raise Stopped if another order came or the client has ended."""
 
-    def check(_words: str = "") -> None:
+    def check() -> None:
         if stop():
             raise Stopped("the study has been edited")
 
@@ -103,19 +103,18 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
         from study_app.session.simulated.predicted_delivery import predicted_delivery  # noqa: PLC0415 - the compiler: only here
         from study_app.session.simulated.rehearsal import condition_features  # noqa: PLC0415 - the compiler: only here
 
-        simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)
-        send(simulated)
-
-        def show_rehearsal(words: str) -> None:
+        def show_progress(words: str) -> None:
             check()
             send(replace(simulated, waiting=f"{words} …"))
 
+        show_progress("predicting which trials can be delivered")
+        simulated = replace(simulated, lost=predicted_delivery(protocol, ASSUMED_TICKS).sentences)
         for estimate in estimate_power(
             protocol,
             _OneProcess(check),
             sizes=planned_sizes(protocol),
-            rehearse=lambda: condition_features(protocol, seed=1, progress=show_rehearsal),
-            progress=check,
+            rehearse=lambda: condition_features(protocol, seed=1, progress=show_progress),
+            progress=show_progress,
         ):
             progress = f"{estimate.studies} of {estimate.asked} studies per sample size"
             simulated = replace(simulated, table=estimate_markdown(estimate), waiting=progress)

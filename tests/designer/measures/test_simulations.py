@@ -71,9 +71,14 @@ def test_warnings_that_take_simulated_observers_are_those_of_check() -> None:
 def test_a_simulation_ends_between_two_batches() -> None:
     sent: list[Simulated] = []
     with pytest.raises(Stopped):
-        run_simulation(order(short_study()), sent.append, lambda: len(sent) > 1)
-    assert [bool(answer.table) for answer in sent] == [False, True]
-    assert sent[-1].waiting == "10 of 200 studies per sample size"
+        run_simulation(order(short_study()), sent.append, lambda: any(answer.table for answer in sent))
+    assert [answer.waiting for answer in sent] == [
+        "predicting which trials can be delivered …",
+        "simulating observers …",
+        "10 of 200 studies per sample size",
+    ]
+    assert [bool(answer.table) for answer in sent] == [False, False, True]
+    assert "**Preliminary: 10 of 200 studies were simulated.**" in sent[-1].table
 
 
 def test_a_simulation_depends_on_forces_tasks_and_titles_but_on_no_other_text() -> None:
