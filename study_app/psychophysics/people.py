@@ -155,8 +155,8 @@ class Expected:
 
     @property
     def measured(self) -> bool:
-        """Whether there are estimates, because levels are not clipped."""
-        return math.isfinite(self.worst[1])
+        """Whether there are estimates at every standard, because levels are not clipped."""
+        return math.isfinite(self.worst[1]) and math.isfinite(self.spread)
 
     @property
     def median(self) -> float:
