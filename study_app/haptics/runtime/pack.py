@@ -39,7 +39,7 @@ _EXPLICIT: Final = history.BIT | current.BIT | wake.BIT | local_wake.BIT
 _ELASTIC: Final = (non_newtonian.KIND_HERSCHEL_BULKLEY, non_newtonian.KIND_MAXWELL)
 _ARRAYS: Final = tuple(name for kind in KINDS for name in kind.arrays)
 _NEVER_TICKS: Final = MOST_DELAY + 1
-_EffectRows: Final[Any] = namedtuple("EffectRows", _ARRAYS)  # type: ignore[misc]
+_EffectRows: Final[Any] = namedtuple("_EffectRows", _ARRAYS)  # type: ignore[misc]
 _EffectRows.__doc__ = "The arrays of a model that effects own, by name."
 _Counts: TypeAlias = Mapping[str, int]
 """A number of rows for each of these arrays."""

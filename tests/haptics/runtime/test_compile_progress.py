@@ -9,6 +9,8 @@ import numba
 import pytest
 
 from study_app.haptics.kernels.compiled import EXPECTED, following_compilation
+from study_app.haptics.runtime.pack import pack
+from study_app.protocol.load import load_scene
 from tests.compiled import needs_servo
 
 pytestmark = needs_servo
@@ -46,6 +48,13 @@ def test_each_compiled_function_is_counted_and_a_stored_one_is_not() -> None:
     with following_compilation(shares.append):
         outer(5)
     assert len(shares) == 2
+
+
+def test_the_types_of_a_model_have_the_names_by_which_they_are_pickled() -> None:
+    """Stored code is found by the types of its arguments; one that is pickled by value differs in each process."""
+    model = pack(load_scene("demo", "thick"))
+    for kind in (type(model), type(model.rows)):
+        assert getattr(sys.modules[kind.__module__], kind.__qualname__, None) is kind
 
 
 @pytest.mark.nightly
