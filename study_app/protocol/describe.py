@@ -19,7 +19,7 @@ from study_app.protocol.orders.block_orders import block_codes, order_of, orders
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.presented.presentation import link_descriptions
 from study_app.protocol.presented.presented_levels import FASTER, highest_damping
-from study_app.protocol.quantities import quantity
+from study_app.protocol.quantities import liquid_words, quantity
 from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import Context, Question
 from study_app.protocol.sequences import row_count
@@ -295,17 +295,12 @@ def _assignment_and_break_rows(protocol: Protocol, block: Block, language: str) 
 
 
 def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
-    rows: list[tuple[str, ...]] = [("", "density", "effects", "wake N", "S", "y", "")]
+    """Return each liquid's density, parameters and effects; a note if no condition uses it."""
     used = {liquid for condition in protocol.conditions.values() for liquid in condition.liquid_ids}
-    for name, liquid in protocol.liquids.items():
-        effects = resolve(protocol.scene_of(name)).liquids[0].effects
-        wake = liquid.wake if "wake" in effects else None
-        numbers = ("–", "–", "–") if wake is None else (f"{wake.length}", f"{wake.scaling:g}", f"{wake.exponent:g}")
-        unused = "" if name in used else "not used in any condition"
-        viscosity = "" if liquid.viscosity_pa_s is None else f", {liquid.viscosity_pa_s:g} Pa·s"
-        damper = liquid.drag.damping_nspm
-        density = f"{liquid.density_kg_m3:g} kg/m³{viscosity}" if damper is None else f"{damper:g} N·s/m at the hand"
-        rows.append((name, density, ", ".join(effects) or "none", *numbers, unused))
+    rows: list[tuple[str, ...]] = []
+    for name in protocol.liquids:
+        words = liquid_words(resolve(protocol.scene_of(name)).liquids[0].model_dump(mode="json"))
+        rows.append((name, words if name in used else f"{words}; not used in any condition"))
     return rows
 
 

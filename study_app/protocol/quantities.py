@@ -5,7 +5,8 @@ Names are ``table.field``, as ``haptics.model.overrides`` takes them; the parame
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterator, Mapping
+from typing import Any, Final
 
 from study_app.haptics.model.effect import Parameter
 from study_app.haptics.model.effects import EFFECTS, NAMED
@@ -106,6 +107,47 @@ def quantity_words(name: str) -> str:
     effect = NAMED.get(_table_name(row.name))
     label = row.label if effect is None or effect.with_liquid else f"{effect.label} {row.label}"
     return label.lower()
+
+
+def liquid_words(liquid: Mapping[str, Any]) -> str:
+    """Return the density, the effects and all parameters that are not defaults of a liquid, from its JSON table."""
+    damping, viscosity, effects = liquid["drag"].get("damping_nspm"), liquid.get("viscosity_pa_s"), liquid["effects"]
+    words = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
+    words += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
+    for effect in EFFECTS:
+        if effect.name == "drag":
+            words += [f"drag law: {liquid['drag']['law']}"] if effect.name in effects else []
+            continue
+        is_named, table = effect.name in effects, liquid.get(effect.name)
+        values = ""
+        if table is not None and (is_named or (effects == "auto" and effect.automatic)):
+            values = ", ".join(_parameter_words(effect.name, table, effect.model))
+        if is_named or values:
+            words.append(f"{effect.label[0].lower()}{effect.label[1:]}{f' ({values})' if values else ''}")
+    region = liquid.get("region") or {"kind": "everywhere"}
+    if region["kind"] != "everywhere":
+        words.append(f"in a {region['kind']} ({', '.join(_parameter_words('region', region))})")
+    return ", ".join([*words, *(["effects selected automatically by size"] if effects == "auto" else [])])
+
+
+def _parameter_words(table: str, values: Mapping[str, Any], defaults: Any = None) -> Iterator[str]:
+    """Yield the name, value and SI unit of each parameter in a table that is not the default of its model.
+
+    Tables of one of several kinds are given in full, and the exponent of a wake always.
+    """
+    for name, value in values.items():
+        row = QUANTITIES.get(f"{table}.{name}")
+        if row is None or value is None:
+            continue
+        if "kind" not in values and name != "exponent" and defaults.model_fields[name].default == value:
+            continue
+        if row.choices:
+            text = dict(row.choices).get(value, str(value))
+        elif isinstance(value, list | tuple):
+            text = f"({', '.join(f'{part:g}' for part in value)})"
+        else:
+            text = f"{value:g}"
+        yield f"{row.label[0].lower()}{row.label[1:]} {text} {row.unit}".rstrip()
 
 
 def _table_name(name: str) -> str:

@@ -1,8 +1,8 @@
 """The methods paragraph: participants, apparatus, design, hypotheses, tests and exclusions, as the study has them."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from typing import Any, Final
+from collections.abc import Iterator
+from typing import Final
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import contrast_methods
@@ -19,6 +19,7 @@ from study_app.analysis.results import BlockResult, Results, lead_phrase, said_o
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.protocol.groups import blocks_before
 from study_app.protocol.orders.block_orders import session_steps_of
+from study_app.protocol.quantities import liquid_words
 from study_app.store.unblinding import RULES
 
 _WITHOUT_FORCE: Final = {"mouse", "spacemouse"}
@@ -202,24 +203,11 @@ def _liquids(study: Study) -> str:
         if setting is not None and setting.liquid is not None
     ]
     names = [name for liquids in dict.fromkeys(held) for name in liquids.split(" + ")]
-    words = [f"{name.replace('_', ' ')} ({_parameters(study.liquids[name])})" for name in dict.fromkeys(names)
+    words = [f"{name.replace('_', ' ')} ({liquid_words(study.liquids[name])})" for name in dict.fromkeys(names)
              if name in study.liquids]  # fmt: skip
     if not words:
         return ""
     return f"The simulated liquid{'s were' if len(words) > 1 else ' was'} {listed(words)}."
-
-
-def _parameters(liquid: Mapping[str, Any]) -> str:
-    """Return a liquid's numbers and effects as text."""
-    damping, viscosity = liquid["drag"].get("damping_nspm"), liquid.get("viscosity_pa_s")
-    numbers = [f"{liquid['density_kg_m3']:g} kg/m³"] if damping is None else [f"damping {damping:g} N·s/m at the hand"]
-    numbers += [] if viscosity is None else [f"{viscosity:g} Pa·s"]
-    if liquid["effects"] == "auto":
-        return ", ".join([*numbers, "effects selected automatically by size"])
-    wake = liquid.get("wake") or {}
-    of_wake = ", ".join(f"{key} {wake[key]:g}" for key in ("length", "scaling", "exponent") if key in wake)
-    of = {"drag": f"drag law: {liquid['drag']['law']}", "wake": f"wake ({of_wake})"}
-    return ", ".join([*numbers, *(of.get(effect, effect.replace("_", " ")) for effect in liquid["effects"])])
 
 
 def _design(study: Study, results: Results) -> Iterator[str]:

@@ -1,7 +1,6 @@
 """Each sentence of the reports of random studies is true of their numbers."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from study_app.analysis.contrasts import answer
 from study_app.analysis.data.blocks import other_questions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.report import methods as methods_module
 from study_app.analysis.report.first_page import cards
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import empty_studies, limits, none_found
@@ -108,24 +106,3 @@ def check_report(made: Study) -> None:
 @pytest.mark.parametrize("number", range(STUDIES))
 def test_each_sentence_is_true_of_its_numbers(number: int) -> None:
     check_report(with_plan(np.random.default_rng([9, number])))
-
-
-@pytest.mark.parametrize(
-    ("changed", "text"),
-    [
-        ({}, "1234 kg/m³, 0.5 Pa·s, drag law: newton, wake (length 3, scaling 5, exponent 0.7), added mass"),
-        ({"drag": {"law": "linear", "damping_nspm": 6.5}, "viscosity_pa_s": None, "effects": ["drag"]},
-         "damping 6.5 N·s/m at the hand, drag law: linear"),
-        ({"effects": "auto"}, "1234 kg/m³, 0.5 Pa·s, effects selected automatically by size"),
-        ({"wake": {"scaling": 5}, "effects": ["history", "wake"]}, "1234 kg/m³, 0.5 Pa·s, history, wake (scaling 5)"),
-    ],
-)  # fmt: skip
-def test_each_number_of_a_liquid_has_its_own_unit(changed: dict[str, Any], text: str) -> None:
-    liquid = {
-        "density_kg_m3": 1234.0,
-        "viscosity_pa_s": 0.5,
-        "drag": {"law": "newton"},
-        "wake": {"length": 3.0, "scaling": 5.0, "exponent": 0.7},
-        "effects": ["drag", "wake", "added_mass"],
-    }
-    assert methods_module._parameters(liquid | changed) == text
