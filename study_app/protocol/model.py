@@ -439,7 +439,7 @@ class Contrast(Table):
     def measure_words(self) -> str:
         """The measure in words: "threshold", "agreement with “thick”"."""
         if self.form is not None:
-            return f"“{self.measure}” of {self.form}"
+            return f"“{self.measure}” ({self.form})"
         words = {"d_prime": "sensitivity (d′)", "pse": "point of subjective equality"}
         return (
             words.get(self.measure, self.measure) if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
@@ -474,7 +474,8 @@ class Contrast(Table):
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
         near = "" if self.bound is None else f"; equivalent within {self.bound:g}"
-        return f"{self.effect_words(within, measure)} {moves} {first} {joint} {second}{where}{near}"
+        kind = " (interaction)" if self.is_interaction else ""
+        return f"{self.effect_words(within, measure)} {moves} {first} {joint} {second}{kind}{where}{near}"
 
 
 def quoted_title(name: str) -> str:

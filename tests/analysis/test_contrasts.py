@@ -275,7 +275,7 @@ def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> N
     protocol = parse(LOADED.encode(), "loaded.toml")
     told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found={}))
     half, smallest = detectable(18, tail=0.025)
-    assert "“raw” of load differs between late and prompt" in told
+    assert "“raw” (load) differs between late and prompt" in told
     assert f"| raw | 18 | 1 | ±{half:.2f} SD | ±{smallest:.2f} SD |" in told
 
 
@@ -341,7 +341,8 @@ def test_limits_of_the_study_are_the_power_of_its_hypotheses_and_groups_that_exi
 def test_a_hypothesis_names_titles_of_several_words_in_quotation_marks() -> None:
     interaction = Contrast(measure="d_prime", blocks=("prompt", "late"), groups=("novice", "expert"))
     difference = "the difference in sensitivity (d′) between “No delay” and “80 ms late”"
-    assert interaction.described(within=("No delay", "80 ms late")) == f"{difference} differs between novice and expert"
+    said = interaction.described(within=("No delay", "80 ms late"))
+    assert said == f"{difference} differs between novice and expert (interaction)"
     paired = Contrast(measure="sure", form="after", blocks=("prompt", "late"), expected="higher")
     words = paired.described(("No delay", "Late"), measure="“Sure” (Your impression)")
     assert words == "“Sure” (Your impression) is higher in “No delay” than in Late"
@@ -409,7 +410,7 @@ def test_power_tells_the_smallest_interaction() -> None:
     told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found=found))
     spread = math.hypot(math.log(1.2), math.log(1.3), math.log(1.3))
     half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
-    assert "the difference in threshold between late and prompt differs between a and b" in told
+    assert "the difference in threshold between late and prompt differs between a and b (interaction)" in told
     assert f"| 20 | 18 | {spread:.0%} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
     text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
     sequence, _, rest = rest.partition("]")

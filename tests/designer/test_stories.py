@@ -908,15 +908,23 @@ def hypotheses(story: Story) -> None:
     story.play("ctrl+f 'order of blocks' Return")
     story.expect(selected="blocks.liquids")
     story.press("Add a hypothesis")
-    story.choose(line().first, "A, Prompt in Delays − Late in Delays")
+    story.choose(line().first, "Interaction: A, Prompt in Delays − Late in Delays")
     pair = {"blocks": ("delays",), "groups": ("a", "b"), "conditions": ("prompt", "late")}
-    offered("B, Prompt in Delays − Late in Delays")
+    offered("Interaction: B, Prompt in Delays − Late in Delays")
     assert designer.value(*contrasts) == ({"measure": "harder", **pair},)
     story.choose(line().relation, "is higher than")
     assert designer.value(*contrasts) == ({"measure": "harder", "expected": "higher", **pair},)
     assert [line().first.currentText(), line().second.currentText()] == [
-        f"{group}, Prompt in Delays − Late in Delays" for group in ("A", "B")
+        f"Interaction: {group}, Prompt in Delays − Late in Delays" for group in ("A", "B")
     ]
+    story.ask(RetypeFile(designer.text.replace('title = "Delays"', 'title = "Liquids"')))
+    story.play("@questionnaires.liquid")
+    times = [entry.text().partition("\t")[0] for entry in designer.place.form.head.asks.actions()]
+    assert times.count("After Liquids (liquids)") == times.count("After Liquids (delays)") == 1
+    story.play("ctrl+f 'order of blocks' Return")
+    every = [line().first.itemText(at) for at in range(line().first.count())]
+    assert "Interaction: A, Prompt in Liquids (delays) − Late in Liquids (delays)" in every
+    assert len(set(every)) == len(every)
     for before, after in (
         ('conditions = ["thin", "thick"]', ""),
         ('phase = "main" ', "phase = {} "),
@@ -960,7 +968,7 @@ def two_conditions(story: Story) -> None:
     assert designer.study.protocol.study.block_order == "balanced"
     story.play("@sequence")
     line = designer.field("analysis", "contrasts").lines[0]
-    story.choose(line.measure, next(words for _, words in line.measures if words.startswith("Raw of ")))
+    story.choose(line.measure, next(words for _, words in line.measures if words.startswith("Raw score (")))
     (hypothesis,) = designer.study.protocol.analysis.contrasts
     assert (hypothesis.form, hypothesis.measure, hypothesis.expected) == ("nasa_tlx", "raw", None)
 

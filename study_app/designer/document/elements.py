@@ -102,6 +102,13 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
     return name_label(str(value.get("id", path[-1])))
 
 
+def distinct_title(document: Mapping[str, Any], path: Path) -> str:
+    """Return an element's title, followed by its ID in parentheses if another element of its table has this title."""
+    title = title_of(document, path)
+    titles = (title_of(document, (*path[:-1], name)) for name in names(document, str(path[0])) if name != path[-1])
+    return f"{title} ({path[-1]})" if title in titles else title
+
+
 def study_title(document: Mapping[str, Any]) -> str:
     """Return the title of a study in its first language; "" if it has none."""
     head = document.get("study")

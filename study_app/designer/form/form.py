@@ -9,6 +9,7 @@ from study_app.designer.document.additions import number_rows
 from study_app.designer.document.elements import (
     FIRST,
     SEQUENCE,
+    distinct_title,
     kind_of,
     place_words,
     position_of,
@@ -148,7 +149,7 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
     firsts = {place[:-1]: place for place, _ in reversed(blocks)}
     yield from as_step("Before the first block\t(once)", firsts.values())
     for name in dict.fromkeys(step for _, step in blocks):
-        title, block = title_of(document, ("blocks", name)), value_at(document, ("blocks", name))
+        title, block = distinct_title(document, ("blocks", name)), value_at(document, ("blocks", name))
         if isinstance(block, Mapping) and "design" not in block and (other := block.get("questionnaire")) != path[1]:
             instead = "" if other is None else f", instead of {title_of(document, (path[0], str(other)))}"
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
@@ -157,7 +158,7 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
         name: _places_after(place for place, step in main if step == name) for name in dict.fromkeys(s for _, s in main)
     }
     for name, after in ends.items():
-        yield from as_step(f"After {title_of(document, ('blocks', name))}\t(once, about the block)", after)
+        yield from as_step(f"After {distinct_title(document, ('blocks', name))}\t(once, about the block)", after)
     if len(ends) > 1:
         yield from as_step(
             f"After each block\t({len(ends)} times, for comparison)", _places_after(place for place, _ in main)

@@ -1,6 +1,5 @@
 """Editors of certain keys: sentences, order, points of a scale, kind and list of questions, hypotheses."""
 
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -11,7 +10,7 @@ from PySide6.QtCore import QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QSizePolicy, QWidget
 
-from study_app.designer.document.elements import title_of
+from study_app.designer.document.elements import distinct_title, title_of
 from study_app.designer.document.fields import Row, label_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
@@ -414,17 +413,13 @@ class Compared:
 
 
 def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
-    """Return the items that hypotheses can compare, in file order; equal titles get the block's id."""
+    """Return the items that hypotheses can compare, in file order."""
     after = _form_measures(study)
     every = tuple(
         item if item.key == "conditions" else replace(item, measures=(*item.measures, *after.get(item.block, ())))
         for item in _comparable_items(study)
     )
     every += tuple(_interaction_sides(every))
-    times = Counter(item.words for item in every)
-    every = tuple(
-        replace(item, words=f"{item.words} ({item.block})") if times[item.words] > 1 else item for item in every
-    )
     return tuple(item for item in every if item.comparable_with(every))
 
 
@@ -441,7 +436,7 @@ def _comparable_items(study: Study) -> Iterator[Compared]:
     for place, block in entries(document, "blocks.*"):
         if not isinstance(block, Mapping) or block.get("phase", "main") != "main":
             continue
-        name, title = str(place[1]), title_of(document, place)
+        name, title = str(place[1]), distinct_title(document, place)
         if "design" in block:
             measures = _measures_of_design(study, name)
         else:
@@ -454,7 +449,7 @@ def _comparable_items(study: Study) -> Iterator[Compared]:
         conditions = block.get("conditions") if "design" not in block else ()
         for key, inner in (("conditions", conditions), ("groups", names(document, "groups"))):
             for condition in inner if isinstance(inner, tuple | list) else ():
-                label = f"{title_of(document, (key, str(condition)))} in {title}"
+                label = f"{distinct_title(document, (key, str(condition)))} in {title}"
                 yield Compared(key=key, block=name, name=str(condition), words=label, measures=measures)
 
 
@@ -465,9 +460,13 @@ def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
         return after
     exchanged = [] if protocol.study.block_order == "fixed" else [block.id for block in protocol.main_blocks]
     for name, form in protocol.forms.items():
-        title = title_of(study.document, ("questionnaires", name))
-        ids = [*form.scores, *(item.id for item in form.items if item.value_type != "text")]
-        measures = tuple((f"{name}/{measure}", f"{capitalised(measure)} of {title}") for measure in ids)
+        title = distinct_title(study.document, ("questionnaires", name))
+        words = {score: f"{capitalised(score)} score" for score in form.scores} | {
+            item.id: f"“{protocol.text(item.short, protocol.study.languages[0])}”"
+            for item in form.items
+            if item.value_type != "text"
+        }
+        measures = tuple((f"{name}/{measure}", f"{label} ({title})") for measure, label in words.items())
         for block in filter(None, follows(protocol, name, protocol.blocks, exchanged)):
             after[block] = (*after.get(block, ()), *measures)
     return after
@@ -481,7 +480,7 @@ def _interaction_sides(every: Sequence[Compared]) -> Iterator[Compared]:
             words = f"{first.words} − {second.words}"
             for group, title in groups.items():
                 yield replace(
-                    first, key="groups", name=group, words=f"{title}, {words}", pair_of=first.key,
+                    first, key="groups", name=group, words=f"Interaction: {title}, {words}", pair_of=first.key,
                     pair=(first.name, second.name), measures=first.shared_measures(second),
                 )  # fmt: skip
 
