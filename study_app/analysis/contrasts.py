@@ -74,6 +74,7 @@ _BAYES: Final = (
     "Bayes factors are two-sided JZS Bayes factors (Rouder et al., 2009) that compare the hypothesis of a difference "
     f"with the null hypothesis, using a Cauchy prior with scale {number(PRIOR_SCALE, 3)}."
 )
+_UNADJUSTED: Final = "The confidence intervals are not adjusted for the number of hypotheses. "
 _MOST_NAMED: Final = 20
 
 _TOO_FEW: Final = "fewer than two participants have both values"
@@ -95,13 +96,15 @@ class Measured:
 class Compared:
     """The sorted numbers of each group, or the differences within participants, and the reasons for exclusions.
 
-    ``shared`` is the variance of an error that all participants share, ``sides`` are the numbers of those compared.
+    ``shared`` is the variance of an error that all participants share, ``sides`` are the numbers of those compared;
+    ``cells`` are, of an interaction, those of each group under each condition.
     """
 
     samples: tuple[tuple[Measured, ...], ...]
     left_out: Mapping[str, str]
     shared: float = 0.0
     sides: tuple[Mapping[str, Measured], ...] = ()
+    cells: tuple[Mapping[str, Measured], ...] = ()
 
     @property
     def values(self) -> tuple[Array, ...]:
@@ -195,12 +198,20 @@ def _compared(
             )
             for person in kept
         }
+    cells = tuple(
+        {who: side[who] for who in kept if members[who] == group}
+        for group in contrast.groups or ()
+        for side in sides
+        if contrast.is_interaction
+    )
     if contrast.groups is not None:  # the error that all have in common is the same in both groups
         sides = [{who: numbers[who] for who in kept if members[who] == group} for group in contrast.groups]
         samples, shared = tuple(tuple(side.values()) for side in sides), 0.0
     else:
         sides, samples = [{person: side[person] for person in kept} for side in sides], (tuple(numbers.values()),)
-    return Compared(samples=tuple(map(_ascending, samples)), left_out=left_out, shared=shared, sides=tuple(sides))
+    return Compared(
+        samples=tuple(map(_ascending, samples)), left_out=left_out, shared=shared, sides=tuple(sides), cells=cells
+    )
 
 
 def _ascending(sample: Iterable[Measured]) -> tuple[Measured, ...]:
@@ -329,7 +340,7 @@ def _tested(
     """Return a contrast before correction, with enough resamples for an alpha of ``strictest``."""
     compared = _compared(study, contrast, answers, levels)
     ratio, means = _is_ratio(contrast, levels), compared.means(strictest)
-    names = _side_names(study, contrast)
+    names, within = _side_names(study, contrast), _within_names(study, contrast)
     is_ordinal = contrast.measure not in _STATISTICS and not contrast.is_interaction
     standardised = _standardised(compared, is_ordinal=is_ordinal)
     effect = ends = p_equal = p = p_bootstrap = p_skewed = statistic = error = None
@@ -386,7 +397,11 @@ def _tested(
         standardised=standardised.effect,
         ordinal=standardised.ordinal,
         bayes_factor=standardised.bayes_factor,
-        within_names=_within_names(study, contrast),
+        within_names=within,
+        cells=tuple(
+            _side(name, held, ratio=ratio)
+            for name, held in zip((within or contrast.within or ()) * 2, compared.cells, strict=False)
+        ),
         measure_name=_measure_name(study, contrast),
         standard_error=error,
         freedom=None if error is None or means is None else means.freedom,
@@ -505,22 +520,24 @@ def _difference_words(contrast: ContrastResult) -> str:
         said = f"{what} did not differ significantly between {first} and {second}"
     else:
         said = f"{what} was not significantly {expected} in {first} than in {second}"
-    means = listed([_mean_words(side) for side in contrast.sides if side.mean is not None])
+    means = listed([mean_words(side) for side in contrast.sides if side.mean is not None])
     higher = (
         ""
         if contrast.higher is None
         else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants."
     )
     effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect)}"
+    unadjusted = "unadjusted " * (contrast.members > 1)
     size = "" if contrast.standardised is None else f", {_size_words(contrast.standardised)}"
     return (
-        f"{said} (means {means}; {effect}, 95 % confidence interval {interval(contrast.interval)}{size}, "
+        f"{said} (means {means}; {effect}, {unadjusted}95 % confidence interval {interval(contrast.interval)}{size}, "
         f"{'adjusted ' * (contrast.members > 1)}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n})."
         f"{higher}{_bayes_words(contrast)}"
     )
 
 
-def _mean_words(side: ContrastSide) -> str:
+def mean_words(side: ContrastSide) -> str:
+    """Return the mean of one side with its interval: "0.61 [0.4, 0.82]"."""
     ends = "" if side.low is None or side.high is None else f" [{number(side.low)}, {number(side.high)}]"
     return f"{number(side.mean)}{ends}"
 
@@ -635,7 +652,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         "The p value is that of the t test. The largest p value is the largest of the t test, a bootstrap that adds a "
         "participant as extreme as the most extreme one, and a t test corrected for skewness. The verdict depends on "
         f"the largest p value{_holm_words(contrasts)}. The last two tests do not assume normal distributions, so "
-        f"normality is not tested. {_BAYES} {_WEIGHTED * weighted}"
+        f"normality is not tested. {_UNADJUSTED * (len(contrasts) > 1)}{_BAYES} {_WEIGHTED * weighted}"
         f"{inclusion_words(contrast.contrast for contrast in contrasts)}",
         "soft",
     )

@@ -277,8 +277,9 @@ class ContrastResult(Outcome):
     that differ by more. ``sides`` are the numbers of those compared, ``sd`` is the standard deviation of the
     differences within participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a
     statement, and ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the
-    names of the blocks or conditions of an interaction, ``measure_name`` is the measure in words. ``standard_error`` is
-    that of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of freedom of t.
+    names of the blocks or conditions of an interaction, ``cells`` the numbers of each group under each of them, group
+    by group, and ``measure_name`` is the measure in words. ``standard_error`` is that of the mean difference, of
+    logarithms for a ratio, and ``freedom`` are the degrees of freedom of t.
     """
 
     contrast: Contrast
@@ -300,6 +301,7 @@ class ContrastResult(Outcome):
     ordinal: EffectSize | None = None
     bayes_factor: float | None = None
     within_names: tuple[str, str] | None = None
+    cells: tuple[ContrastSide, ...] = ()
     measure_name: str = ""
     standard_error: float | None = None
     freedom: int | None = None
@@ -359,11 +361,12 @@ SEALED: Final = "computed only after unblinding, because this requires knowing w
 """The reason for results that are missing because the key is sealed."""
 
 VERDICTS_MEAN: Final = (
-    "Shown: the adjusted p value is at most {alpha}. Suggested: the adjusted p value is at most {alpha}, but the "
-    "statement was not specified as primary before the study; this is a lead, not a finding. Not shown: the adjusted "
-    "p value is above {alpha}, which is not evidence that the answers are the same. Out of reach: no rearrangement of "
-    "these answers within participants could have made the adjusted p value significant, given the other p values in "
-    "the family. A statement's adjusted p value is never below the p value of the test over all statements, which is "
+    "Shown (“significant” on the first page): the adjusted p value is at most {alpha}. Suggested (“significant, "
+    "exploratory”): the adjusted p value is at most {alpha}, but the statement was not specified as primary before the "
+    "study; this is a lead, not a finding. Not shown (“not significant”): the adjusted p value is above {alpha}, which "
+    "is not evidence that the answers are the same. Out of reach (“too few participants”): no rearrangement of these "
+    "answers within participants could have made the adjusted p value significant, given the other p values in the "
+    "family. A statement's adjusted p value is never below the p value of the test over all statements, which is "
     "Holm-adjusted across the blocks of the study."
 )
 

@@ -235,7 +235,7 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     """
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
     from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures  # noqa: PLC0415
-    from study_app.analysis.report.first_page import cards  # noqa: PLC0415
+    from study_app.analysis.report.first_page import cards, presented_sentences  # noqa: PLC0415
     from study_app.analysis.report.study_figures import pictures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
@@ -249,12 +249,12 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
         send(_figure(picture))
         going("drawing", _EVALUATION + (1 - _EVALUATION) * min(1.0, number / 8))
     page = []
-    for place, card in enumerate(cards(results, numbers)):
+    for place, card in enumerate(cards(results, numbers, presented_sentences(study))):
         figure, answer = card.figure_of(drawn), " ".join(card.sentences)
         if figure is None:
-            shown = FigureDrawn(name=f"answer-{place}", title=card.question, caption=answer, verdict=card.verdict)
+            shown = FigureDrawn(name=f"answer-{place}", title=card.question, caption=answer, verdict=card.badge)
         else:
-            shown = _figure(figure, question=card.question, verdict=card.verdict, answer=answer)
+            shown = _figure(figure, question=card.question, verdict=card.badge, answer=answer)
         send(shown)
         page.append(shown)
     send(FirstPage(tuple(shown.name for shown in page)))

@@ -29,7 +29,7 @@ from study_app.analysis.planning.preregistration import preregistration
 from study_app.analysis.planning.simulated_studies import count_findings, draw_opinions, plan, stacked_answers
 from study_app.analysis.planning.threshold_studies import PrecisionResult, Precisions, threshold_markdown
 from study_app.analysis.report import write_report
-from study_app.analysis.report.first_page import first_page
+from study_app.analysis.report.first_page import cards, first_page
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import limits
 from study_app.analysis.report.write_report import report
@@ -381,8 +381,18 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
         if "hypothesis" in picture.name
     )
     drawn = figure.files["svg"].decode()
-    assert f"Difference in agreement with “{ITEMS[0].capitalize()}”: c2 − c1<" in drawn
+    assert ">Difference: c2 − c1<" in drawn
     assert ">one − two<" in drawn
+    cells = [answers[code].loc[group.index] for group in (one, two) for code in ("L2", "L1")]
+    assert [cell.mean for cell in result.cells] == pytest.approx([cell.mean() for cell in cells])
+    (card, *_) = cards(evaluate(made), presented={"b": "In B, honey was presented."})
+    means = [f"{cell.mean():.2f} [" for cell in cells]
+    assert [card.badge, card.sentences[-1]] == ["significant", "In B, honey was presented."]
+    for group, (first, second), sentence in zip(
+        ("one", "two"), (means[:2], means[2:]), card.sentences[1:], strict=False
+    ):
+        assert sentence.startswith(f"Means in the group {group} (95 % intervals): {first}")
+        assert f"] in c2 and {second}" in sentence
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """The figures of the first page: hypotheses, estimates of levels, ratings and scores, each with its participants."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any, Final, NamedTuple
 
@@ -9,7 +10,7 @@ import pandas as pd
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import QuestionPlace
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.people_figures import MOST_LETTERS, Column, Mean, Panel, mean_of, people_picture
+from study_app.analysis.figures.people_figures import Column, Mean, Panel, mean_of, people_picture
 from study_app.analysis.levels.answers import Answers, Settings
 from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities
@@ -31,6 +32,10 @@ _MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
 
 MOST_PANELS: Final = 9
 """Panels of a figure of scores or questions; more are in their tables."""
+
+
+_CELL_PLACES: Final = (0.0, 1.0, 2.5, 3.5)
+"""Positions of the two conditions of each group of an interaction."""
 
 
 class Estimates(NamedTuple):
@@ -119,6 +124,21 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
         for side, group in zip(contrast.sides, contrast.contrast.groups or ("", ""), strict=True)
     )
     panels = [Panel(columns=columns, joined=within, share=1.6, log=log)]
+    kind, sign = ("ratio", " ÷ ") if contrast.ratio else ("difference", " − ")
+    if contrast.cells:
+        cells = tuple(
+            Column(
+                name=cell.name,
+                values=cell.values,
+                mean=None if cell.mean is None else Mean(value=cell.mean, low=cell.low, high=cell.high),
+                group=contrast.compared[place // 2],
+            )
+            for place, cell in enumerate(contrast.cells)
+        )
+        panels = [
+            Panel(title="Values", columns=cells, places=_CELL_PLACES, share=3.2, log=log),
+            replace(panels[0], title=f"{kind.capitalize()}: {sign.join(cell.name for cell in contrast.cells[:2])}"),
+        ]
     ends = contrast.interval
     mean = None if contrast.effect is None else Mean(
         value=contrast.effect, low=None if ends is None else ends.low, high=None if ends is None else ends.high
@@ -137,7 +157,9 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
     band = " Band: equivalence bounds." if bound is not None else ""
     is_weighted = contrast.contrast.measure == "threshold" and not (within and study.split)
     weighted = " Means are weighted as in the test." if is_weighted else ""
-    lines = "Each line joins a participant's two values. " if within else ""
+    lines = "Each line joins a participant's two values. " if within or contrast.cells else ""
+    if contrast.cells:
+        lines = f"Left: each group under each condition. {lines}Middle: each participant's {kind}. "
     caption = (
         f"{capitalised(contrast.hypothesis)}. {lines}Right: {contrast.comparison}"
         f"{', for each participant and on average' if within else ''}; dashed line: no difference.{band}{weighted} "
@@ -151,11 +173,6 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
 def _scale_words(contrast: ContrastResult, result: LevelsResult | None) -> str:
     """Return the title of a hypothesis' scale."""
     measure = contrast.measure_name or contrast.contrast.measure_words
-    if contrast.contrast.is_interaction:
-        symbol = "d′" if contrast.contrast.measure == "d_prime" else measure
-        of = (" ÷ " if contrast.ratio else " − ").join(contrast.within_names or contrast.contrast.within or ())
-        words = f"{'Ratio' if contrast.ratio else 'Difference'} in {symbol}"
-        return whole if len(whole := f"{words}: {of}") <= MOST_LETTERS else words
     if contrast.contrast.form is not None:
         return measure
     if contrast.contrast.measure in ("threshold", "pse") and result is not None:

@@ -561,12 +561,13 @@ class _UnchangedUpTo(Finding[None]):
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
             return self.answered(
-                "not shown", f"{_NO_DELAY.format(within)} {_largest_words(self.found, against)}{_beyond_words(against)}"
+                "inconclusive",
+                f"{_NO_DELAY.format(within)} {_largest_words(self.found, against)}{_beyond_words(against)}",
             )
         statements = all_of(len(equivalent_up_to(against)), "statement")
         share = _not_excluded([tested.found for tested in against if tested.delay_ms <= at])
         text = f"Up to {ms(at)}, mean answers to {statements} stay {within}, but {share}."
-        return self.answered("shown", text)
+        return self.answered("equivalent", text)
 
 
 _NO_DELAY: Final = "We could not show for any delay that the mean answers to all statements stay {}."

@@ -9,18 +9,19 @@ from typing import Any, Final
 import numpy as np
 from markupsafe import Markup
 
-from study_app.analysis.contrasts import answer, question
-from study_app.analysis.data.blocks import AFTER
+from study_app.analysis.contrasts import answer, mean_words, question
+from study_app.analysis.data.blocks import AFTER, LevelBlock
 from study_app.analysis.data.measures import AGREEMENT
+from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import Mean, mean_of
 from study_app.analysis.figures.summary_figures import MOST_PANELS, Numbers, estimates_of, place_of
 from study_app.analysis.findings import all_findings
 from study_app.analysis.html_page import picture, render
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.report.sections import answers, empty_studies, none_found, place_title
-from study_app.analysis.results import BlockResult, LevelsResult, QuestionResult, Results
+from study_app.analysis.results import BlockResult, ContrastResult, LevelsResult, QuestionResult, Results
 from study_app.analysis.statistics.outcome import clopper_pearson
-from study_app.analysis.wording import interval, listed, number, significant
+from study_app.analysis.wording import interval, listed, ms, number, significant
 from study_app.protocol.model import quoted_title
 
 _BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] |\b(?:d_z|g) (?=[−\d])")
@@ -29,7 +30,14 @@ _LIMITS_SHOWN: Final = 6
 """So many limits are listed on the first page; the others are folded."""
 
 
+_BADGES: Final = {
+    "shown": "significant",
+    "suggested": "significant, exploratory",
+    "not shown": "not significant",
+    "out of reach": "too few participants",
+}
 _NO_NUMBERS: Final[Mapping[str, Sequence[Numbers]]] = MappingProxyType({})
+_NOT_PRESENTED: Final[Mapping[str, str]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,6 +55,11 @@ class Card:
     figures: tuple[str, ...]
     is_small: bool = False
 
+    @property
+    def badge(self) -> str:
+        """The verdict as the badge beside the question shows it."""
+        return _BADGES.get(self.verdict, self.verdict)
+
     def figure_of(self, drawn: Sequence[Picture]) -> Picture | None:
         """Return the figure that shows the answer; None if there is none."""
         for name in self.figures:
@@ -56,20 +69,63 @@ class Card:
         return None
 
 
-def cards(results: Results, numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS) -> tuple[Card, ...]:
-    """Return the answers of a study, those to its hypotheses first; ``numbers`` are those of `numbers_of`."""
-    return (*_hypotheses(results), *_statements(results), *_levels(results), *_questions(results, numbers))
+def presented_sentences(study: Study) -> dict[str, str]:
+    """Return, by block, a sentence on the liquids and delays of its conditions; sealed blocks have none."""
+    sentences: dict[str, str] = {}
+    for block in (*study.blocks, *study.levels):
+        reference = block.reference if isinstance(block, LevelBlock) else None
+        conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
+        liquids = [liquid.replace("_", " ") for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid]
+        if not liquids:
+            continue
+        delays = sorted({condition.delay_ms for condition in conditions if condition.delay_ms is not None})
+        delay = f"visual delays of {listed([f'{delay_ms:g}' for delay_ms in delays])} ms"
+        if len(delays) < 2:
+            delay = "a varied visual delay" if not delays else f"a visual delay of {ms(delays[0])}"
+        displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
+        sentences[block.id] = (
+            f"In {quoted_title(block.title)}, {listed(liquids)} {'were' if len(liquids) > 1 else 'was'} presented with "
+            f"{'no visual delay' if delays == [0.0] else delay}{''.join(f', {words}' for words in displays)}."
+        )
+    return sentences
 
 
-def _hypotheses(results: Results) -> Iterator[Card]:
+def cards(
+    results: Results,
+    numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS,
+    presented: Mapping[str, str] = _NOT_PRESENTED,
+) -> tuple[Card, ...]:
+    """Return the answers of a study, those to its hypotheses first.
+
+    ``numbers`` are those of `numbers_of` and ``presented`` those of `presented_sentences`.
+    """
+    levels = _levels(results, presented)
+    return (*_hypotheses(results, presented), *_statements(results), *levels, *_questions(results, numbers))
+
+
+def _hypotheses(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
     for place, contrast in enumerate(results.contrasts, start=1):
+        blocks = contrast.contrast.blocks
         yield Card(
             question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(contrast)}",
             verdict=contrast.verdict,
-            sentences=(answer(contrast),),
-            block=contrast.contrast.blocks[0],
+            sentences=(
+                answer(contrast),
+                *_cell_words(contrast),
+                *(presented[block] for block in blocks if block in presented),
+            ),
+            block=blocks[0],
             figures=(f"hypothesis-{place}",),
         )
+
+
+def _cell_words(contrast: ContrastResult) -> Iterator[str]:
+    """Yield the means of each group under each condition of an interaction."""
+    for place, group in enumerate(contrast.compared):
+        own = contrast.cells[2 * place : 2 * place + 2]
+        means = [f"{mean_words(cell)} in {quoted_title(cell.name)}" for cell in own if cell.mean is not None]
+        if means:
+            yield f"Mean{'s' * (len(means) > 1)} in the group {group} (95 % intervals): {listed(means)}."
 
 
 def _statements(results: Results) -> Iterator[Card]:
@@ -108,7 +164,7 @@ def _agreement_words(result: BlockResult) -> Iterator[str]:
         yield f"{agreed} of {n} {who} with “{item.short}” ({100 * agreed / n:.0f} %{ends}; median {row['median']:g})."
 
 
-def _levels(results: Results) -> Iterator[Card]:
+def _levels(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
     """Yield the estimates of blocks of levels, except those that a hypothesis already shows."""
     shown = {(block, contrast.contrast.measure) for contrast in results.contrasts for block in contrast.contrast.blocks}
     for level in results.levels:
@@ -125,7 +181,10 @@ def _levels(results: Results) -> Iterator[Card]:
             yield Card(
                 question=f"{level.title}: {estimates.words}",
                 verdict="",
-                sentences=tuple(_estimate_words(level, estimates.group, estimates.attribute, estimates.words)),
+                sentences=(
+                    *_estimate_words(level, estimates.group, estimates.attribute, estimates.words),
+                    *filter(None, [presented.get(level.block)]),
+                ),
                 block=level.block,
                 figures=(f"estimates-{level.block}",),
             )
@@ -236,9 +295,10 @@ def first_page(
     limits: Sequence[str],
     numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS,
     drawn: Sequence[Picture] = (),
+    presented: Mapping[str, str] = _NOT_PRESENTED,
 ) -> Markup:
     """Return the answers next to their figures, the limitations, and the error rate of the page."""
-    given = cards(results, numbers)
+    given = cards(results, numbers, presented)
     shown = [(card, card.figure_of(drawn)) for card in given]
     claimed = any(block.n for block in results.blocks) and bool(answers(results))
     look = results.decided.look_words(len(results.people))
@@ -247,7 +307,7 @@ def first_page(
         cards=[
             {
                 "question": card.question,
-                "verdict": card.verdict,
+                "verdict": card.badge,
                 "state": card.verdict.replace(" ", "-"),
                 "small": is_small,
                 "sentences": [_unbroken(line) for line in card.sentences],

@@ -34,12 +34,13 @@ from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
-from study_app.analysis.report.first_page import cards, figures_shown, first_page
+from study_app.analysis.report.first_page import cards, figures_shown, first_page, presented_sentences
 from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.questions_in_full import appendix
 from study_app.analysis.report.study_figures import pictures
 from study_app.analysis.results import (
     BlockResult,
+    ContrastResult,
     Failure,
     Failures,
     LevelsResult,
@@ -64,6 +65,7 @@ from study_app.store.unblinding import reveals_of
 _OF_FORMAT_2: Final = {
     Results: frozenset({"questions", "scores", "levels", "contrasts"}),
     Setting: frozenset({"link", "view"}),
+    ContrastResult: frozenset({"cells"}),
 }
 """Results that reports of earlier versions do not have; omitted where there are none."""
 
@@ -368,6 +370,7 @@ def _page(
     failures: Failures,
 ) -> str:
     on_first = failures.value("figures on the first page", lambda: figures_shown(cards(results, numbers), drawn), set())
+    presented = failures.value("the presented liquids", lambda: presented_sentences(study), {})
     others = [picture for picture in drawn if picture.name not in on_first]
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("Hypotheses", lambda: contrast_section(results)),
@@ -395,7 +398,9 @@ def _page(
         ("Counts of answers", lambda: sections.counts_of_answers(results)),
         ("Questions in full", lambda: appendix(recorded_contents(study.folder))),
     ]
-    first = try_part(failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn)])
+    first = try_part(
+        failures, "first page", Markup(), lambda: [first_page(results, texts["limits"], numbers, drawn, presented)]
+    )
     made = [
         (title, try_part(failures, f"section “{title}”", heading(2, title), make), place < shown)
         for place, (title, make) in enumerate(sections_)

@@ -355,7 +355,7 @@ _AT_ONCE = 2
 LEAST_WIDTH, MOST_WIDTH = 830, 1240
 
 
-_VERDICTS: Mapping[str, str] = {"shown": "ok", "equivalent": "ok", "suggested": "warn"}
+_VERDICTS: Mapping[str, str] = {"significant": "ok", "equivalent": "ok", "significant, exploratory": "warn"}
 _FORMS = "PDF (*.pdf);;SVG (*.svg);;PNG (*.png)"
 _MOST_SCALE = 2.5
 """Pixels of the window for a point of a figure at most."""

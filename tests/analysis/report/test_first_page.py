@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from study_app.analysis.data.blocks import Block, Decided, Item
+from study_app.analysis.data.blocks import Block, Decided, Item, LevelBlock, Setting
 from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, Lowest, LowestDelay
 from study_app.analysis.findings.finding import of_tables
@@ -19,10 +19,11 @@ from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, with_
 from study_app.analysis.page_layout import Drawing
 from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
-from study_app.analysis.report.first_page import Card, first_page
+from study_app.analysis.report.first_page import Card, first_page, presented_sentences
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
 from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
+from study_app.protocol.trials.designs import default_design
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 from tests.analysis.outputs import GOLDEN
 from tests.golden import compare
@@ -121,6 +122,29 @@ def studies() -> Iterator[tuple[str, Results]]:
     yield "the exploratory statement alone", changed(exploratory, ContrastsWithControl, without_harder)
     for decided in ({}, {"changed": True}, {"primary": ITEMS[1:]}, {"primary": ITEMS[:1]}):
         yield f"a threshold alone {decided}", threshold_alone(**decided)
+
+
+def test_the_page_says_what_each_block_presented() -> None:
+    def presented(*conditions: tuple[str, float | None], link: str = "") -> Setting:
+        (liquid, delay_ms), *_ = conditions
+        return Setting(code="L1", condition="c", liquid=liquid, delay_ms=delay_ms, link=link)
+
+    settings = (presented(("slime", 73.0)),)
+    late = LevelBlock("late", "Liquids (late)", "main", default_design("abx"), None, settings)
+    blocks = [
+        replace(late, reference=presented(("gear_oil", 73.0))),
+        replace(late, id="b", settings=(presented(("slime", 0.0)), presented(("slime", 41.0)))),
+        replace(late, id="c", title="On time", settings=(presented(("slime", 0.0), link="force 20 ms late"),)),
+        replace(late, id="d", settings=(Setting(code="L1", condition="8/1", of=presented(("slime", None))),)),
+        replace(late, id="e", settings=(Setting(code="L1"),)),
+    ]
+    study: Any = SimpleNamespace(blocks=(), levels=blocks)
+    assert presented_sentences(study) == {
+        "late": "In Liquids (late), slime and gear oil were presented with a visual delay of 73 ms.",
+        "b": "In Liquids (late), slime was presented with visual delays of 0 and 41 ms.",
+        "c": "In “On time”, slime was presented with no visual delay, force 20 ms late.",
+        "d": "In Liquids (late), slime was presented with a varied visual delay.",
+    }
 
 
 def test_what_is_answered(pytestconfig: pytest.Config) -> None:
