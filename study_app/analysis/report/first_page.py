@@ -23,6 +23,7 @@ from study_app.analysis.results import BlockResult, ContrastResult, LevelsResult
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, ms, number, significant
 from study_app.protocol.model import quoted_title
+from study_app.protocol.quantities import quantity_words
 
 _BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] |\b(?:d_z|g) (?=[−\d])")
 """Where a line must not break: in an interval, before a percent sign, in "n = 12" and "p < .001"."""
@@ -73,7 +74,7 @@ def presented_sentences(study: Study) -> dict[str, str]:
     """Return, by block, a sentence on the liquids and delays of its conditions; sealed blocks have none."""
     sentences: dict[str, str] = {}
     for block in (*study.blocks, *study.levels):
-        reference = block.reference if isinstance(block, LevelBlock) else None
+        stimulus, reference = (block.stimulus, block.reference) if isinstance(block, LevelBlock) else (None, None)
         conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
         liquids = [liquid.replace("_", " ") for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid]
         if not liquids:
@@ -82,10 +83,11 @@ def presented_sentences(study: Study) -> dict[str, str]:
         delay = f"visual delays of {listed([f'{delay_ms:g}' for delay_ms in delays])} ms"
         if len(delays) < 2:
             delay = "a varied visual delay" if not delays else f"a visual delay of {ms(delays[0])}"
+        varied = "" if stimulus is None or not delays else f"varied {quantity_words(stimulus.vary)} and "
         displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
         sentences[block.id] = (
             f"In {quoted_title(block.title)}, {listed(liquids)} {'were' if len(liquids) > 1 else 'was'} presented with "
-            f"{'no visual delay' if delays == [0.0] else delay}{''.join(f', {words}' for words in displays)}."
+            f"{varied}{'no visual delay' if delays == [0.0] else delay}{''.join(f', {words}' for words in displays)}."
         )
     return sentences
 
