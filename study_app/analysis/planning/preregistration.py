@@ -466,8 +466,7 @@ _SHOWN = 20
 class Deviations:
     """The preregistered commitments, and each deviation of the study from them as text.
 
-    ``commitment`` is None without a preregistration in the study's folder; then only the planned number of participants
-    is compared.
+    ``commitment`` is None without a preregistration; then only the planned number of participants is compared.
     """
 
     commitment: Commitment | None
@@ -477,6 +476,8 @@ class Deviations:
 def deviations(study: Study) -> Deviations | None:
     """Return deviations from the plan; None without a preregistration or a planned number of participants."""
     sites = {prefix.removesuffix(DASH): read_commitment(place) for prefix, place in folders_of(study.folder).items()}
+    if sites == {"": None}:  # a rehearsal or pilot has a folder of its own beside that of the study
+        sites[""] = read_commitment(study.folder.with_name(study.name))
     committed = next(filter(None, sites.values()), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:
@@ -530,10 +531,12 @@ def deviations_section(study: Study) -> Iterator[str]:
         return
     yield heading(2, "Preregistration")
     if (committed := compared.commitment) is None:
-        yield paragraph(
-            f"The study's folder does not contain {FILE}, so only the number of participants is compared with the plan "
-            "in the protocol."
+        lacks = (
+            f"The study's folder does not contain {FILE}, which “Write preregistration” in the designer and "
+            "liquid-study preregister write. If you have this file, copy it to that folder. "
         )
+        lacks = "" if study.simulated else lacks
+        yield paragraph(f"{lacks}Only the number of participants is compared with the plan in the protocol.")
     else:
         yield paragraph(
             f"Preregistered: {committed.study}, version {committed.version}, protocol with SHA-256 "

@@ -1,6 +1,7 @@
 """Where a study left its preregistration."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -116,6 +117,29 @@ def test_where_only_the_protocol_plans_participants_they_are_compared(answered: 
     assert deviations(load_study(answered.folder)) == Deviations(
         None, ("there are fewer participants than planned (3 instead of 20)",)
     )
+
+
+def test_the_preregistration_of_a_rehearsal_is_in_the_folder_of_its_study(answered: Results) -> None:
+    rehearsal = answered.folder.rename(answered.folder.with_name("small-rehearsal-1"))
+    (study := answered.folder.with_name("small")).mkdir()
+    committed(replace(answered, folder=study), participants=7)
+    compared = deviations(load_study(rehearsal))
+    assert compared is not None
+    assert compared.commitment is not None
+    assert compared.found == ("there are fewer participants than planned (3 instead of 7)",)
+
+
+def test_the_report_of_people_says_where_a_preregistration_is_missing(answered: Results) -> None:
+    (first, *_) = StudyFolder(answered.folder).sessions()
+    protocol = json.loads(first.receipt.read_text(encoding="utf-8"))["protocol"]
+    analysis = {"alpha": 0.05, "equivalence_bound": None, "primary": [], "names": [], "rising": [], "falling": []}
+    receipts(answered, protocol=protocol | {"analysis": analysis | {"noticed": None, "participants": 3}})
+    told = load_study(answered.folder)
+    for simulated in (True, False):
+        study = replace(told, participants=told.participants.assign(simulated=simulated))
+        text = " ".join(map(str, deviations_section(study)))
+        assert ("does not contain preregistration.md" in text) != simulated
+        assert "Only the number of participants is compared" in text
 
 
 @pytest.mark.parametrize("content", ["# nothing\n", "```json\n{}\n```\n", "```json\n{broken}\n```\n"])
