@@ -3,10 +3,9 @@
 import ctypes
 import os
 import sys
-from pathlib import Path
 
-from PySide6.QtCore import Qt, QUrl
-from PySide6.QtGui import QDesktopServices, QGuiApplication
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.display.display_check import check_display
@@ -39,8 +38,3 @@ def application_here() -> QApplication:
     key_presses()
     sys.setswitchinterval(_SWITCH_INTERVAL_S)
     return application
-
-
-def open_here(path: Path) -> None:
-    """Open a file or folder with the system's program for it."""
-    QDesktopServices.openUrl(QUrl.fromLocalFile(str(path.resolve())))

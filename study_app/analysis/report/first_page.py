@@ -10,7 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from study_app.analysis.contrasts import answer, mean_words, question
-from study_app.analysis.data.blocks import AFTER, LevelBlock
+from study_app.analysis.data.blocks import AFTER, Block, LevelBlock
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import Mean, mean_of
@@ -73,7 +73,8 @@ class Card:
 def presented_sentences(study: Study) -> dict[str, str]:
     """Return, by block, a sentence on the liquids and delays of its conditions; sealed blocks have none."""
     sentences: dict[str, str] = {}
-    for block in (*study.blocks, *study.levels):
+    blocks: list[Block | LevelBlock] = [*study.blocks, *study.levels]
+    for block in blocks:
         stimulus, reference = (block.stimulus, block.reference) if isinstance(block, LevelBlock) else (None, None)
         conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
         liquids = [liquid.replace("_", " ") for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid]

@@ -11,8 +11,8 @@ from shiboken6 import isValid
 
 from study_app.discovery import explain_error
 from study_app.errors import StudyError
-from study_app.gui.application import open_here
 from study_app.gui.kit.dialogs import Question
+from study_app.gui.kit.opening import open_here
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import DARK, LIGHT, RADIUS_CONTROL, Theme, font
 from study_app.gui.theme.themed import Coloured, Themed, apply_theme, give_ground, name_scroll_bars

@@ -12,7 +12,6 @@ from PySide6.QtWidgets import QBoxLayout, QDialog, QHBoxLayout, QLayout, QSizePo
 
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
-from study_app.gui.application import open_here
 from study_app.gui.display.screens import screens_shown
 from study_app.gui.home.cards import (
     LEAST_HEIGHT,
@@ -42,6 +41,7 @@ from study_app.gui.home.study_facts import (
 from study_app.gui.kit.commands import add_commands, key_cap, with_key
 from study_app.gui.kit.devices import DeviceShown, device_before_look
 from study_app.gui.kit.dialogs import choose_protocol
+from study_app.gui.kit.opening import open_here
 from study_app.gui.sessions.session_facts import SessionFacts, extent_of, sessions
 from study_app.gui.theme.theme import SHADOW
 from study_app.gui.widgets.background import Background

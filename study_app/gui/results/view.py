@@ -34,9 +34,9 @@ from study_app.analysis.worker_messages import (
     WriteTables,
     start_analysis_worker,
 )
-from study_app.gui.application import open_here
 from study_app.gui.kit.dialogs import REASON, Question, Work
 from study_app.gui.kit.fields import Field, choice_field
+from study_app.gui.kit.opening import open_here
 from study_app.gui.results.figures import (
     FiguresPanel,
     ResultsView,
@@ -256,6 +256,8 @@ class _SessionsCard(Card):
         """Show these sessions, or the text ``none``; the filters stay."""
         self._none = none
         self.rows.show_rows(sessions, datetime.now().astimezone())
+        has_groups = any(session.group for session in sessions)
+        self.search.setPlaceholderText("Participant or group" if has_groups else "Participant")
         chosen = self.state.currentData()
         with QSignalBlocker(self.state):
             self.state.clear()

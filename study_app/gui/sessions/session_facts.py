@@ -42,7 +42,8 @@ class SessionFacts:
     ``status`` is the table's, or "running" if a program has the session open. ``excluded`` is the reason why the
     analysis excludes it completely, otherwise None; ``lost`` counts recordings that could not be stored,
     ``reconnected`` how often the failed device was reconnected, ``outlets_lost`` failed streams and ports. ``missing``
-    are the undelivered trials, None if all were delivered.
+    are the undelivered trials, None if all were delivered. ``group`` is "" without groups or while it is
+    sealed.
     """
 
     participant: str
@@ -61,6 +62,7 @@ class SessionFacts:
     reconnected: int = 0
     outlets_lost: int = 0
     missing: MissingTrials | None = None
+    group: str = ""
 
     @property
     def version(self) -> str:
@@ -137,6 +139,7 @@ def session_facts(
             lost=lost,
             reconnected=reconnected,
             outlets_lost=outlets_lost,
+            group=row.get("group") or "",
             missing=_missing_trials(session) if row.get(TRIALS_MISSING.name) else None,
         )
         for (row, session), (lost, reconnected, outlets_lost) in zip(placed, counts, strict=True)
@@ -261,14 +264,14 @@ def answers_text(facts: SessionFacts) -> str:
 
 
 def session_filter(text: str, status: str) -> Callable[[SessionFacts], bool]:
-    """Return a predicate: the participant contains ``text`` and the state is ``status`` ("" for any).
+    """Return a predicate: participant or group contain ``text`` and the state is ``status`` ("" for any).
 
     ``status`` is one of `_STATUS`, "excluded", "invalid" or "lost".
     """
     wanted = text.strip().lower()
 
     def matches(facts: SessionFacts) -> bool:
-        if wanted not in facts.participant.lower():
+        if wanted not in facts.participant.lower() and wanted not in facts.group.lower():
             return False
         if status == "excluded":
             return facts.excluded is not None

@@ -30,7 +30,7 @@ def _session_cell(facts: SessionFacts, name: str, now: datetime) -> dict[int, An
     incident = "device reconnected" if facts.reconnected else "outlet failed" if facts.outlets_lost else ""
     missing = facts.missing
     incident = missing.brief if missing else incident
-    below = {"status": incident, "study": facts.kind}.get(name, "")
+    below = {"participant": facts.group, "status": incident, "study": facts.kind}.get(name, "")
     began = start_time_text(facts.started, now)
     said = f"{facts.name}: began {began}, {answers_text(facts)} answers"
     tip, face = ", ".join(filter(None, (said, str(missing or ""), incidents_text(facts)))), None

@@ -15,10 +15,10 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent, QPen, QPolygonF
 from PySide6.QtWidgets import QDialog, QSizePolicy, QStackedWidget, QWidget
 
 from study_app.errors import StudyError
-from study_app.gui.application import open_here
 from study_app.gui.kit.commands import Command, connect_button
 from study_app.gui.kit.dialogs import Work
 from study_app.gui.kit.fields import Field
+from study_app.gui.kit.opening import open_here
 from study_app.gui.participant.tank.arrows import HEIGHTS, Arrow, arrows_place, paint_arrows
 from study_app.gui.participant.tank.frame import Placed
 from study_app.gui.participant.tank_widget import TankWidget

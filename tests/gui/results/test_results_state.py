@@ -36,10 +36,15 @@ def test_an_excluded_session_that_was_not_complete_is_told_once():
         ("", "excluded", ["Q003"]),
         ("", "invalid", ["P001"]),
         ("q", "unfinished", []),
+        ("novice", "", ["P002"]),
     ],
 )
 def test_sessions_are_found_by_participant_and_state(words, status, found):
-    held = [facts("P001", validity="invalid"), facts("P002", status="unfinished"), facts("Q003", excluded="x")]
+    held = [
+        facts("P001", validity="invalid"),
+        facts("P002", status="unfinished", group="novices"),
+        facts("Q003", excluded="x"),
+    ]
     assert [one.participant for one in held if session_filter(words, status)(one)] == found
     assert [state for state, _ in occurring_states(held)] == ["completed", "unfinished", "invalid", "excluded"]
 

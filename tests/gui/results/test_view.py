@@ -68,6 +68,17 @@ def test_sessions_are_searched_and_filtered(place, qtbot):
     assert place.sessions.state.currentData() == "unfinished", "what was filtered stays so when sessions come"
 
 
+def test_the_group_stands_below_the_participant_and_can_be_searched(place, qtbot):
+    groups = {"P031": "novice", "P032": "expert", "P033": "novice"}
+    place.show_view(replace(view(), sessions=tuple(facts(who, group=group) for who, group in groups.items())))
+    model = place.sessions.rows.model
+    said = [model.index(row, 0).data(Qt.ItemDataRole.AccessibleTextRole) for row in range(model.rowCount())]
+    assert said == ["P031, novice", "P032, expert", "P033, novice"]
+    assert place.sessions.search.placeholderText() == "Participant or group"
+    qtbot.keyClicks(place.sessions.search, "Nov")
+    assert [one.participant for one in place.sessions.rows.shown] == ["P031", "P033"]
+
+
 def test_rows_are_chosen_by_the_keyboard_and_the_choice_begins_the_dialog(place, qtbot):
     table = place.sessions.rows.table
     place.sessions.state.setFocus()
