@@ -234,7 +234,7 @@ def draw_people(
     ruler = Sheet(width_pt, 72, look.fonts)
     rows = [panels[place : place + _A_ROW] for place in range(0, len(panels), _A_ROW)]
     inside = width_pt - MARGIN_PT
-    widths = [_widths(row, inside, shared=shared) for row in rows]
+    widths = [_widths(row, rows[0], inside, shared=shared) for row in rows]
     if len(panels) == 1:
         width_pt = min(width_pt, max(_NARROW_PT, _LEFT_PT + widths[0][0] + MARGIN_PT))
     titles = [
@@ -271,9 +271,15 @@ def draw_people(
     return sheet
 
 
-def _widths(row: Sequence[Panel], inside: float, *, shared: bool) -> list[float]:
-    room = inside - (_LEFT_PT + (len(row) - 1) * _GAP_PT if shared else len(row) * _LEFT_PT)
-    total = sum(panel.share for panel in row)
+def panel_rows(panels: int) -> int:
+    """Return the number of rows in which so many panels are drawn."""
+    return -(-panels // _A_ROW)
+
+
+def _widths(row: Sequence[Panel], first: Sequence[Panel], inside: float, *, shared: bool) -> list[float]:
+    """Return the widths of a row's panels [pt], which are as wide as those of the ``first`` row, if this is full."""
+    room = inside - (_LEFT_PT + (len(first) - 1) * _GAP_PT if shared else len(first) * _LEFT_PT)
+    total = sum(panel.share for panel in first)
     most = [
         _OF_MANY_PT if any(column.ends for column in panel.columns) else _MOST_COLUMN_PT * len(panel.columns)
         for panel in row

@@ -13,7 +13,7 @@ from study_app.analysis.contrasts import answer, mean_words, question
 from study_app.analysis.data.blocks import AFTER, Block, LevelBlock
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.figures.people_figures import Mean, mean_of
+from study_app.analysis.figures.people_figures import Mean, mean_of, panel_rows
 from study_app.analysis.figures.summary_figures import MOST_PANELS, Numbers, estimates_of, place_of
 from study_app.analysis.findings import all_findings
 from study_app.analysis.html_page import picture, render
@@ -331,11 +331,14 @@ def _unbroken(sentence: str) -> str:
 
 
 def _in_pairs(given: Sequence[Card]) -> list[bool]:
-    """Return which cards stand side by side: of successive small ones each pair."""
+    """Return which cards stand side by side: of successive small ones each pair with figures of one height."""
     paired: list[bool] = []
     for place, card in enumerate(given):
         if len(paired) == place:
-            is_pair = card.is_small and any(after.is_small for after in given[place + 1 : place + 2])
+            is_pair = card.is_small and any(
+                after.is_small and panel_rows(len(after.sentences)) == panel_rows(len(card.sentences))
+                for after in given[place + 1 : place + 2]
+            )
             paired += [True, True] if is_pair else [False]
     return paired
 

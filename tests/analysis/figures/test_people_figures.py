@@ -72,6 +72,14 @@ def test_no_text_leaves_the_figure_or_touches_another(panels: int, shared: bool)
         assert not box.overlaps(beside), (words, other)
 
 
+@pytest.mark.parametrize("shared", [True, False])
+def test_a_panel_alone_in_the_last_row_is_as_wide_as_those_above_it(shared: bool) -> None:
+    figure = draw_people([Panel(columns=columns(2))] * 4, LOOK, above="Points", shared=shared).figure
+    assert [axes.get_position().width for axes in figure.axes] == pytest.approx(
+        [figure.axes[0].get_position().width] * 4
+    )
+
+
 RATIOS = {"A": 0.5, "B": 2.0, "C": 3.0, "D": 12.0, "E": 6.0}
 MEMBERS = {"A": "experts", "B": "experts", "C": "novices", "D": "novices", "E": "novices"}
 GROUPS = ("experts", "novices")

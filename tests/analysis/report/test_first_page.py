@@ -290,14 +290,21 @@ def test_a_block_without_reaching_measures_says_why(
 
 def test_of_successive_short_cards_each_pair_is_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
     """A short card without a neighbour would leave half of the page empty."""
-    kinds = "S SS L SSS L S".replace(" ", "")
+    kinds = "S SS L SSS L S L S TT T".replace(" ", "")  # figures of T have two rows of panels
     made = [
-        Card(question=f"{place}", verdict="", sentences=("n = 12",), block="b", figures=(), is_small=kind == "S")
+        Card(
+            question=f"{place}",
+            verdict="",
+            sentences=("n = 12", *"abc" * (kind == "T")),
+            block="b",
+            figures=(),
+            is_small=kind != "L",
+        )
         for place, kind in enumerate(kinds)
     ]
     monkeypatch.setattr(pages, "cards", lambda *_: made)
     page = first_page(rising(5), ())
     assert ["S" if small else "-" for small in re.findall(r'<article class="card( small)?">', page)] == list(
-        "SS--SS---"
+        "SS--SS-----SS-"
     )
     assert page.count("n\u00a0=\u00a012") == len(made)
