@@ -107,15 +107,18 @@ def cards(
 
 
 def _hypotheses(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
+    told: set[str] = set()
     for place, contrast in enumerate(results.contrasts, start=1):
         blocks = contrast.contrast.blocks
+        new = [presented[block] for block in blocks if block in presented and block not in told]
+        told.update(blocks)
         yield Card(
             question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(contrast)}",
             verdict=contrast.verdict,
             sentences=(
                 answer(contrast),
                 *_cell_words(contrast),
-                *(presented[block] for block in blocks if block in presented),
+                *filter(None, [" ".join(new)]),
             ),
             block=blocks[0],
             figures=(f"hypothesis-{place}",),
