@@ -115,11 +115,7 @@ def _hypotheses(results: Results, presented: Mapping[str, str]) -> Iterator[Card
         yield Card(
             question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(contrast)}",
             verdict=contrast.verdict,
-            sentences=(
-                answer(contrast),
-                *_cell_words(contrast),
-                *filter(None, [" ".join(new)]),
-            ),
+            sentences=(answer(contrast), *_cell_words(contrast), *filter(None, [" ".join(new)])),
             block=blocks[0],
             figures=(f"hypothesis-{place}",),
         )
