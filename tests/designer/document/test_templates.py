@@ -8,6 +8,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from study_app.cli import commands
+from study_app.designer.document.additions import texts_of
 from study_app.designer.document.document import Answers, copy_of, template, with_answers
 from study_app.designer.document.fields import row_at
 from study_app.designer.document.study import read_study
@@ -59,6 +60,14 @@ def test_each_template_asks_at_most_five_questions_about_keys_that_it_has(name: 
         row = row_at(document, path)
         assert row is not None
         assert row.kind in {"number", "whole number", "numbers", "vector", "either"}
+
+
+@pytest.mark.parametrize("name", templates())
+def test_the_texts_of_a_template_break_only_between_paragraphs(name: str) -> None:
+    study = template(name)
+    texts = [text for _, text in texts_of(study) if isinstance(text, str)]
+    assert any("\n\n" in text for text in texts)
+    assert [text for text in texts if "\n" in text.rstrip().replace("\n\n", "")] == []
 
 
 def test_the_answers_are_edits_of_the_template() -> None:
