@@ -871,6 +871,10 @@ def hypotheses(story: Story) -> None:
 
     story.press("Add a hypothesis")
     stated("feels_liquid", "thin thick")
+    story.press("Add a hypothesis")
+    first, second = designer.value(*contrasts)
+    assert (second["measure"], second["conditions"]) != (first["measure"], first["conditions"])
+    story.play("ctrl+z")
     story.choose(line().relation, "is higher than")
     stated("feels_liquid", "thin thick", expected="higher")
     offered("Thick in Liquids")

@@ -596,6 +596,23 @@ def _comparison_keys(first: Compared, second: Compared, measure: str) -> dict[st
     return table | {first.key: [first.name, second.name]} | ({first.pair_of: [*first.pair]} if first.pair else {})
 
 
+def _comparisons(every: tuple[Compared, ...]) -> Iterator[dict[str, Any]]:
+    """Yield the keys of each possible comparison."""
+    for first in every:
+        for second in first.comparable_with(every):
+            for measure, _ in first.shared_measures(second):
+                yield _comparison_keys(first, second, measure)
+
+
+def _comparison(value: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a hypothesis compares, in any order and whatever it expects."""
+    return {
+        key: frozenset(entry) if isinstance(entry, list | tuple) else entry
+        for key, entry in value.items()
+        if key not in {"expected", "bound"}
+    }
+
+
 def _relation(value: Mapping[str, Any]) -> Any:
     return value.get("expected", None if value.get("bound") is None else "equal")
 
@@ -625,10 +642,11 @@ class _HypothesesField(Field):
         self.why.setText("" if self.row.facts else _NOTHING_TO_COMPARE)
 
     def _add_hypothesis(self) -> None:
-        first: Compared = self.row.facts[0]
-        second = first.comparable_with(self.row.facts)[0]
-        value = _comparison_keys(first, second, first.shared_measures(second)[0][0])
-        self.asked.emit(AddEntry(self.row.path, value))
+        values = list(_comparisons(self.row.facts))
+        known = [_comparison(value) for value in self.row.value or () if isinstance(value, Mapping)]
+        self.asked.emit(
+            AddEntry(self.row.path, next((value for value in values if _comparison(value) not in known), values[0]))
+        )
 
     def _refuse(self, why: str) -> None:
         if why != self.refusal:
