@@ -421,7 +421,7 @@ class ParticipantPreview(Card):
         self.page.shown.connect(self._show_if_visible)
         self.page.happened.connect(self._handle_page_event)
         self.page.frame_due.connect(self._move_ball)
-        self.page.left.connect(lambda: self.before.setFocus(Qt.FocusReason.OtherFocusReason))
+        self.page.left.connect(self._leave_page)
         self.languages.chosen.connect(lambda code: self.show_language(str(code)))
         self.screens.activated.connect(self._choose_screen)
         self.before.clicked.connect(lambda: self.go(-1))
@@ -450,6 +450,11 @@ class ParticipantPreview(Card):
     def enter_page(self) -> None:
         self._show_tab()
         self.page.setFocus(Qt.FocusReason.ShortcutFocusReason)
+
+    def _leave_page(self) -> None:
+        """Focus the first control below the page; the first step has no previous one."""
+        part = next(part for part in (self.before, self.after, self.zoom) if part.isEnabled())
+        part.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _show_tab(self) -> None:
         self.place.sides.chosen.emit("pane")

@@ -47,6 +47,15 @@ def place_of(live: Any, part: Any) -> QPoint:
     return live.mapFromScene(QPointF(middle))
 
 
+def test_escape_leaves_the_page_of_the_first_step(designer: Any, live: Any) -> None:
+    designer.go_to("pages", "welcome")
+    preview = designer.controller.preview
+    preview.enter_page()
+    QApplication.processEvents()
+    assert (designer.keyboard, preview.before.isEnabled()) == (live, False)
+    assert designer.hit("Escape") is preview.after
+
+
 def test_a_trial_is_stepped_to_and_played(designer: Any) -> None:
     designer.controller.begin_study("template:viscosity-jnd", "thicker")
     designer.go_to("blocks", "viscosity")
