@@ -150,7 +150,7 @@ def _exclusion_rules(study: Study, results: Results) -> str:
     is_known = study.revealed or not NEED_KEY & conditions.keys()
     number_met = f"; {counted(met, 'session') if met else 'no session'} met {rules}" if is_known else ""
     return (
-        "According to the protocol, a session was considered for exclusion if "
+        "According to the protocol, a session is considered for exclusion if "
         f"{', or if '.join(conditions.values())}{number_met}."
     )
 

@@ -15,13 +15,13 @@ from study_app.designer.document.toml_edits import Edit, Rename, Set, Unset
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.ranges import REASON
 from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
-from study_app.number_text import counted
+from study_app.number_text import counted, exact_text
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
 from study_app.protocol.json_schema import length_texts, schema
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.questions import POINTS
 from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.source.problems import rule_of, shown_value
+from study_app.protocol.source.problems import rule_of
 from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
 from study_app.protocol.trials.designs import KINDS as DESIGNS
 from study_app.protocol.trials.designs import Design, default_design
@@ -669,7 +669,7 @@ _NO_BOUND: Final = 1e6
 
 def _bound_texts(node: _Node, numbers: _Node) -> tuple[str, ...]:
     stated = {key: numbers[key] for key in _OF_NUMBERS if key in numbers and abs(numbers[key]) < _NO_BOUND}
-    phrases = [_OF_NUMBERS[key].format(shown_value(number)) for key, number in stated.items()]
+    phrases = [_OF_NUMBERS[key].format(exact_text(number)) for key, number in stated.items()]
     if "prefixItems" not in node:
         phrases += length_texts(node)
     return (*phrases, rule_of(node["pattern"])) if "pattern" in node else tuple(phrases)
@@ -681,7 +681,7 @@ def violated_bound(document: Mapping[str, Any], row: Row, number: float) -> str:
     if row.kind == "whole number" and not isinstance(number, int):
         return "a whole number"
     broken = (key for key, holds in _HOLDS.items() if key in node and not holds(number, node[key]))
-    return next((_OF_NUMBERS[key].format(shown_value(node[key])) for key in broken), "")
+    return next((_OF_NUMBERS[key].format(exact_text(node[key])) for key in broken), "")
 
 
 def label_of(step: str | int) -> str:

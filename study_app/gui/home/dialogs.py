@@ -30,7 +30,7 @@ from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
 from study_app.protocol.source.files import source_bytes
 from study_app.protocol.warnings.untranslated import check_translated
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording.languages import LANGUAGES, language_name
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
 from study_app.session.start import MAX_SEED, NewSession, check_row, draw_seed, study_results
 from study_app.store.blinded.allocation import Claim, check_choice, claims
@@ -63,7 +63,7 @@ class RehearsalDialog(Work):
         self, facts: StudyFacts, results: Path, *, theme: Theme = LIGHT, parent: QWidget | None = None
     ) -> None:
         self.folder = rehearsal_folder(results, facts.protocol.study.name)
-        groups = ", ".join(facts.protocol.groups)
+        groups = LANGUAGES["en"].joined(tuple(facts.protocol.groups))
         dealt = f" Participants are distributed evenly across the groups {groups}." if facts.protocol.asks_group else ""
         super().__init__(
             parent,

@@ -836,7 +836,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # Questionnaires and planned exclusions
     (rf"Participants completed the questionnaire “(?P<form>\w+)” \((?P<n>{N}) questions?\) (?P<times>.*)\.",
      form_times),
-    (rf"According to the protocol, a session was considered for exclusion if (?P<rules>.*); (?P<met>{N}) sessions? met "
+    (rf"According to the protocol, a session is considered for exclusion if (?P<rules>.*); (?P<met>{N}) sessions? met "
      r"(?:this rule|one of these rules)\.", rules_met),
     # Limits
     (rf"In (\d+) simulated studies with (\d+) participants, three liquids, seven delays and no true effect, {R} % of "

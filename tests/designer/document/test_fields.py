@@ -1,5 +1,6 @@
 """Forms from the models of the file format: every key of every model has a row, every fault a field."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -11,9 +12,10 @@ from study_app.designer.document.fields import Row, label_of, row_at, rows, unit
 from study_app.designer.document.steps import AddKey, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.form.form import form_of
+from study_app.number_text import exact_text
 from study_app.protocol.json_schema import schema
 from study_app.protocol.source.document import Path, entries
-from study_app.protocol.source.problems import Fault, rule_of, shown_value
+from study_app.protocol.source.problems import Fault, rule_of
 from study_app.store.workstation import MachineSettings
 from tests.designer.document.grown import PROTOCOLS
 from tests.protocol.edited_studies import FAULTY, Case, text_of
@@ -55,10 +57,13 @@ def described(node: Any) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     for definition in (node, *node["$defs"].values()):
         for key, part in definition.get("properties", {}).items():
             bounds = [
-                one[name] for one in (part, *part.get("anyOf", ())) for name in ("minimum", "maximum") if name in one
+                one[name]
+                for one in (part, *part.get("anyOf", ()))
+                for name in ("minimum", "maximum")
+                if abs(one.get(name, math.inf)) < 1e6
             ]
             if "description" in part:
-                yield key, part["description"], tuple(map(shown_value, bounds))
+                yield key, part["description"], tuple(map(exact_text, bounds))
 
 
 def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> None:
@@ -69,7 +74,7 @@ def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> 
         assert row.label
     for key, words, bounds in described(schema()):
         assert (key, words) in found
-        assert all(bound in found[key, words] or "e+" in bound for bound in bounds), key
+        assert all(bound in found[key, words] for bound in bounds), key
 
 
 def test_every_unit_of_the_models_is_known() -> None:
@@ -82,8 +87,8 @@ def test_every_unit_of_the_models_is_known() -> None:
 
 def test_bounds_are_words_or_numbers_that_a_person_can_reach() -> None:
     bounds = {bound for row in every_row({}) for bound in row.bounds}
-    assert {"at most 8", "at least 1 entry", "at least 2 entries"} <= bounds
-    assert not {bound for bound in bounds if "^" in bound or "e+" in bound}
+    assert {"at most 8", "at least 0.000001", "at least 1 entry", "at least 2 entries"} <= bounds
+    assert not {bound for bound in bounds if "^" in bound or "e+" in bound or "e-" in bound}
 
 
 def patterns_in(node: Any) -> Iterator[str]:
