@@ -4,7 +4,7 @@ Each class is one table of the file (blocks, tasks and questionnaires have modul
 can decide by itself is checked by its class; what needs two tables is in ``checks``.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -12,6 +12,7 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
+from study_app.haptics.model.effect import Effect as EffectDescriptor
 from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, Vector, later, within
 from study_app.haptics.model.scene import (
     FADE_S,
@@ -244,6 +245,13 @@ class StudyLiquid(Liquid):
     model_config = ConfigDict(title="Liquid")
 
     body: OwnBody | None = later(default=None, description="The ball in this liquid, if it differs from scene.body.")
+
+    def _has_no_problem(self, effects: Iterable[EffectDescriptor]) -> None:
+        used = list(effects)
+        if self.viscosity_pa_s is not None and any(effect.name == "non_newtonian" for effect in used):
+            message = "describes a Newtonian liquid, but the non-Newtonian table specifies another law"
+            raise invalid(message, "viscosity_pa_s", kind="surplus")
+        super()._has_no_problem(used)
 
     @property
     def alone(self) -> Liquid:

@@ -169,8 +169,10 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         meant = difflib.get_close_matches(str(path[-1]), sorted(permitted), n=1)
         return Fault(path, "unknown key", hint, use=(path, meant[0]) if meant else None, kind="unknown key")
     if kind == "union_tag_not_found":
-        tags = f"one of {context.get('expected_tags', '')}".strip()
-        return Fault((*path, _tag_key(context)), "is missing", tags, kind="missing")
+        key = _tag_key(context)
+        tags = (node.get("properties", {}).get(key, {}) for node in _nodes_at(document, path, schema))
+        permitted = [f'"{value}"' for tag in tags for value in tag.get("enum", (tag.get("const"),)) if value]
+        return Fault((*path, key), "is missing", f"one of {', '.join(permitted)}", kind="missing")
     if kind == "union_tag_invalid":
         tag, tags = context["tag"], str(context["expected_tags"]).replace("'", '"')
         return _unknown_value((*path, _tag_key(context)), tag, f'"{tag}" is not one of {tags}', tags)

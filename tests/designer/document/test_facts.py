@@ -11,7 +11,7 @@ from study_app.analysis.planning import threshold_studies
 from study_app.designer.document.additions import repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import outline
-from study_app.designer.document.steps import AddElement, AddInstrument, ChangeLanguage, Situation
+from study_app.designer.document.steps import AddElement, AddInstrument, AddKey, ChangeLanguage, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.measures.study_facts import (
@@ -28,7 +28,7 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_level
-from study_app.protocol.source.document import places_of
+from study_app.protocol.source.document import places_of, value_at
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.warnings.expected_precision import ThresholdPlan, expected, threshold_plan
 from tests.designer.document.grown import PROTOCOLS
@@ -195,6 +195,22 @@ def test_blocks_with_one_title_are_named_once_whatever_the_number_of_languages()
     )
     (warning,) = [sentence for sentence in facts(study).warnings if "same title" in sentence]
     assert warning.startswith("blocks.delays.title: block liquids has the same title, “A common title”")
+
+
+def test_a_viscosity_beside_another_law_is_a_problem_of_its_field_and_can_be_removed() -> None:
+    liquid = ("liquids", "thin")
+    study = template("two-liquids-abx")
+    assert value_at(study.document, (*liquid, "viscosity_pa_s")) == 0.2
+    study, _ = study.with_edits(*AddKey((*liquid, "non_newtonian")).step(Situation(study)).edits)
+    (fault,) = study.faults
+    message = "describes a Newtonian liquid, but the non-Newtonian table specifies another law"
+    assert (fault.path, fault.message) == ((*liquid, "viscosity_pa_s"), message)
+    (repair,) = repairs(study, fault)
+    assert repair.words == "Remove"
+    assert study.with_edits(*repair.edits)[0].faults == ()
+    without, _ = study.with_edits(*repair.edits, Unset((*liquid, "non_newtonian", "kind")))
+    kinds = '"herschel-bulkley", "carreau", "maxwell", "shear-thickening"'
+    assert [fault.hint for fault in without.faults] == [f"one of {kinds}"]
 
 
 def test_a_study_gets_two_groups_at_once() -> None:
