@@ -176,8 +176,11 @@ class Block(Table):
                     "questionnaire": "ask its questions in a form after the block",
                 }.get(name, "")
                 raise invalid(f"cannot be used in a block with {what}", name, instead, kind="surplus")
-        if what == "a design" and (self.standard not in self.conditions or len(self.conditions) < 2):
-            raise invalid("must be one of the block's conditions, and the block needs at least two", "standard")
+        if what == "a design" and len(self.conditions) < 2:
+            message = "the block has one condition, but its design compares at least two"
+            raise invalid(message, "conditions", "add another condition")
+        if what == "a design" and self.standard not in self.conditions:
+            raise invalid("must be one of the block's conditions", "standard")
         return self
 
     @model_validator(mode="after")

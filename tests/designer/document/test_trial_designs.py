@@ -123,7 +123,9 @@ def test_the_standard_follows_the_conditions_of_its_block(study: Study) -> None:
     whole = after(study, SetValue(DESIGN, "abx"))
     conditions = ("blocks", "feel", "conditions")
     one = after(whole, RemoveKey((*conditions, 0)))
-    assert [fault.path[-1] for fault in one.faults] == ["standard"]
+    (fault,) = one.faults
+    assert (fault.path, fault.hint) == (conditions, "add another condition")
+    assert fault.message == "the block has one condition, but its design compares at least two"
     assert after(one, AddEntry(conditions, "late")).document["blocks"]["feel"]["standard"] == "slime"
     three = after(whole, AddEntry(conditions, "late"))
     assert three.document["blocks"]["feel"]["standard"] == "water"
