@@ -537,8 +537,9 @@ class Questions(Themed, QWidget):
         self.own: dict[OwnQuestion, QLineEdit] = {}
         self._grid = grid_of(8, 8, margins=0, parent=self)
         self._grid.setColumnStretch(1, 1)
-        for row, (title, field) in enumerate((("Title", self.title), ("Short name", self.name))):
-            self._add_field(row, title, field)
+        self._grid.addWidget(label("Title", "label"), 0, 0, 1, 2)
+        self._grid.addWidget(self.title, 1, 0, 1, 2)  # a title is long
+        self._add_field(2, "Short name", self.name)
         box = QWidget()
         checks = grid_of(2, 2, margins=0, parent=box)
         for at, (code, name) in enumerate(_languages_offered()):
@@ -551,8 +552,8 @@ class Questions(Themed, QWidget):
         self.first_texts = label("", "label", "text2", wraps=True)
         checks.addWidget(self.first_texts, checks.rowCount(), 0, 1, 2)
         self._show_first_texts()
-        self._grid.addWidget(label("Languages", "label"), 2, 0, 1, 2)
-        self._grid.addWidget(box, 3, 0, 1, 2)
+        self._grid.addWidget(label("Languages", "label"), 3, 0, 1, 2)
+        self._grid.addWidget(box, 4, 0, 1, 2)
         self._own: list[QWidget] = []
 
     def _make_field(self, name: str) -> QLineEdit:
@@ -584,7 +585,7 @@ class Questions(Themed, QWidget):
         for part in self._own:
             remove_widget(part)
         self._own, self.own = [], {}
-        for row, question in enumerate(choice.questions, start=4):
+        for row, question in enumerate(choice.questions, start=5):
             field = self._make_field(question.words)
             field.setText(question.value)
             field.setToolTip(question.bounds)

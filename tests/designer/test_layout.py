@@ -123,6 +123,7 @@ def test_measures_and_the_page_of_a_new_study_fit(
         one.setChecked(True)
         qtbot.wait(1)
         assert fits(page.card.area), one.choice.source
+        assert page.card.questions.title.width() == page.card.questions.width(), "a title is long"
         assert not nameless(page), one.choice.source
     designer.controller.begin_study("template:viscosity-jnd", "thicker")
     designer.place.sides.buttons[1].click()
