@@ -7,8 +7,8 @@ from PySide6.QtWidgets import QDialog
 
 from study_app.app.main_controller import MainController
 from study_app.devices.registry import all_devices
-from study_app.gui.application import open_here
 from study_app.gui.home.study_facts import StudyFacts, study_facts
+from study_app.gui.kit.opening import open_here
 from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.settings.view import DisplayTest

@@ -290,10 +290,10 @@ def _repairs_by_kind(study: Study, fault: Fault) -> Iterator[Repair]:
 
 def _groups_repair(study: Study) -> Repair:
     """Return the repair that adds groups until there are two."""
-    known = names(study.document, _GROUPS[0])
+    known = names(study.document, "groups")
     taken = list(known)
     while len(taken) < 2:
-        taken.append(free_id(taken, element_noun(_GROUPS[0])))
+        taken.append(free_id(taken, element_noun("groups")))
     edits = tuple(Set((*_GROUPS, name), {}) for name in taken[len(known) :])
     return Repair("Add another group" if known else "Add two groups", edits)
 

@@ -24,7 +24,7 @@ from study_app.gui.widgets.background import Background
 from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.labels import label, set_ink
+from study_app.gui.widgets.labels import Ink, label, set_ink
 from study_app.protocol.groups import check_session_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
@@ -411,7 +411,8 @@ class NewSessionDialog(QDialog):
             self._free = min(max(numbers) + 1, MAX_SESSION), used.suggested()
             self.ways[0].show_action("", f"Session {self._free[0]} of {participant}")
             self.ways[1].show_action("", f"New participant {self._free[1]}")
-        fault, sign, ink = "", "check", "ok"
+        fault, sign = "", "check"
+        ink: Ink = "ok"
         try:
             self._raise_if_refused()
         except _ChoiceMissing as missing:  # what is still to be done is not a mistake

@@ -170,9 +170,9 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         return Fault(path, "unknown key", hint, use=(path, meant[0]) if meant else None, kind="unknown key")
     if kind == "union_tag_not_found":
         key = _tag_key(context)
-        tags = (node.get("properties", {}).get(key, {}) for node in _nodes_at(document, path, schema))
-        permitted = [f'"{value}"' for tag in tags for value in tag.get("enum", (tag.get("const"),)) if value]
-        return Fault((*path, key), "is missing", f"one of {', '.join(permitted)}", kind="missing")
+        choices = (node.get("properties", {}).get(key, {}) for node in _nodes_at(document, path, schema))
+        values = [f'"{value}"' for choice in choices for value in choice.get("enum", (choice.get("const"),)) if value]
+        return Fault((*path, key), "is missing", f"one of {', '.join(values)}", kind="missing")
     if kind == "union_tag_invalid":
         tag, tags = context["tag"], str(context["expected_tags"]).replace("'", '"')
         return _unknown_value((*path, _tag_key(context)), tag, f'"{tag}" is not one of {tags}', tags)
