@@ -27,7 +27,7 @@ from study_app.analysis.levels.statistic import LevelStatistic
 from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.questions import scored
-from study_app.analysis.results import ContrastResult, ContrastSide, LevelsResult, Results
+from study_app.analysis.results import BADGES, ContrastResult, ContrastSide, LevelsResult, Results
 from study_app.analysis.statistics.effect_sizes import (
     PRIOR_SCALE,
     EffectSize,
@@ -641,7 +641,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("SE", lambda row: number(row.standard_error)),
         *ends_of(lambda row: row.interval),
         ("BF₁₀", lambda row: "–" if row.bayes_factor is None else significant(row.bayes_factor)),
-        ("Verdict", lambda row: row.verdict),
+        ("Verdict", lambda row: BADGES.get(row.verdict, row.verdict)),
         words=1,
         last=1,
     )

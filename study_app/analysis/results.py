@@ -360,6 +360,14 @@ class Results:
 SEALED: Final = "computed only after unblinding, because this requires knowing which condition each code stands for"
 """The reason for results that are missing because the key is sealed."""
 
+BADGES: Final = {
+    "shown": "significant",
+    "suggested": "significant, exploratory",
+    "not shown": "not significant",
+    "out of reach": "too few participants",
+}
+"""Verdicts as the first page and the table of hypotheses name them."""
+
 VERDICTS_MEAN: Final = (
     "Shown (“significant” on the first page): the adjusted p value is at most {alpha}. Suggested (“significant, "
     "exploratory”): the adjusted p value is at most {alpha}, but the statement was not specified as primary before the "

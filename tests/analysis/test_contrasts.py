@@ -254,7 +254,16 @@ def test_the_score_of_a_form_after_each_block_is_a_hypothesis(tmp_path: Path) ->
         *(f"{p:.3f}".removeprefix("0") for p in (expected.pvalue, result.largest_p)),
     ]
     bayes = f"{result.bayes_factor:.3g}"
-    row = [comparison, "6", *tested, _shown(differences.mean()), _shown(differences.sem()), *ends, bayes]
+    row = [
+        comparison,
+        "6",
+        *tested,
+        _shown(differences.mean()),
+        _shown(differences.sem()),
+        *ends,
+        bayes,
+        "not significant",
+    ]
     assert " ".join(row) in told
     for name, values in (
         (comparison, differences),

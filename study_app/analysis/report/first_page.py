@@ -19,7 +19,7 @@ from study_app.analysis.findings import all_findings
 from study_app.analysis.html_page import picture, render
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.report.sections import answers, empty_studies, none_found, place_title
-from study_app.analysis.results import BlockResult, ContrastResult, LevelsResult, QuestionResult, Results
+from study_app.analysis.results import BADGES, BlockResult, ContrastResult, LevelsResult, QuestionResult, Results
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, ms, number, significant
 from study_app.protocol.model import quoted_title
@@ -31,12 +31,6 @@ _LIMITS_SHOWN: Final = 6
 """So many limits are listed on the first page; the others are folded."""
 
 
-_BADGES: Final = {
-    "shown": "significant",
-    "suggested": "significant, exploratory",
-    "not shown": "not significant",
-    "out of reach": "too few participants",
-}
 _NO_NUMBERS: Final[Mapping[str, Sequence[Numbers]]] = MappingProxyType({})
 _NOT_PRESENTED: Final[Mapping[str, str]] = MappingProxyType({})
 
@@ -59,7 +53,7 @@ class Card:
     @property
     def badge(self) -> str:
         """The verdict as the badge beside the question shows it."""
-        return _BADGES.get(self.verdict, self.verdict)
+        return BADGES.get(self.verdict, self.verdict)
 
     def figure_of(self, drawn: Sequence[Picture]) -> Picture | None:
         """Return the figure that shows the answer; None if there is none."""
