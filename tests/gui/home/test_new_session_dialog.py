@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QScrollBar, QWidget
+from PySide6.QtWidgets import QLabel, QScrollBar, QWidget
 
 from study_app.gui.display.screens import ScreenShown
 from study_app.gui.home import dialogs
@@ -200,6 +200,13 @@ def grouped(tmp_path: Path, assignment: str) -> Path:
     head = f'study.name = "grouped"\nstudy.group_assignment = "{assignment}"\n'
     study.write_text((STUDY + GROUPS).replace('study.name = "grouped"\n', head), encoding="utf-8", newline="\n")
     return study
+
+
+def test_a_rehearsal_names_the_groups_across_which_it_distributes_participants(qtbot, tmp_path, results):
+    made = RehearsalDialog(study_facts(str(grouped(tmp_path, "pre-existing"))), results)
+    qtbot.addWidget(made)
+    texts = [shown.text() for shown in made.findChildren(QLabel)]
+    assert any("evenly across the groups first_thin and first_thick." in text for text in texts), texts
 
 
 def test_a_preexisting_group_is_chosen_before_a_session_begins_and_kept_in_the_next_one(
