@@ -108,7 +108,8 @@ class Measurements:
     of the velocity and its value for fully known device dynamics; None if all are known. ``outlets`` are the streams
     and ports to other programs; ``video`` is the state of the study's videos, None without any. ``ran_otherwise`` is a
     participant whose session used the same version of the study from a different file; ``untranslated`` are texts of
-    the pages that are still in another language.
+    the pages that are still in another language. ``late_device`` says when the device answered later than the servo
+    assumes, as far as the bench test or the last session showed it.
     """
 
     device: str
@@ -132,6 +133,7 @@ class Measurements:
     outlets: tuple[OutletStatus, ...] = ()
     video: VideosFound | None = None
     ran_otherwise: str = ""
+    late_device: str = ""
     untranslated: tuple[UntranslatedText, ...] = ()
     lateness_ns: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, np.int64), compare=False, repr=False)
 
@@ -199,8 +201,11 @@ def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
         about = f"a force takes effect after {1e3 * facts.dynamics.delay_s:.2f} ms, as measured by the device"
         if facts.delay_ticks > facts.dynamics.delay_ticks(requested_hz):
             about += " when it was opened; it has measured a longer delay since"
-    well = facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS
+    well = (facts.dynamics.delay_s is None or facts.delay_ticks <= ASSUMED_TICKS) and not facts.late_device
     advice = "The force limits are stricter because of this delay; connect the device without a hub."
+    if facts.late_device:
+        remedy = f"connect the device without a hub, then measure it: liquid-study devices bench {facts.device}"
+        advice = f"{facts.late_device}; {remedy}."
     yield _warning_unless("Loop delay", counted(facts.delay_ticks, "tick"), about, advice, well=well)
 
     value, about = f"{facts.timing.rate_hz:.1f} Hz", f"requested: {requested_hz:g} Hz"

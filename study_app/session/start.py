@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from study_app.devices.registry import check_options, descriptor_of
 from study_app.devices.rig import Rig
-from study_app.errors import SessionError
+from study_app.errors import SessionError, StoreError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
 from study_app.protocol.load import parse, read_document, source_bytes
 from study_app.protocol.model import Protocol
@@ -25,7 +26,8 @@ from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store import workstation
 from study_app.store.blinded.allocation import check_session
-from study_app.store.blinded.blinding import check_conditions
+from study_app.store.blinded.blinding import check_conditions, open_events, opened_key, read_key
+from study_app.store.delivered import TOLERATED_TICKS, late_device_text
 from study_app.store.folders import ID_PATTERN, StudyFolder, locate_session, study_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
@@ -252,7 +254,11 @@ def measure_rig(
     document, _ = read_document(chosen.read_source(), chosen.source)
     untranslated = untranslated_on_pages(document)
     return replace(
-        facts, video=looked, ran_otherwise=participant_with_other_contents(chosen), untranslated=untranslated
+        facts,
+        video=looked,
+        ran_otherwise=participant_with_other_contents(chosen),
+        untranslated=untranslated,
+        late_device=seen_late(rig, StudyFolder(chosen.results), chosen.read_protocol().study.blinding),
     )
 
 
@@ -266,6 +272,29 @@ def participant_with_other_contents(chosen: NewSession) -> str:
         ran = run_of(session.receipt)
         if ran is not None and ran.version == version and not has_hash(source, ran.hash):
             return session.participant
+    return ""
+
+
+def seen_late(rig: Rig, folder: StudyFolder, blinding: str) -> str:
+    """Return a sentence on when the device answered later than the servo assumes; "" if that was not seen.
+
+    The bench test on this computer shows it, or else the trials of the study's last session. In a double-blind study,
+    these would reveal which participants felt a thick liquid, so they are only read after unblinding.
+    """
+    bench = with_bench_measurements(rig.described).get("bench")
+    if bench is not None:
+        ticks, assumed = round(max(bench["delay_ms"]) * rig.servo.rate_hz / 1000), rig.servo.delay_ticks
+        if ticks > assumed + TOLERATED_TICKS:
+            text = late_device_text({"device_delay_ticks": ticks, "loop_delay_ticks": assumed})
+            return f"In the bench test of {bench['measured']}, {text}"
+    with suppress(StoreError, OSError, ValueError):
+        last = max(folder.sessions(), key=lambda session: session.journal.stat().st_mtime)
+        key = opened_key(folder) if blinding == "double" else read_key(folder.path)
+        lines = open_events(journal.read(last.journal), key)
+        late = progress_of(lines).late
+        if late and start_of(lines).device == rig.device.name:
+            trial = max(late)
+            return f"In trial {trial} of the last session (participant {last.participant}), {late[trial]}"
     return ""
 
 

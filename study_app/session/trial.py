@@ -20,7 +20,7 @@ from study_app.protocol.trials.tasks import AnyTask
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TankView, TargetReached, TaskView, new_tracker
 from study_app.session.transitions.events import StartTrial
-from study_app.store.delivered import JUDGED, delivered_error, judged_fields
+from study_app.store.delivered import JUDGED, delivered_error, judged_fields, late_device_ticks
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
 _LEAD_S = 0.6  # time of samples kept for the next recording [s]: longer than the slowest fade
@@ -159,6 +159,7 @@ def _sample_columns(samples: Any, rate_hz: float, samples_dropped: int, worst_ga
         "withheld_share": float(samples["withheld_n"].sum()) / permitted_n if permitted_n > 0 else None,
         "loop_delay_ticks": int(delay_ticks.max()) if ticks else None,
         "loop_delay_changes": int(np.count_nonzero(np.diff(delay_ticks))) if ticks else None,
+        "device_delay_ticks": late_device_ticks(samples, rate_hz) if ticks else None,
         **{
             f"limiter_{name}": int(np.count_nonzero(samples["limiters"] >> bit & 1))
             for bit, name in enumerate(LIMITER_NAMES)

@@ -216,6 +216,12 @@ _TRIALS: tuple[Column, ...] = (
         of_trial="max",
     ),
     _count("loop_delay_changes", "Number of times the loop delay changed during the task."),
+    _count(
+        "device_delay_ticks",
+        "Least delay of the device in ticks, if an oscillation shows that it exceeds loop_delay_ticks by two or more.",
+        sealed=True,
+        of_trial="max",
+    ),
     *(
         _count(f"limiter_{limiter.name}", f"Number of servo ticks in which {limiter.meaning}.", sealed=True)
         for limiter in sorted(LIMITERS)

@@ -11,7 +11,15 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from study_app.haptics.model.layout import FORCE_STEP_N, LIMITER_GLITCH, LIMITER_NORM, LIMITER_SATURATED, SAMPLE
+from study_app.haptics.model.layout import (
+    FORCE_STEP_N,
+    LIMITER_ENERGY,
+    LIMITER_GLITCH,
+    LIMITER_NORM,
+    LIMITER_SATURATED,
+    SAMPLE,
+)
+from study_app.number_text import counted
 from study_app.protocol.model import Limits, Protocol
 from study_app.protocol.presented.presentation import Presentation, presented_condition
 from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, Stimulated
@@ -39,6 +47,19 @@ _TRUE_HALF_S: Final = 0.018
 loop adds; a shorter one keeps encoder noise."""
 LONGEST_S: Final = 0.26
 """Longest lag of a force that is searched for: the longest delay with the longest jitter, plus a margin [s]."""
+TOLERATED_TICKS: Final = 1
+"""The passivity controller also holds if a device is this much later than assumed."""
+_LONGEST_TICKS: Final = 8
+"""Longest delay of a device that is searched for."""
+_FAST_S: Final = 0.03
+_FAST_PASSES: Final = 3
+"""Length of a moving average [s], and how often what it takes, twice in a row, is removed: what remains, above 24 Hz
+(-3 dB), no hand can drive. A single pass left enough of quick strokes for one false result in 1,500 loops."""
+_NEAR_S: Final = 0.1
+"""Time before and after a tick in which the passivity controller acted that is evaluated [s]."""
+_ACTED_S: Final = 0.1
+_BRAKED_J: Final = 1e-3
+"""Least time in which the controller acted [s] and least energy [J] for a device to count as late. [choice]"""
 JUDGED: Final = np.dtype(
     [(name, SAMPLE[name]) for name in ("time_ns", "position_m", "force_n", "device_force_n", "limiters")]
 )
@@ -165,6 +186,56 @@ def delivered_error(
     off_n = sent_n[counted] - right_n
     off_n2, right_n2 = (float(np.mean(np.einsum("ij,ij->i", it, it))) for it in (off_n, right_n))
     return round(math.sqrt(off_n2 / right_n2), 6) if right_n2 > _FELT_N**2 else None
+
+
+def late_device_ticks(samples: Any, rate_hz: float) -> int | None:
+    """Return the least delay [ticks] of a device that answers two ticks or more later than assumed, else None.
+
+    No hand drives motion above 24 Hz, so in this band the device's force drives it or brakes it. If the force would
+    have braked an oscillation with the assumed delay, and with one tick more, it acts later still: at least with the
+    first delay at which it would not have braked. That is visible only while the passivity controller acts.
+
+    Parameters
+    ----------
+    samples : array (n,)
+        The samples of a trial or interval, with ``delay_ticks`` and the fields of `JUDGED`.
+    rate_hz : float
+        Samples per second.
+    """
+    samples = _plausible_samples(samples)
+    acted = samples["limiters"][1:] & LIMITER_ENERGY != 0
+    if np.count_nonzero(acted) < _ACTED_S * rate_hz:
+        return None
+    aside = round(_NEAR_S * rate_hz)
+    near = np.convolve(acted, np.ones(2 * aside + 1))[aside:-aside] >= 1
+    steps_m = _fast_part(np.diff(samples["position_m"], axis=0), rate_hz) * near[:, np.newaxis]
+    force_n = _fast_part(samples["device_force_n"][:-1], rate_hz)
+    first = int(samples["delay_ticks"].max()) + TOLERATED_TICKS
+    work_j = [
+        float(np.sum(force_n[: len(force_n) - ticks] * steps_m[ticks:])) for ticks in range(first, _LONGEST_TICKS + 1)
+    ]
+    if work_j[0] > -_BRAKED_J:
+        return None
+    return next((ticks for ticks, energy_j in enumerate(work_j, first) if energy_j >= 0), None)
+
+
+def late_device_text(measured: Mapping[str, Any]) -> str:
+    """Return a sentence if the measures of a trial contain the delay of a device that answered late, else ""."""
+    ticks = measured.get("device_delay_ticks")
+    if ticks is None:
+        return ""
+    assumed = counted(measured["loop_delay_ticks"], "tick")
+    return f"the device answered after {ticks} ticks, but the servo assumes {assumed}"
+
+
+def _fast_part(vectors: Vectors, rate_hz: float) -> Vectors:
+    """Return vectors (n, 3) without what is slow (`_FAST_S`)."""
+    rows = max(round(_FAST_S * rate_hz), 1)
+    weights = np.convolve(np.full(rows, 1 / rows), np.full(rows, 1 / rows))
+    for _ in range(_FAST_PASSES):
+        padded = np.pad(vectors, ((rows - 1, rows - 1), (0, 0)), "edge")
+        vectors = vectors - np.array([np.convolve(axis, weights, "valid") for axis in padded.T]).T
+    return vectors
 
 
 def _lag_s(times_s: Times, sent_n: Vectors, model_n: Vectors, from_s: float, period_s: float) -> float | None:

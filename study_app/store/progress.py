@@ -11,7 +11,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import arrangement_of, trial_result
 from study_app.protocol.tracks import design_of
 from study_app.protocol.trials.methods import TrialResult
-from study_app.store.delivered import Broken, beyond_limits
+from study_app.store.delivered import Broken, beyond_limits, late_device_text
 from study_app.store.journals import journal_events as events
 from study_app.store.missing_trials import MissingTrial, MissingTrials
 
@@ -40,9 +40,10 @@ class Progress:
     steps, ``away_s`` is the time without a program, which no duration includes. ``targets`` counts those reached in the
     latest trial; it began at ``trial_since_s``, None while a page is shown or after a gap, and its task took
     ``trial_lasted_s``, None until it ended. ``answered`` counts the answers to each main trial and form, for a trial's
-    last attempt; ``broken`` has the violated limits of each finished trial: column, value and limit. ``lost`` gives the
-    reason if a trial's recording could not be kept, ``lacking`` its number of missing samples; ``outlets_lost`` why an
-    outlet to other programs failed since the session began or was resumed.
+    last attempt; ``broken`` has the violated limits of each finished trial: column, value and limit. ``late`` says in
+    which trials the device answered later than assumed. ``lost`` gives the reason if a trial's recording could not be
+    kept, ``lacking`` its number of missing samples; ``outlets_lost`` why an outlet to other programs failed since the
+    session began or was resumed.
 
     ``of_intervals`` is the latest trial if it is one of intervals; ``trial_answers`` are the answers to all of them,
     ``repeated`` gives the reason for each repeated presentation, ``undelivered`` names the limits that intervals
@@ -73,6 +74,7 @@ class Progress:
     targets: int = 0
     answered: dict[int | tuple[str, str | None], int] = field(default_factory=dict)
     broken: dict[int, tuple[Broken, ...]] = field(default_factory=dict)
+    late: dict[int, str] = field(default_factory=dict)
     lost: dict[int, str] = field(default_factory=dict)
     lacking: dict[int, int] = field(default_factory=dict)
     outlets_lost: dict[str, str] = field(default_factory=dict)
@@ -124,6 +126,8 @@ class Progress:
     def process_line(self, line: events.Event) -> None:
         """Process one more line."""
         at_s = line.t_s
+        if isinstance(line, events.EndOfTask) and (text := late_device_text(line.others)):
+            self.late[line.trial] = text
         match line:
             case events.SessionStarted():
                 self.start, self.language = line, line.language
@@ -247,6 +251,7 @@ class Progress:
         self.answered.pop(trial, None)
         self.trial_answers.pop(trial, None)
         self.broken.pop(trial, None)
+        self.late.pop(trial, None)
         self._failed.discard(trial)
 
     def _resume(self, gap_s: float) -> None:

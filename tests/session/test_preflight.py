@@ -3,6 +3,7 @@
 import itertools
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -21,13 +22,18 @@ from study_app.protocol.warnings.untranslated import untranslated_on_pages
 from study_app.session import preflight_measurements
 from study_app.session.preflight import Measurements, PredictedDelivery, Screen, preflight_checks, refusal_reasons
 from study_app.session.preflight_measurements import measure_servo_and_disk
-from study_app.session.start import NewSession, participant_with_other_contents
+from study_app.session.start import NewSession, participant_with_other_contents, seen_late
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
+from study_app.store.journals.journal_events import TrialStarted
+from study_app.store.unblinding import unblind
+from study_app.store.workstation import DEFAULTS, DeviceBench, save_settings
 from tests.compiled import needs_servo
 from tests.golden import compare, each_once, what_comes
+from tests.journal_lines import event_of
 from tests.protocol.edited_studies import text_of
 from tests.session import small
+from tests.studies import begun
 
 DAMPERS = text_of("strong")
 DELAYS = DAMPERS.replace("damping_nspm = 16", "damping_nspm = 30").replace(
@@ -97,6 +103,8 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
         (0.00093, 1, "ok Loop delay: 1 tick; a force takes effect after 0.93 ms"),
         (0.0018, 2, "warning Loop delay: 2 ticks; a force takes effect after 1.80 ms"),
         (0.00093, 3, "warning Loop delay: 3 ticks; a force takes effect after 0.93 ms"))),
+    ("small", {"late_device": "In trial 2 of the last session (participant P003), the device answered after 4 ticks, "
+     "but the servo assumes 1 tick"}, "warning Loop delay: 1 tick; assumed, because the device does not measure"),
     *((name, {"withheld": {"thin": 0.001, "thick": share}}, f"{verdict} Force withheld: at most {percent} %; in the "
        f"fastest stroke of a task (limit: 5 %){of_each.format(percent)}")
       for name, of_each in (("small", ""), ("single-blind", ": thick {} %, thin 0.1 %"))
@@ -192,6 +200,55 @@ def test_another_file_of_the_same_version_is_a_warning(tmp_path: Path, recorded:
     assert participant_with_other_contents(chosen) == who
     found = preflight_checks(replace(small.WELL, ran_otherwise=who), study)
     assert [check.verdict for check in found if check.name == "Study file"] == ["warning"] * bool(who)
+
+
+RIG: Any = SimpleNamespace(
+    servo=SimpleNamespace(rate_hz=500.0, delay_ticks=1),
+    device=SimpleNamespace(name="mouse"),
+    described={"name": "mouse", "serial": "7"},
+)
+"""A device that is assumed to be one tick late at 500 Hz."""
+
+
+@pytest.mark.parametrize(("delay_ms", "ticks"), [((1.0, 5.2, 3.0), 3), ((1.0, 4.8, 3.0), None), ((7.0, 7.0, 7.0), 4)])
+def test_a_bench_test_shows_that_a_device_is_late(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, delay_ms: tuple[float, ...], ticks: int | None
+) -> None:
+    """At 500 Hz, two ticks more than assumed, 3 ticks, are 6 ms; delays from 5 ms on are rounded to them."""
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path))
+    three = (0.2, 0.2, 0.2)
+    measured = DeviceBench(
+        name="mouse", serial="7", measured="2026-11-21", mass_kg=three, damping_nspm=three, friction_n=three,
+        delay_ms=delay_ms, stable_nspm=three,
+    )  # fmt: skip
+    save_settings(DEFAULTS.with_bench(measured))
+    told = f"In the bench test of 2026-11-21, the device answered after {ticks} ticks, but the servo assumes 1 tick"
+    assert seen_late(RIG, StudyFolder(tmp_path / "study"), "double") == (told if ticks else "")
+
+
+def hold_session(folder: StudyFolder, who: str, delays: tuple[int | None, ...]) -> None:
+    """Hold a session in whose trials the device answered after so many ticks."""
+    with begun(folder.path, who, small.protocol(), b"small") as store:
+        for number, ticks in enumerate(delays, start=1):
+            which = {"block": "feeling", "phase": "main", "part": 1, "of": len(delays), "code": "L1"}
+            store.append(TrialStarted(trial=number, attempt=1, index=number, **which))
+            measured = {"loop_delay_ticks": 1, "device_delay_ticks": ticks}
+            store.append(event_of("trial_ended", trial=number, attempt=1, outcome="complete", **measured))
+        store.finish("aborted")
+
+
+def test_the_last_session_shows_that_a_device_is_late(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_CONFIG", str(tmp_path))
+    folder = StudyFolder(tmp_path / "small")
+    assert seen_late(RIG, folder, "single") == ""
+    hold_session(folder, "P002", (None, 3, None, 5, None))
+    told = "the device answered after 5 ticks, but the servo assumes 1 tick"
+    assert seen_late(RIG, folder, "single") == f"In trial 4 of the last session (participant P002), {told}"
+    assert seen_late(RIG, folder, "double") == ""
+    unblind(folder.path, "AK", "end of the study")
+    assert seen_late(RIG, folder, "double") == f"In trial 4 of the last session (participant P002), {told}"
+    hold_session(folder, "P001", (None, None))
+    assert seen_late(RIG, folder, "single") == ""
 
 
 @pytest.mark.parametrize(("language", "told"), [("fr", "4 texts; still in English"), ("en", "")])

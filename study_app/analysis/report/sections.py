@@ -164,12 +164,26 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             f"{late_exclusions(study)}. To see their influence, reverse these decisions in a copy of the study "
             "(`include` or `exclude`) and compare the two reports."
         )
+    yield from _late_devices(study)
     if study.n == 1:
         yield "There is only one participant, so the results do not generalise to other people."
     if study.n < FEW and results.blocks:
         yield (
             "Intervals for mean rank correlations and exploratory tests of means need at least "
             f"{FEW} participants; this study has {study.n}. Effects that this report does not show may still exist."
+        )
+
+
+def _late_devices(study: Study) -> Iterator[str]:
+    """Yield a sentence on the main trials in which the device answered later than assumed, if there are any."""
+    rows = study.trials[study.trials["counted"] & (study.trials["phase"] == "main")]
+    late = rows[rows["device_delay_ticks"].notna()] if "device_delay_ticks" in rows else rows[:0]
+    if len(late):
+        assumed = " or ".join(f"{ticks:g}" for ticks in sorted(set(late["loop_delay_ticks"])))
+        yield (
+            f"In {len(late)} of {counted(len(rows), 'trial')} in the main blocks, the device answered after up to "
+            f"{late['device_delay_ticks'].max():g} ticks, although the servo assumed {assumed}. In these trials, the "
+            "force acted too late, and the passivity controller reduced it."
         )
 
 

@@ -235,6 +235,7 @@ def operator_view(
                 session, progress, {trial.number: dropped} if trial is not None and dropped else {}
             ),
             *filter(None, [str(progress.missing_trials)]),
+            *_late_device_sentences(session, progress),
             *_limit_sentences(session, progress),
         ),
         blinding=session.protocol.study.blinding,
@@ -394,6 +395,16 @@ def _incomplete_recording_sentences(session: Session, progress: Progress, now: M
     return tuple(
         f"The recording of {labels[number]} is missing {grouped(count)} samples because the disk is too slow"
         for number, count in sorted({**progress.lacking, **now}.items(), reverse=True)
+    )
+
+
+def _late_device_sentences(session: Session, progress: Progress) -> tuple[str, ...]:
+    """Return a sentence for every trial in which the device answered late, newest first; none if double-blind."""
+    labels = {trial.number: trial.label(session.protocol, session.language) for trial in session.schedule.trials}
+    shown = {} if session.protocol.study.blinding == "double" else progress.late
+    return tuple(
+        f"{labels[number]}: {text}; measure the device with liquid-study devices bench"
+        for number, text in sorted(shown.items(), reverse=True)
     )
 
 

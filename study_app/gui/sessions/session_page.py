@@ -30,7 +30,7 @@ from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import capitalised, counted
 from study_app.store.blinded.blinding import Codes, open_events, opened_key
-from study_app.store.delivered import beyond_limits
+from study_app.store.delivered import beyond_limits, late_device_text
 from study_app.store.exclusions import Exclusion, exclusions
 from study_app.store.folders import locate_session
 from study_app.store.journals import journal
@@ -223,7 +223,8 @@ def _choice_texts(given: Mapping[str, Answer]) -> tuple[str, ...]:
 
 
 def _row_note_texts(row: Mapping[str, Any]) -> list[str]:
-    said = [("recording lost", row["recording_lost"]), ("marked", row["marked"])]
+    late = late_device_text(row)
+    said = [("recording lost", row["recording_lost"]), (late, late), ("marked", row["marked"])]
     return [word for word, holds in said if holds] + (row["notes"] or "").splitlines()
 
 

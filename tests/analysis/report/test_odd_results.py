@@ -6,11 +6,13 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from study_app.analysis.data.study_tables import group_counts, group_means, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.report.methods import methods
+from study_app.analysis.report.sections import limits
 from study_app.analysis.report.write_report import report
 from study_app.errors import AnalysisError
 from study_app.protocol.load import parse
@@ -58,6 +60,20 @@ def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
         "falcon:12": "haptic device (falcon); forces were computed at 1000 Hz and limited to 8 N.",
         "answers-only": "",
     }
+
+
+def test_limits_count_the_trials_in_which_the_device_answered_late() -> None:
+    study = load_study(SAMPLE.path)
+    results, trials = evaluate(study), study.trials.assign(loop_delay_ticks=1.0, device_delay_ticks=np.nan)
+    assert not [line for line in limits(replace(study, trials=trials), results) if "device answered" in line]
+    main = trials.index[trials["counted"] & (trials["phase"] == "main")]
+    trials.loc[trials.index[trials["phase"] != "main"], "device_delay_ticks"] = 7.0
+    trials.loc[main[:3], "device_delay_ticks"] = 3.0, 4.0, 3.0
+    (told,) = [line for line in limits(replace(study, trials=trials), results) if "device answered" in line]
+    assert told.startswith(
+        f"In 3 of {len(main)} trials in the main blocks, the device answered after up to 4 ticks, although the servo "
+        "assumed 1. "
+    )
 
 
 def test_a_changed_file_of_one_version_and_an_exclusion_after_unblinding_are_stated(

@@ -69,7 +69,7 @@ STORY = (
     (lambda it: it.start(3), {"trouble": "it is full", "waits": True}),
     (lambda it: it.tell("target_reached", 1.0, trial=3, target=0, t_task_s=1.0), {}),
     (lambda it: it.tell("target_reached", 1.0, trial=3, target=1, t_task_s=1.0), {}),
-    (lambda it: it.end(3, "timeout"), {}),
+    (lambda it: it.end(3, "timeout", loop_delay_ticks=1, device_delay_ticks=4), {}),
     (lambda it: it.tell("recorded", trial=3, attempt=1, samples_unrecorded=1200), {}),
     (lambda it: it.tell("repeat", trial=3, reason="phone rang"), {}),
     (lambda it: it.start(3, 2), {}),

@@ -163,7 +163,7 @@ def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblindi
     study = tmp_path / "results" / "demo"
     with held(study) as store:
         trial(store, 1, withheld_share=0.02)
-        trial(store, 2, withheld_share=0.2)
+        trial(store, 2, withheld_share=0.2, loop_delay_ticks=1, device_delay_ticks=3)
         store.finish("completed")
     folder = StudyFolder(study).session("P007", 1).path
     before = read_record(folder)
@@ -175,3 +175,6 @@ def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblindi
     assert before.limits.endswith("Unblinding will show which trial.")
     assert [trial.valid for trial in after.trials] == [True, False]
     assert after.limits.startswith("Out of limits: 1 of 2 measured trials")
+    assert [trial.notes for trial in before.trials] == ["", ""]
+    late = "the device answered after 3 ticks, but the servo assumes 1 tick"
+    assert [trial.notes for trial in after.trials] == ["", late]

@@ -1,5 +1,6 @@
 """The runner on the real servo and a scripted device, on a virtual clock: what the hand feels when things happen."""
 
+import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from study_app.devices.rig import open_rig, study_settings
 from study_app.devices.simulated import ScriptedDevice
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
@@ -21,6 +23,7 @@ from study_app.store.blinded.blinding import open_events
 from study_app.store.journals.journal import SessionClock
 from study_app.store.tables.session_tables import SessionRows
 from tests.compiled import needs_servo
+from tests.protocol.edited_studies import text_of
 from tests.session import small
 from tests.session.fakes import FakeJournal
 from tests.session.runner.bench import Bench, small_bench
@@ -184,3 +187,24 @@ def test_incidents_make_a_trial_invalid(
     assert row["duration_s"] == pytest.approx(3)
     assert row["delay_error_mean_ms"] == pytest.approx(3 + 1000 * SETTLED_S)
     assert row["delay_error_p95_ms"] < 25  # frames that never came have no age
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("delay", "ticks"), [(0, None), (3, 3)])
+def test_a_delay_that_a_device_does_not_report_is_in_the_row_of_a_trial(delay: int, ticks: int | None) -> None:
+    """The device reports that it answers at once; a light handle then oscillates in honey if it does not."""
+    honey = tomllib.loads(text_of("physical2"))
+    liquids = small.TABLES["liquids"] | {"thick": honey["liquids"]["honey"]}
+    study = Protocol.model_validate(small.TABLES | {"scene": honey["scene"], "liquids": liquids})
+    with open_rig("force-dimension-emulated", study_settings(study, stream(1, "hand")), clock=VirtualClock()) as rig:
+        device: Any = rig.device
+        handle = device.hand.state.handle
+        handle.mass_kg = handle.hand_kg = 0.1
+        handle.stiffness_npm, handle.damping_nspm, handle.coulomb_n = 100.0, 2.0, 0.0
+        handle.delay = delay
+        bench = Bench(rig, study)
+        bench.swing()
+        bench.runner.post(Continue(bench.clock()))
+        bench.look(3500)
+    row = bench.journal.of("trial_ended")[-1]
+    assert (row["outcome"], row["loop_delay_ticks"], row["device_delay_ticks"]) == ("complete", 0, ticks)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NORM, SAMPLE
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_GLITCH, LIMITER_NORM, SAMPLE
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import Presentation
@@ -20,6 +20,8 @@ from study_app.store.delivered import (
     delivered_error,
     delivered_values,
     judged_fields,
+    late_device_text,
+    late_device_ticks,
 )
 from tests.golden import compare
 from tests.protocol.edited_studies import text_of
@@ -187,3 +189,50 @@ def test_the_error_counts_after_the_fade_and_where_a_force_is_felt():
     assert error(samples(lasts_s=0.0)) is None
     assert error(samples(pace=0.001)) is None
     assert error(samples(pace=0.001), b_nspm=8000.0) is not None
+
+
+def swing(*, lag: float, assumed: int = 1, acted_s: float = 2.0, force_n: float = 2.0) -> Any:
+    """Return 2 s of a swing, 12° per tick, up to 20 mm/s, that its force, ``lag`` ticks later, neither drives nor brakes."""
+    found = np.zeros(2000, SAMPLE)
+    ticks, turns = np.arange(len(found)), np.pi / 15
+    found["position_m"][:, 0] = 0.02e-3 / turns * np.sin(turns * (ticks - 0.5))
+    found["device_force_n"][:, 0] = -force_n * np.sin(turns * (ticks + lag))
+    found["delay_ticks"] = assumed
+    found["limiters"][: round(1000 * acted_s)] = LIMITER_ENERGY
+    return found
+
+
+@pytest.mark.parametrize(
+    ("made", "ticks"),
+    [
+        ({"lag": 2.5}, 3),  # work at 2 ticks: -½ · 2 N · 0.02 m/s · sin 6° · 2 s = -4.2 mJ
+        ({"lag": 2.9}, 3),
+        ({"lag": 3.5}, 4),
+        ({"lag": 3.5, "assumed": 2}, 4),
+        ({"lag": 2.5, "assumed": 2}, None),  # one tick later than assumed is tolerated
+        ({"lag": 1.5}, None),
+        ({"lag": 2.5, "force_n": 0.5}, 3),  # -1.05 mJ
+        ({"lag": 2.5, "force_n": 0.45}, None),  # -0.94 mJ
+        ({"lag": 2.5, "acted_s": 0.09}, None),
+        ({"lag": 9.0}, None),  # with every delay the force is a brake, so the hand drives the motion
+    ],
+)
+def test_a_device_is_late_if_its_force_would_have_braked_an_oscillation_that_lasts(
+    made: Any, ticks: int | None
+) -> None:
+    assert late_device_ticks(swing(**made), 1000.0) == ticks
+
+
+def test_slow_motion_and_rejected_positions_do_not_make_a_device_late() -> None:
+    found = swing(lag=2.5)
+    found["device_force_n"] += 5.0
+    found["position_m"][:, 1] = 0.1 * np.sin(2 * np.pi * 1e-3 * np.arange(len(found)))
+    found["position_m"][700], found["limiters"][700] = 1.0, LIMITER_GLITCH
+    assert late_device_ticks(found, 1000.0) == 3
+
+
+def test_a_sentence_names_both_delays() -> None:
+    assert late_device_text({"device_delay_ticks": 3, "loop_delay_ticks": 1}) == (
+        "the device answered after 3 ticks, but the servo assumes 1 tick"
+    )
+    assert late_device_text({"loop_delay_ticks": 1}) == ""
