@@ -192,7 +192,7 @@ def test_the_error_counts_after_the_fade_and_where_a_force_is_felt():
 
 
 def swing(*, lag: float, assumed: int = 1, acted_s: float = 2.0, force_n: float = 2.0) -> Any:
-    """Return 2 s of a swing of 12° per tick and 20 mm/s that its force neither drives nor brakes ``lag`` ticks later."""
+    """Return 2 s of a swing, 12° per tick, 20 mm/s, that its force neither drives nor brakes ``lag`` ticks later."""
     found = np.zeros(2000, SAMPLE)
     ticks, turns = np.arange(len(found)), np.pi / 15
     found["position_m"][:, 0] = 0.02e-3 / turns * np.sin(turns * (ticks - 0.5))
