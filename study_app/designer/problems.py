@@ -297,6 +297,8 @@ class ProblemsCard(Card):
         self.problems: tuple[ProblemRow, ...] = ()
         self._warnings: tuple[ProblemRow, ...] = ()
         self._had = False
+        self._repairing = False  # whether a pressed repair is being made
+        self._repaired = False  # whether the last edit was a repair pressed here
         self.lines: list[ProblemLine] = []
         self._element: object = None
         self._here_only = False
@@ -319,6 +321,12 @@ class ProblemsCard(Card):
         add_parts(self.column, top, (self.area, 1))
         self.close_button.clicked.connect(self.close_asked)
 
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Show the current lines after a click beside them or on a solved one."""
+        self._repaired = False
+        self._show_lines()
+        super().mousePressEvent(event)
+
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.close_asked.emit()
@@ -335,6 +343,7 @@ class ProblemsCard(Card):
 
     def show_problems(self, rows: tuple[ProblemRow, ...], element: object) -> None:
         """Show problems; ``element`` is selected. The list closes when the last problem is solved."""
+        self._repaired = self._repairing or (self._repaired and rows == self.problems)
         had, self.problems, self._element = bool(self.problems), rows, element
         now = {row.identity: row for row in rows}
         self.repairs = {now[row.identity]: sentences for row, sentences in self.repairs.items() if row.identity in now}
@@ -353,7 +362,7 @@ class ProblemsCard(Card):
         rows = self.rows
         if self.at is not None:  # lines above may have moved it
             self.at = next((row for row in rows if row.identity == self.at.identity), self.at)
-        if closes and not rows and not self.under_pointer:
+        if closes and not rows and not self.stays_still:
             self.hide()
         counts = ((len(self.problems), "problem"), (len(self._warnings), "warning"))
         counted = [f"{count} {word}{'s' * (count != 1)}" for count, word in counts if count]
@@ -362,10 +371,10 @@ class ProblemsCard(Card):
         self.next.setEnabled(bool(rows))
         listed = tuple(row for row in rows if not self._here_only or row.element == self._element)
         wanted = min(HIGHEST, HEAD_PX + (ROW_PX + 1) * max(1, len(listed)))
-        self.setFixedHeight(max(wanted, self.height()) if self.under_pointer else wanted)
+        self.setFixedHeight(max(wanted, self.height()) if self.stays_still else wanted)
         if listed == self._listed:
             return
-        if self.under_pointer and self.lines:  # no line moves while the pointer is over the list
+        if self.stays_still and self.lines:
             still = {row.identity: row for row in listed}
             for line in self.lines:
                 row = still.get(line.row.identity)
@@ -390,19 +399,25 @@ class ProblemsCard(Card):
         narrow = (self.parentWidget() or self).width() < NARROW_BELOW
         made = ProblemLine(row, self.repairs.get(row, ()), narrow=narrow)
         made.opened.connect(lambda: self.open_problem(made.row))
-        made.repair_asked.connect(lambda sentence: self.repair_asked.emit(made.row, sentence))
+        made.repair_asked.connect(lambda sentence: self._ask_to_repair(made.row, sentence))
         made.here = row == self.at
         for part in (made, Rule()):
             self._column.insertWidget(self._column.count() - 1, part)
         self.lines.append(made)
 
+    def _ask_to_repair(self, row: ProblemRow, sentence: str) -> None:
+        self._repairing = True
+        self.repair_asked.emit(row, sentence)
+        self._repairing = False
+
     @property
-    def under_pointer(self) -> bool:
-        """Whether the pointer is over the list, which then keeps its height so that a click does not miss it."""
-        return self.isVisible() and self.underMouse()
+    def stays_still(self) -> bool:
+        """Whether no line moves, so that a click on the next repair does not miss it."""
+        return self._repaired and self.isVisible() and self.underMouse()
 
     def leaveEvent(self, event: QEvent) -> None:
         super().leaveEvent(event)
+        self._repaired = False
         QTimer.singleShot(
             0, self, self._show_lines
         )  # Qt also reports this when the widget under the pointer is replaced
@@ -437,6 +452,8 @@ class ProblemsCard(Card):
 
     def open_problem(self, row: ProblemRow) -> None:
         self.set_current(row)
+        self._repaired = False
+        self._show_lines()
         for line in self.lines:
             line.here = line.row == row
             line.update()

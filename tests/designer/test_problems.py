@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from PySide6.QtCore import QPointF
 from PySide6.QtGui import QEnterEvent
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
 from study_app.designer.document.steps import RetypeFile
@@ -35,6 +36,30 @@ def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer:
         assert [one.isEnabled() for one in lines] == [False] * number + [True] * (len(lines) - number)
         assert [one.row for one in lines[number:]] == list(problems.problems)
     assert designer.study.faults == ()
+
+
+def test_a_problem_solved_in_the_form_leaves_the_list_under_the_pointer(designer: Any, qtbot: Any) -> None:
+    text = "\n".join(line for line in DEMO.split("\n") if not line.startswith(("density_kg_m3", "min_s", "dwell_s")))
+    designer.open()
+    designer.editing.handle_request(RetypeFile(text))
+    problems = designer.place.problems
+    qtbot.waitUntil(lambda: len(problems.problems) == 4)
+    problems.show()
+    at = QPointF(5, 5)
+    QApplication.sendEvent(problems, QEnterEvent(at, at, at))
+    qtbot.waitUntil(lambda: all(line.repairs for line in problems.lines))
+    designer.click_on(problems.lines[0].repairs[0])
+    assert [line.isEnabled() for line in problems.lines] == [False, True, True, True]
+    designer.click_on(problems.lines[0])
+    assert [line.row for line in problems.lines] == list(problems.problems), "after a click"
+    solved = problems.lines[1].row
+    designer.click_on(problems.lines[1].go)
+    QTest.keyClicks(designer.keyboard, "0.7")
+    designer.keyboard.flush()
+    assert solved.identity not in {line.row.identity for line in problems.lines}
+    assert [line.row for line in problems.lines] == list(problems.problems)
+    assert len(problems.lines) == 2
+    assert all(line.isEnabled() for line in problems.lines)
 
 
 def test_header_and_list_count_problems_and_warnings_after_each_step(designer: Any, qtbot: Any) -> None:
