@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 import shiboken6
 from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.steps import AddKey, ChangeLanguage, RemoveKey, RenameElement
@@ -125,6 +126,40 @@ def test_a_text_loses_its_selection_with_the_keyboard(designer: Any) -> None:
     assert line.textCursor().hasSelection()
     designer.form_row(*ITEMS).field.take_keyboard()
     assert not line.textCursor().hasSelection()
+
+
+def test_write_scrolls_to_the_missing_text_of_each_question(designer: Any, qtbot: Any) -> None:
+    designer.open("kitchen", *QUESTIONNAIRE, width=1366)
+    count = 6
+    texts = [f"Question {number}: how much did you have to look, think and search for it?" for number in range(count)]
+    items = [{"id": f"i{at}", "text": {"en": f"{text} {text} {text}"}} for at, text in enumerate(texts)]
+    designer.editing.make_step("Change", Set(("study", "languages"), ["en", "fr"]), Set(ITEMS, items))
+    form = designer.place.form
+    for number in range(1, count + 1):
+        listed = designer.form_row(*ITEMS).field.rows.rows if number == 1 else form.below.rows
+        write = next(row.write for row in listed if row.line.number == number)
+        form.area.ensureWidgetVisible(write)
+        press(qtbot, write)
+        qtbot.wait(50)
+        line = designer.keyboard
+        assert designer.editing.selected == (*ITEMS, number - 1)
+        assert line is designer.field(*ITEMS, number - 1, "text").lines["fr"]
+        assert line.visibleRegion().boundingRect() == line.rect(), number
+        QTest.keyClicks(
+            line, "a text of so many words that it has several lines and a space at the end of the last one "
+        )
+        assert not line.horizontalScrollBar().value(), "no letter is cut"
+
+
+def test_a_long_line_shows_its_start_after_the_keyboard_left_it(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids", width=1366)
+    line = designer.field("blocks", "liquids", "title").lines["en"]
+    designer.fill(line, "a title that is far longer than its field in a window of this width, and still longer", "")
+    assert line.cursorPosition() == len(line.text())
+    designer.form_row("blocks", "liquids", "conditions").field.take_keyboard()
+    assert line.cursorPosition() == 0
+    line.setFocus()
+    assert line.cursorPosition() == len(line.text()), "typing goes on where it ended"
 
 
 def test_the_name_of_an_incomplete_language_is_whole(designer: Any) -> None:

@@ -771,8 +771,13 @@ class FormCard(Card):
                 part.flush()
 
     def _scroll_to(self, row: QWidget) -> None:
-        """Scroll to a row, or to the focused part of a high row; new rows are laid out first."""
+        """Scroll to the question of a row, the row, and its focused part, as far as there is room for them.
+
+        New rows are laid out first.
+        """
         QApplication.sendPostedEvents(None, QEvent.Type.LayoutRequest.value)
+        if self.panel.tinted:
+            self.area.ensureWidgetVisible(self.panel, 0, 0)
         self.area.ensureWidgetVisible(row, 0, 40)
         keyboard = self.window().focusWidget()
         if keyboard is not None and row.isAncestorOf(keyboard):

@@ -40,6 +40,7 @@ CLICK_MS = 10
 MOST_LINES, SENTENCE_EDGE_PX = 6, 16
 """How many lines a sentence has at most, and what its field needs above and below them [px]."""
 _LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
+_WINDOW_REASONS = {Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason}
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
 
@@ -180,6 +181,7 @@ class TypedLine(_Typed, QLineEdit):
     def __init__(self, name: str) -> None:
         super().__init__()
         self.begin()
+        self._caret = 0
         make_dense(self, name)
         self.textEdited.connect(lambda _text: self.note_typing())
         self.returnPressed.connect(self.accept)
@@ -191,6 +193,17 @@ class TypedLine(_Typed, QLineEdit):
             self.stepped.emit(steps[Qt.Key(event.key())])
         else:
             super().keyPressEvent(event)
+
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        super().focusInEvent(event)
+        if event.reason() == Qt.FocusReason.OtherFocusReason and not self.hasSelectedText():
+            self.setCursorPosition(self._caret)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        super().focusOutEvent(event)
+        if event.reason() not in _WINDOW_REASONS:
+            self._caret = self.cursorPosition()
+            self.home(False)  # a long text is shown from its start
 
     def words(self) -> str:
         return self.text()
@@ -249,7 +262,7 @@ class TypedText(_Typed, QPlainTextEdit):
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         super().focusOutEvent(event)
-        if event.reason() not in {Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason}:
+        if event.reason() not in _WINDOW_REASONS:
             cursor = self.textCursor()  # a line loses its selection in Qt, a text does not
             cursor.clearSelection()
             self.setTextCursor(cursor)
@@ -264,6 +277,8 @@ class TypedSentence(TypedText):
         self.setProperty("dense", "true")
         self.document().setDocumentMargin(0)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        across = self.horizontalScrollBar()
+        across.rangeChanged.connect(lambda: across.setRange(0, 0))  # Qt scrolls to a caret behind a space
         self.textChanged.connect(self._fit)
         self._fit()
 

@@ -188,6 +188,7 @@ class QuestionRows(Themed, QWidget):
             made = _QuestionRow(line)
             made.opened.connect(lambda path=line.path: self.asked.emit(Do("write", (path,))))
             add_parts(self.column, made, Rule())
+            made.show()  # at once: a layout shows it later, and would then move the row that was scrolled to
             self.rows.append(made)
 
 
