@@ -9,7 +9,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
-from study_app.designer.document.steps import AddKey, ChangeLanguage, RemoveKey, RenameElement
+from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
 from study_app.designer.document.toml_edits import Set
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
@@ -126,6 +126,42 @@ def test_a_text_loses_its_selection_with_the_keyboard(designer: Any) -> None:
     assert line.textCursor().hasSelection()
     designer.form_row(*ITEMS).field.take_keyboard()
     assert not line.textCursor().hasSelection()
+
+
+def test_a_liquid_file_is_chosen_before_a_liquid_changes(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    preset = designer.file.parent / "presets" / "thin.toml"
+    preset.parent.mkdir()
+    preset.write_text("format = 2\n[liquids.thin]\ndensity_kg_m3 = 913.5\n", encoding="utf-8")
+    answers = iter(["", str(preset)])
+    monkeypatch.setattr("study_app.designer.form.card.choose_protocol", lambda _by, _title: next(answers))
+    designer.open("kitchen", "liquids", "thin")
+    before = designer.text
+    press_add = designer.place.form.adds["liquids", "thin", "file"].click
+    press_add()
+    assert designer.text == before, "after Cancel"
+    press_add()
+    assert designer.value("liquids", "thin") == {"file": "presets/thin.toml"}
+    assert designer.study.faults == ()
+    assert designer.study.protocol.liquids["thin"].density_kg_m3 == 913.5
+
+
+def test_an_instrument_is_chosen_before_a_questionnaire_changes(designer: Any, qtbot: Any) -> None:
+    designer.open("kitchen", *QUESTIONNAIRE)
+    designer.editing.handle_request(AddElement(("questionnaires",)))
+    path, before = designer.editing.selected, designer.text
+    form = designer.place.form
+    press(qtbot, form.adds[*path, "instrument"])
+    assert form.instruments.isVisible()
+    form.instruments.close()
+    assert designer.text == before
+    press(qtbot, form.adds[*path, "instrument"])
+    use = {action.text(): action for action in form.instruments.actions()}
+    assert list(use) == ["IPQ", "NASA-TLX", "NASA-TLX-WEIGHTED", "PANAS", "SSQ", "SUS", "UEQ"]
+    use["SUS"].trigger()
+    form.instruments.close()
+    assert designer.value(*path)["instrument"] == "sus"
+    assert [fault.message for fault in designer.study.faults if fault.path[:2] == path] == []
+    assert len(designer.study.formed.questionnaires[path[1]].items) == 10
 
 
 def test_write_scrolls_to_the_missing_text_of_each_question(designer: Any, qtbot: Any) -> None:

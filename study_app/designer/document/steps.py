@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import KW_ONLY, dataclass, fields, is_dataclass, replace
 from functools import cache
+from pathlib import Path as File
 from typing import Any, Final, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
@@ -241,11 +244,43 @@ class AddInstrument(Request):
     name: str
 
     def step(self, at: Situation) -> Step:
-        table, scales = instrument_tables(self.name, languages_of(at.study.document))
-        taken, scale_names = names(at.study.document, "questionnaires"), names(at.study.document, "scales")
-        path = ("questionnaires", free_id(taken, self.name.replace("-", "_")))
-        edits = (Set(("scales", name), scale) for name, scale in scales.items() if name not in scale_names)
+        table, edits = _instrument_edits(at.study, self.name)
+        path = ("questionnaires", free_id(names(at.study.document, "questionnaires"), self.name.replace("-", "_")))
         return Step(f"Add {self.name}", (*edits, Set(path, table)), path)
+
+
+def _instrument_edits(study: Study, name: str) -> tuple[dict[str, Any], tuple[Edit, ...]]:
+    """Return the table of a standard questionnaire, and the edits that add the scales it needs."""
+    table, scales = instrument_tables(name, languages_of(study.document))
+    known = names(study.document, "scales")
+    return table, tuple(Set(("scales", scale), value) for scale, value in scales.items() if scale not in known)
+
+
+@dataclass(frozen=True, slots=True)
+class UseSource(Request):
+    """Replace a liquid by the one in a file, or a questionnaire's content by a standard questionnaire.
+
+    ``path`` is that of the key ``file`` or ``instrument``, ``name`` the path of the file or the name of the instrument.
+    """
+
+    path: Path
+    name: str
+
+    def step(self, at: Situation) -> Step:
+        element, key = self.path[:-1], self.path[-1]
+        before: Any = value_at(at.study.document, element)
+        edits: tuple[Edit, ...] = ()
+        if key == "instrument":
+            table, edits = _instrument_edits(at.study, self.name)
+            table |= {"title": before["title"]} if "title" in before else {}
+        else:
+            file = self.name
+            with suppress(ValueError):  # on another drive
+                file = os.path.relpath(file, at.study.folder)
+            table = {"file": File(file).as_posix()}
+        gone = (Unset((*element, other)) for other in before if other not in table)
+        new = (Set((*element, other), _as_written(value)) for other, value in table.items())
+        return Step(f"Use {label_of(key).lower()} {File(self.name).stem}", (*edits, *new, *gone))
 
 
 _SCALE: Final = ("scene", "scale")

@@ -12,7 +12,15 @@ from PySide6.QtCore import QCoreApplication, QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QApplication, QBoxLayout, QGridLayout, QMenu, QVBoxLayout, QWidget
 
-from study_app.designer.document.steps import AddKey, LeaveText, RemoveKey, RenameElement, SetValue, SwitchKey
+from study_app.designer.document.steps import (
+    AddKey,
+    LeaveText,
+    RemoveKey,
+    RenameElement,
+    SetValue,
+    SwitchKey,
+    UseSource,
+)
 from study_app.designer.form.drawn_fields import LEVELS, TRIAL
 from study_app.designer.form.fields import (
     ChecksField,
@@ -47,6 +55,7 @@ from study_app.designer.form.special import (
 from study_app.designer.parts import FIELD_PX, Segments, cut_text, small_button
 from study_app.designer.problems import ProblemRow, RepairButton
 from study_app.gui.kit.commands import command_tip, with_key
+from study_app.gui.kit.dialogs import choose_protocol
 from study_app.gui.theme.icons import draw_icon
 from study_app.gui.theme.theme import RADIUS_CONTROL, font
 from study_app.gui.theme.themed import Themed, name_scroll_bars, remove_widget
@@ -57,6 +66,7 @@ from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Icon, Rule, fill_
 from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import capitalised
+from study_app.protocol.questionnaires import instruments
 from study_app.protocol.source.document import Path
 
 KINDS = {
@@ -136,6 +146,8 @@ def _field_for(row: FormRow) -> Field:
 
 _LABEL_PX = 116
 _MOST_REPAIRS = 3
+_SOURCES = _LIQUID_FILE, _INSTRUMENT = ("liquids", "file"), ("questionnaires", "instrument")
+"""Section and key of the sources of a whole element, which are chosen before they are added."""
 EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
     key: editor
     for editor in (
@@ -606,6 +618,8 @@ class FormCard(Card):
         self._known: Mapping[ProblemRow, tuple[str, ...]] = {}
         self._focused: _RowWidget | None = None
         self._renames = False
+        self.instruments = QMenu(self)
+        self.instruments.setFont(font("label"))
         self.head = _FormHead()
         self.head.asked.connect(self._request)
         self.own = label("", "label", "bad", wraps=True)
@@ -731,11 +745,26 @@ class FormCard(Card):
                 inner = row.path[len(form.path) :] if row.path[: len(form.path)] == form.path else row.path
                 yield (at, inner, _editor_structure(row)), partial(self._make_row, row), row
             if section.absent and not self.read_only:
-                added = tuple((row.path[len(form.path) :], row.label, row.help) for row in section.absent)
+                added = tuple(
+                    (row.path[len(form.path) :], row.label + " …" * (row.path[::2] in _SOURCES), row.help)
+                    for row in section.absent
+                )
                 yield ("adds", at, added), partial(_AddKeys, added, self._add_key), None
 
     def _add_key(self, inner: Path) -> None:
-        self.asked.emit(AddKey(self._path_in_form(inner)))
+        """Request to add a key; ask first which liquid file or standard questionnaire to use."""
+        path = self._path_in_form(inner)
+        if path[::2] == _LIQUID_FILE:
+            if name := choose_protocol(self, "Choose a liquid file"):
+                self.asked.emit(UseSource(path, name))
+        elif path[::2] == _INSTRUMENT:
+            self.instruments.clear()
+            for name in instruments():
+                use = self.instruments.addAction(name.upper())
+                use.triggered.connect(partial(self.asked.emit, UseSource(path, name)))
+            self.instruments.popup(self.adds[path].mapToGlobal(self.adds[path].rect().bottomLeft()))
+        else:
+            self.asked.emit(AddKey(path))
 
     def _path_in_form(self, inner: Path) -> Path:
         """Return the path of a part of the shown element."""
