@@ -87,3 +87,22 @@ def test_header_and_list_count_problems_and_warnings_after_each_step(designer: A
         designer.editing.undo()
     qtbot.waitUntil(lambda: header.words == sound)
     assert heading.text() == "No problems"
+
+
+def test_a_repeated_text_is_a_problem_of_its_language_alone(designer: Any) -> None:
+    first, copy = ("questionnaires", "liquid", "items", 0), ("questionnaires", "liquid", "items", 1)
+    designer.open()
+    original = designer.value(*first)
+    texts = {"en": original["text"], "nl": "Een tekst"}
+    edits = [Set(("study", "languages"), ["en", "nl"]), Set((*first, "text"), texts), Set((*copy, "text"), texts)]
+    designer.editing.make_step("Change", *edits)
+    designer.go_to(*copy)
+    row = designer.form_row(*copy, "text")
+    assert [line.property("state") for line in row.field.lines.values()] == ["refused", "refused"]
+    designer.editing.make_step("Change", Set((*copy, "text", "en"), "Another text"))
+    assert row.row.faults == (
+        "Reads the same as an earlier item in Dutch (participants could not tell them apart: change one)",
+    )
+    assert {code: line.property("state") for code, line in row.field.lines.items()} == {"en": "", "nl": "refused"}
+    designer.editing.make_step("Change", Set((*copy, "text", "nl"), "Een andere tekst"))
+    assert row.row.faults == ()

@@ -298,12 +298,15 @@ class _RowWidget(Themed, QWidget):
         sentences = filter(None, (row.help, row.permitted, *corrections))
         self.field.setAccessibleDescription(" ".join(f"{sentence.rstrip('.')}." for sentence in sentences))
         some_missing = isinstance(self.field, LanguagesField) and self.field.has_missing_texts
+        lines = self.field.lines if isinstance(self.field, LanguagesField) else {}
+        sound = [line for code, line in lines.items() if row.faulty_languages and code not in row.faulty_languages]
         for part in self.field.findChildren(QWidget):
             if not isinstance(part, TypedLine | TypedText):
                 continue
             part.setAccessibleDescription(self.field.accessibleDescription())
             if not refused:
                 blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
+                blamed = blamed and part not in sound
                 part.show_refused(bool(self.row.faults) and blamed)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:

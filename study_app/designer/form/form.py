@@ -250,11 +250,9 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     document, path = study.document, row.path
     if path[:2] == EXCLUSIONS:
         row = _exclusion_row(study, row)
-    faults = tuple(
-        _sentence(fault.message, fault.hint)
-        for fault in study.faults
-        if fault.path[: len(path)] == path and fault.kind != "no text"  # the empty field says that
-    )
+    own = [fault for fault in study.faults if fault.path[: len(path)] == path and fault.kind != "no text"]
+    faults = tuple(_sentence(fault.message, fault.hint) for fault in own)  # an empty field says that it has no text
+    faulty = () if any(fault.path == path for fault in own) else tuple(str(fault.path[len(path)]) for fault in own)
     if path == STUDY_LANGUAGES:
         row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
     codes, is_text = languages_of(document), row.kind in {"localised", "paragraphs"}
@@ -265,6 +263,7 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         **values_of(row),
         place=place_words(path, places.line(path)),
         faults=faults,
+        faulty_languages=faulty if is_text else (),
         languages=tuple((code, language_name(code)) for code in codes) if is_text else (),
         untranslated=tuple(untranslated_at(document, row.path, row.value, codes)) if is_text else (),
         entries=tuple(_entries(study, row)),

@@ -106,6 +106,7 @@ class FormRow(Row):
 
     place: str = ""  # its place in the file, such as ``blocks.liquids.order``, with its line
     faults: tuple[str, ...] = ()  # its faults, in the sentences of ``check``
+    faulty_languages: tuple[str, ...] = ()  # languages whose texts have all these faults; () if others have some, too
     languages: tuple[tuple[str, str], ...] = ()  # code and name of each language of the study, for texts
     entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
     target: Path | None = None  # what a reference names

@@ -15,7 +15,7 @@ from study_app.protocol.groups import ASSIGNMENT, SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, did_you_mean, unknown_name
-from study_app.protocol.wording.languages import LANGUAGES, REFUSED, missing_text
+from study_app.protocol.wording.languages import LANGUAGES, REFUSED, language_name, missing_text
 
 _REFERENCES = {
     "conditions.*.liquid": "liquids",
@@ -180,7 +180,7 @@ def check_statements_differ(document: Document) -> Iterator[Fault]:
 
 
 def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str, readers: str = "participants") -> Iterator[Fault]:
-    """Yield a fault for every text that looks like an earlier one; an entry may have a text per language.
+    """Yield a fault for every text that looks like an earlier one in all its languages, or in each that repeats one.
 
     Readers do not distinguish texts by case, width or white space, nor Latin letters from Cyrillic or Greek ones that
     look the same.
@@ -189,9 +189,13 @@ def _repeated_texts(located_texts: list[tuple[Path, Any]], kind: str, readers: s
     for path, entry in located_texts:
         texts = entry if isinstance(entry, Mapping) else {"": entry}
         read = {(language, visible_text(text)) for language, text in texts.items() if isinstance(text, str)}
-        if read & seen:
-            hint = f"{readers} could not tell them apart: change one"
-            yield Fault(path, f"reads the same as an earlier {kind}", hint, kind="alike")
+        message, hint = f"reads the same as an earlier {kind}", f"{readers} could not tell them apart: change one"
+        repeated = sorted(language for language, _ in read & seen)
+        if repeated and len(repeated) == len(read):
+            yield Fault(path, message, hint, kind="alike")
+        else:
+            for language in repeated:
+                yield Fault((*path, language), f"{message} in {language_name(language)}", hint, kind="alike")
         seen |= read
 
 
