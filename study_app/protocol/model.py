@@ -523,9 +523,9 @@ class ExclusionRule(Table):
     """A rule by which a session is proposed for exclusion; a person decides."""
 
     rule: _Rule = Field(
-        description="Reason for exclusion. below_chance: fewer correct answers than expected by chance; "
-        "threshold_beyond_levels: a threshold outside the range of levels; constant_answers: nearly always the same "
-        "answer; fast_answers: answers so fast that the participant cannot have read the questions."
+        description="Reason for exclusion. "
+        + "; ".join(f"{rule}: {condition.replace('{limit:g}', '`limit`')}" for rule, condition in RULES.items())
+        + "."
     )
     limit: float | None = Field(
         default=None,
