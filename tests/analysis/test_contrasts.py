@@ -284,7 +284,7 @@ def test_power_of_a_hypothesis_on_a_form_is_stated_in_standard_deviations() -> N
     protocol = parse(LOADED.encode(), "loaded.toml")
     told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found={}))
     half, smallest = detectable(18, tail=0.025)
-    assert "“raw” (load) differs between late and prompt" in told
+    assert "“raw” (load) differs between Late and Prompt" in told
     assert f"| raw | 18 | 1 | ±{half:.2f} SD | ±{smallest:.2f} SD |" in told
 
 
@@ -429,8 +429,8 @@ def test_power_tells_the_smallest_interaction() -> None:
     told = threshold_markdown(Precisions(protocol=protocol, sizes=(18,), studies=10, asked=10, seed=1, found=found))
     spread = math.hypot(math.log(1.2), math.log(1.3), math.log(1.3))
     half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
-    assert "the difference in threshold between late and prompt differs between a and b (interaction)" in told
-    assert f"| 20 | 18 | {spread:.0%} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
+    assert "the difference in threshold between Late and Prompt differs between a and b (interaction)" in told
+    assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
     text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
     sequence, _, rest = rest.partition("]")
     alone = grouped(text + rest, "different", "delays", f"{sequence}]")
@@ -507,11 +507,11 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
         told = threshold_markdown(precisions)
         assert f"{sizes} of the participants." in told
     spread = math.hypot(math.log(1.2), math.log(1.3))
-    assert f"| 20 | 3 | {spread:.0%} | too few | too few |" in told
+    assert f"| 20 | 3 | ×/÷ {math.exp(spread):.2f} | too few | too few |" in told
     half, smallest = (math.exp(spread * end) for end in detectable(12, 6, tail=0.025))
     root = spread * math.sqrt(1 / 12 + 1 / 6)
     assert half == pytest.approx(math.exp(student.ppf(0.975, 5) * root))
-    assert f"| 20 | 18 | {spread:.0%} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
+    assert f"| 20 | 18 | ×/÷ {math.exp(spread):.2f} | ×/÷ {half:.2f} | ×/÷ {smallest:.2f} |" in told
     text, _, rest = source_bytes("rek2024").decode().partition("sequence = ")
     sequence, _, rest = rest.partition("]")
     protocol = grouped(text + rest, "different", "delays", f"{sequence}]")
@@ -531,13 +531,16 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
     def told(planned: int, mean: float) -> str:
         lines = smallest_differences(
             contrast, (5, 16, 26), 0.06, 2, [("20", "90%", 0.9)], "trials", "SD.", "±{:.2f}".format, (0.5, 0.5),
-            planned=planned, assumed=("d′", mean),
+            planned=planned, assumed=("d′", mean), titles={"late": "Green part"},
         )  # fmt: skip
         return "\n".join(lines)
 
     half, least = (0.9 * end for end in detectable(8, 8, tail=0.015))
     assert 1.3 < least < 1.7
     few = told(16, 1.3)
+    assert (
+        "## Contrast: the difference in sensitivity (d′) between “Green part” and prompt differs between a and" in few
+    )
     assert f"**The planned 16 participants are too few to find a difference in d′ smaller than ±{least:.2f} with" in few
     assert "would find even a fall of d′ from 1.3 to 0 in one block of one group (a difference of 1.3)." in few
     assert f"| 20 | 16 (planned) | 90% | ±{half:.2f} | ±{least:.2f} |" in few
@@ -612,11 +615,13 @@ def test_power_plans_differences_and_equality_within_people(
         )
     )
     half, least = (spread * end for end in detectable(40, tail=0.05))
-    ends = f"±{half:.2f} | ±{least:.2f}" if edits else f"×/÷ {math.exp(half):.2f} | ×/÷ {math.exp(least):.2f}"
-    assert ("(a factor of 1.2), relative to a mean d′ of 1." if edits else "(a factor of 1.2).") in told
+    ends = f"{spread:.2f} | ±{half:.2f} | {least:.2f}"  # a one-sided test detects one direction
+    if not edits:
+        ends = f"×/÷ {math.exp(spread):.2f} | ×/÷ {math.exp(half):.2f} | × {math.exp(least):.2f}"
+    assert ("(a factor of 1.2), at a mean d′ of 1." if edits else "(a factor of 1.2).") in told
     assert "Equivalence requires at least 14 participants, at α = 0.05. Participants are included if both" in told
     assert "| smallest difference | shown to be equivalent if there is no difference |" in told
-    assert told.strip().endswith(f"| {spread:.0%} | {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
+    assert told.strip().endswith(f"| {ends} | {shown_equal(bound / spread, 40, alpha=0.05):.0%} |")
 
 
 def test_power_counts_studies_of_statements_that_show_equality() -> None:

@@ -494,6 +494,7 @@ def _summary(power: Powers) -> Iterator[str]:
 def _between(power: Powers) -> Iterator[str]:
     """Yield a table for each contrast of a statement between groups or of a form, which have no simulated effect."""
     plan = power.plan
+    titles = {block.id: block.title for block in plan.blocks}
     given = draw_opinions(plan, _MANY, power.seed, 0) if plan.between else ()
     for contrast, shares in plan.between:
         spreads = {}
@@ -509,11 +510,12 @@ def _between(power: Powers) -> Iterator[str]:
             contrast, power.sizes, plan.decided.alphas[-1], len(plan.contrasts) + plan.untested, rows, "statement",
             said, "±{:.2f}".format, shares, contrast.bound, bounds=_bounds(plan),
             largest=equality_limits(contrast, 1.0, ratio=False)[1], planned=plan.participants, unit=" points",
+            titles=titles,
         )  # fmt: skip
     for contrast, of_groups in plan.of_forms:
         members = len(plan.contrasts) + plan.untested
         alpha, planned = plan.decided.alphas[-1], plan.participants
-        yield from form_differences(contrast, power.sizes, alpha, members, of_groups, planned)
+        yield from form_differences(contrast, power.sizes, alpha, members, of_groups, planned, titles)
 
 
 def form_differences(
@@ -523,6 +525,7 @@ def form_differences(
     members: int,
     shares: tuple[float, float] | None,
     planned: int | None,
+    titles: Mapping[str, str],
 ) -> Iterator[str]:
     """Yield the table of a contrast of a form in standard deviations, which no answer model predicts.
 
@@ -535,7 +538,17 @@ def form_differences(
     )
     rows = [(contrast.measure, "1", 1.0)]
     yield from smallest_differences(
-        contrast, sizes, alpha, members, rows, "question or score", said, "±{:.2f} SD".format, shares, planned=planned
+        contrast,
+        sizes,
+        alpha,
+        members,
+        rows,
+        "question or score",
+        said,
+        "±{:.2f} SD".format,
+        shares,
+        planned=planned,
+        titles=titles,
     )
 
 
@@ -568,6 +581,7 @@ def smallest_differences(
     planned: int | None = None,
     assumed: tuple[str, float] | None = None,
     unit: str = "",
+    titles: Mapping[str, str],
 ) -> Iterator[str]:
     """Yield a Markdown table of the smallest difference in a contrast that 80 % of studies show.
 
@@ -576,8 +590,18 @@ def smallest_differences(
     are the shares of participants in the two groups; None: within participants. ``bound`` is the equivalence bound, on
     the scale of the standard deviation, which ``bounds`` hypotheses state; ``largest`` is the largest difference of a
     participant that the scale permits, None without a limit. ``planned`` participants have a verdict before the table;
-    ``assumed`` is a measure that can fall to 0 with its simulated mean; ``unit`` follows the difference in the verdict.
+    ``assumed`` is a measure that can fall to 0 with its simulated mean; ``unit`` follows the difference in the verdict;
+    ``titles`` are those of the blocks.
     """
+
+    def titled(names: tuple[str, str] | None) -> tuple[str, str] | None:
+        return None if names is None else (titles.get(names[0], names[0]), titles.get(names[1], names[1]))
+
+    def directed(end: float) -> str:
+        """Return a difference without the sign of the other direction, which a one-sided test cannot detect."""
+        if contrast.expected is None:
+            return written(end)
+        return written(end).replace("×/÷", "×" if contrast.expected == "higher" else "÷").removeprefix("±")
 
     def groups_of(n: int) -> list[int]:
         return [n] if shares is None else [int(n * share + 1e-9) for share in shares]
@@ -593,7 +617,8 @@ def smallest_differences(
     sides, strictest = "two-sided" if contrast.expected is None else "one-sided", alpha / members
     corrected = "" if members == 1 else f" ({alpha:.2g} divided by {members} hypotheses)"
     both = "" if shares is None else f" {_group_sizes(*shares)}"
-    yield from ("", f"## Contrast: {contrast.described()}", "")
+    named = contrast.described(titled(contrast.compared), titled(contrast.within))
+    yield from ("", f"## Contrast: {named}", "")
     at = f"{sides}, α = {strictest:.2g}{corrected}"
     within = (
         ""
@@ -612,13 +637,13 @@ def smallest_differences(
         given = f" ({first}: {name})" if len(rows) > 1 else ""
         yield from (
             "",
-            _verdict(contrast, planned, given, differences(planned, spread), lambda end: written(end) + unit, assumed),
+            _verdict(contrast, planned, given, differences(planned, spread), lambda end: directed(end) + unit, assumed),
         )
     yield from ("", f"| {' | '.join(heads)} |", "|---:" * len(heads) + "|")
     for name, words, spread in rows:
         for n in sizes:
             reached, groups = differences(n, spread), groups_of(n)
-            ends = ["too few", "too few"] if reached is None else [written(end) for end in reached]
+            ends = ["too few", "too few"] if reached is None else [written(reached[0]), directed(reached[1])]
             if bound is not None:
                 enough_people = min(groups) >= fewest_participants(alpha / bounds, bound, largest)
                 share = shown_equal(bound / spread, *groups, alpha=alpha / bounds) if enough_people else 0.0

@@ -85,8 +85,12 @@ class PrecisionResult:
         return float(np.median(spreads)) if spreads else math.inf
 
     def half(self, place: int) -> float:
-        """Return the median of half the group's interval at the size with this index."""
-        return float(np.median([half[place] for half in self.halves]))
+        """Return the median of half the group's interval at the size with this index.
+
+        Studies without an interval have a wider one than all others; NaN if none has any.
+        """
+        halves = np.array([half[place] for half in self.halves])
+        return math.nan if np.isnan(halves).all() else float(np.median(np.nan_to_num(halves, nan=math.inf)))
 
     def within(self, place: int, precision: float) -> float:
         """Return the share of studies whose half interval is within the precision, at the size with this index."""
@@ -329,13 +333,14 @@ def threshold_markdown(precisions: Precisions) -> str:
     blocks = precisions.protocol.blocks
     for block in dict.fromkeys(block for block, _ in precisions.found):
         lines += ["", f"## {text_in(blocks[block].title, language)} (block {block})", "", _assumed(planned[block]), ""]
-        trials_of = "trials" + next(iter(planned[block].values())).per
+        trials_of, unknown = "trials" + next(iter(planned[block].values())).per, False
         lines += [f"| {' | '.join((trials_of, *heads))} |", "|---:" * (1 + len(heads)) + "|"]
         for (of_block, trials), found in precisions.found.items():
             if of_block != block:
                 continue
             for place, size in enumerate(precisions.sizes):
                 half = found.half(place)
+                unknown |= not math.isfinite(half)
                 share = "–" if math.isnan(half) else f"{found.within(place, precision or 0.0):.0%}"
                 spread = f"{found.spread:.0%}" if math.isfinite(found.spread) else "–"
                 cells = (
@@ -345,9 +350,17 @@ def threshold_markdown(precisions: Precisions) -> str:
                     f"±{half:.0%}" if math.isfinite(half) else "–",
                 )
                 lines.append(f"| {' | '.join((*cells, *([share] if wanted else [])))} |")
+        if unknown:
+            lines += ["", _NO_INTERVAL]
         lines += _of_kinds(precisions, block)
     lines += _contrasts(precisions)
     return "\n".join(lines) + "\n"
+
+
+_NO_INTERVAL: Final = (
+    "“–” means that at least half of the simulated studies have no interval: there are fewer than three participants "
+    "or all estimates are equal, or limits clip the levels."
+)
 
 
 def _of_kinds(precisions: Precisions, block: str) -> Iterator[str]:
@@ -375,12 +388,14 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
     """Yield, for each contrast of planned blocks, a table of the smallest difference that 80 % of studies show."""
     if (decided := precisions.protocol.analysis) is None:
         return
-    planned = plans(precisions.protocol, ())
+    planned, titles = plans(precisions.protocol, ()), _titles(precisions.protocol)
     alpha, members = decisions(precisions.protocol).alphas[-1], len(decided.contrasts)
     for contrast in decided.contrasts:
         if contrast.form is not None:
             shares = group_shares(precisions.protocol, contrast)
-            yield from form_differences(contrast, precisions.sizes, alpha, members, shares, decided.participants)
+            yield from form_differences(
+                contrast, precisions.sizes, alpha, members, shares, decided.participants, titles
+            )
             continue
         firsts = [next(iter(planned[block].values())) for block in contrast.blocks if block in planned]
         if len(firsts) < len(contrast.blocks) or any(_MEASURED.get(type(it)) != contrast.measure for it in firsts):
@@ -389,10 +404,12 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         what = contrast.measure.replace("d_prime", "d′")
         assumed = None if isinstance(first, ThresholdPlan) else (what, first.value)
         mean = 1.0 if assumed is None else assumed[1]
-        rows = [(name, words, mean * spread) for name, words, spread in _spreads(precisions, contrast)]
+        written = (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format
+        spreads = [(name, mean * spread) for name, spread in _spreads(precisions, contrast)]
+        rows = [(name, written(spread).removeprefix("±"), spread) for name, spread in spreads]
         if not rows:
             continue
-        share = "" if assumed is None else f", relative to a mean {what} of {mean:g}"
+        share = "" if assumed is None else f", at a mean {what} of {mean:g}"
         whose = f"of one participant's {what}, due to estimation error and differences between people"
         if contrast.within is not None:
             whose = "of one participant's difference, due to the two estimation errors and differences between people"
@@ -400,12 +417,18 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
             contrast, precisions.sizes, alpha, members, rows,
             f"trials{first.per}",
             f"SD: standard deviation {whose} (a factor of {BETWEEN_PEOPLE:g}){share}.",
-            (lambda end: f"×/÷ {math.exp(end):.2f}") if ratio else "±{:.2f}".format,
+            written,
             group_shares(precisions.protocol, contrast),
             _log_bound(precisions.protocol, contrast) if ratio else contrast.bound,
             bounds=sum(each.bound is not None for each in decided.contrasts),
-            planned=decided.participants, assumed=assumed,
+            planned=decided.participants, assumed=assumed, titles=titles,
         )  # fmt: skip
+
+
+def _titles(protocol: Protocol) -> dict[str, str]:
+    """Return the titles of the blocks by id."""
+    language = display_language({"study": {"languages": protocol.study.languages}})
+    return {name: text_in(block.title, language) for name, block in protocol.blocks.items()}
 
 
 def _log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
@@ -416,7 +439,7 @@ def _log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
     return abs(math.log(contrast.bound))
 
 
-def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, str, float]]:
+def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, float]]:
     """Yield numbers of trials, and the resulting standard deviation of a participant's compared value."""
     protocol = precisions.protocol
     tracks = [
@@ -427,8 +450,7 @@ def _spreads(precisions: Precisions, contrast: Contrast) -> Iterator[tuple[str, 
         held = [found for block in contrast.blocks if (found := precisions.found.get((block, trials))) is not None]
         spreads = [precision.spread / math.sqrt(count) for precision, count in zip(held, averaged, strict=False)]
         if len(held) == len(contrast.blocks) and all(map(math.isfinite, spreads)):
-            spread = math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
-            yield str(trials), f"{spread:.0%}", spread
+            yield str(trials), math.hypot(math.log(BETWEEN_PEOPLE), *spreads)
 
 
 def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
@@ -446,8 +468,8 @@ def _assumed(plans_of_block: Mapping[int, _Plan]) -> str:
     group = "The group interval is a t-based confidence interval for the mean."
     if isinstance(plan, SensitivityPlan):
         return (
-            f"Simulated observers are unbiased and have a mean d′ of {plan.value:g}; the SD is stated relative to this "
-            f"mean. {group}"
+            f"Simulated observers are unbiased and have a mean d′ of {plan.value:g}. The SD is stated relative to this "
+            f"mean, the half-width relative to the mean of the estimates. {group}"
         )
     if isinstance(plan, RatingPlan):
         return (

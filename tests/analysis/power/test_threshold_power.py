@@ -4,10 +4,18 @@ import math
 from concurrent.futures import Executor, Future
 from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from study_app.analysis.planning.threshold_studies import BATCH, Precisions, plans, sweep, threshold_markdown
+from study_app.analysis.planning.threshold_studies import (
+    BATCH,
+    PrecisionResult,
+    Precisions,
+    plans,
+    sweep,
+    threshold_markdown,
+)
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import load, parse
@@ -95,6 +103,25 @@ def test_exponents_and_d_primes_have_the_spread_that_check_expects() -> None:
         said = threshold_markdown(found)
         assert f"mean {'exponent of 0.44' if block == 'thickness' else 'd′ of 1'}" in said
         assert f"| {'trials' if block == 'thickness' else 'trials per comparison'} | participants |" in said
+
+
+def test_a_study_without_an_interval_is_wider_than_all_others() -> None:
+    halves = [
+        np.array([0.31, 0.27, math.nan]),
+        np.array([math.nan, 0.42, math.nan]),
+        np.array([math.nan, 0.58, math.nan]),
+    ]
+    found = PrecisionResult([np.array([[0.4], [-0.4]])] * 3, halves)
+    assert math.isinf(found.half(0))
+    assert found.half(1) == 0.42
+    assert math.isnan(found.half(2)), "too few participants"
+    some = PrecisionResult(found.errors, [np.array([math.nan]), np.array([0.84]), np.array([0.66])])
+    assert some.half(0) == 0.84
+    known = Precisions(protocol=study(), sizes=(5,), studies=3, asked=3, seed=1, found={("thicker", 20): some})
+    assert "–" not in threshold_markdown(known).replace("Hartung–Knapp", "")
+    few = PrecisionResult(found.errors, [half[:1] for half in halves])
+    unknown = Precisions(protocol=study(), sizes=(5,), studies=3, asked=3, seed=1, found={("thicker", 20): few})
+    assert "“–” means that at least half of the simulated studies have no interval" in threshold_markdown(unknown)
 
 
 @pytest.mark.slow
