@@ -278,7 +278,7 @@ class DesignerController(QObject):
             return
         study = self.editing.opened.study
         known = facts(study)
-        rows = outline_rows(study, known.steps_s, self._find)
+        rows = outline_rows(study, known.steps_s, self._find, session_s=known.expected_s)
         self.place.outline.show_outline(rows, self.editing.selected)
         if known.warnings != self._warnings:
             self._warnings = known.warnings

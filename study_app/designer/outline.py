@@ -100,16 +100,18 @@ class OutlineRow:
     named: bool = False  # whether its title or id matches the search
 
 
-def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> tuple[OutlineRow, ...]:
+def outline_rows(
+    study: Study, times_s: Mapping[str, float], find: str = "", *, session_s: float | None = None
+) -> tuple[OutlineRow, ...]:
     """Return the outline of a study; with a search text only the matching elements.
 
-    ``times_s`` are the durations of steps [s] by id, empty while the study has faults; ``find`` is searched for in an
-    element's title, id and texts, and in the labels and choices of its fields.
+    ``times_s`` are the durations of steps [s] by id, empty while the study has faults, and ``session_s`` is that of the
+    session; ``find`` is searched for in an element's title, id and texts, and in the labels and choices of its fields.
     """
     if study.is_unreadable:
         only = Element(FIRST, title_of({}, FIRST), FIRST[0], faults=len(study.faults))
         return (_outline_row(study, only, {}, in_session=False),)
-    shown, text = outline(study), find.strip()
+    shown, document, text = outline(study), study.document, find.strip()
     fields = found_in_elements(study, text)
     rows: list[OutlineRow] = []
     titles = _titles((*shown.parts, *shown.session, *shown.study))
@@ -119,11 +121,12 @@ def outline_rows(study: Study, times_s: Mapping[str, float], find: str = "") -> 
         named = [replace(element, title=titles[element.path]) for element in elements]
         inner = [_outline_row(study, element, times_s, in_session=heading == SESSION) for element in named]
         if text:
-            inner = [row for row in inner if len(row.path) > 1 or heading != PARTS]
+            whole = {row.path for row in inner if heading == PARTS and len(row.path) == 1}
+            inner = [row for row in inner if row.path not in whole or has_text(document, row.path, text, named=True)]
             inner = [
                 kept for row in inner if (kept := _matching_row(study, row, text, fields.get(row.path))) is not None
             ]
-        total = duration(sum(times_s.values())) if times_s and heading == SESSION else ""
+        total = "" if session_s is None or heading != SESSION else duration(session_s)
         if inner:
             rows += [*([OutlineRow(path=(), title=heading, note=total, name=heading)] if heading else []), *inner]
     return tuple(rows)

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 import shiboken6
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
@@ -196,6 +196,27 @@ def test_a_long_line_shows_its_start_after_the_keyboard_left_it(designer: Any) -
     assert line.cursorPosition() == 0
     line.setFocus()
     assert line.cursorPosition() == len(line.text()), "typing goes on where it ended"
+
+
+def test_the_wheel_over_a_list_or_a_text_leaves_keyboard_and_value(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    title = designer.field("blocks", "liquids", "title").lines["en"]
+    title.setFocus()
+    before = designer.text
+    for part in (designer.field("blocks", "liquids", key).list for key in ("task", "questionnaire")):
+        designer.place.form.area.ensureWidgetVisible(part)
+        at = part.mapTo(designer.window, part.rect().center())
+        QTest.wheelEvent(designer.window.windowHandle(), QPointF(at), QPoint(0, -120))
+        QApplication.processEvents()
+        assert designer.keyboard is title
+    assert designer.text == before
+    designer.go_to("pages", "welcome")
+    body = designer.field("pages", "welcome", "body").lines["en"]
+    designer.place.form.head.id.setFocus()
+    QTest.wheelEvent(
+        designer.window.windowHandle(), QPointF(body.mapTo(designer.window, QPoint(9, 9))), QPoint(0, -120)
+    )
+    assert designer.keyboard is designer.place.form.head.id
 
 
 def test_the_name_of_an_incomplete_language_is_whole(designer: Any) -> None:

@@ -9,8 +9,11 @@ from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit
 from shiboken6 import isValid
 
+from study_app.designer.document.toml_edits import Insert, Set
+from study_app.designer.measures.study_facts import facts
 from study_app.designer.new_study_page import _listed_title
 from study_app.designer.outline import ROW_ROLE
+from study_app.number_text import duration
 from study_app.protocol.source.files import shipped
 from study_app.store.drafts import Keeper
 from study_app.store.study_settings import keep_original
@@ -252,3 +255,16 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     qtbot.mouseClick(tree.viewport(), LEFT, pos=QPoint(20, tree.visualRect(index).center().y()))
     assert outline.isVisible(), "the sign before the title opens and closes, it does not choose"
     assert ("blocks", "liquids") not in expanded(small)
+
+
+def test_the_outline_and_the_measures_have_the_same_duration_of_a_session(designer: Any) -> None:
+    designer.open()
+    sequence = designer.value("sequence")
+    places = [("sequence", sequence.index(block) + 1) for block in ("delays", "liquids")]  # the later one first
+    form = {"instrument": "nasa-tlx-weighted"}
+    designer.editing.make_step("Add", Set(("questionnaires", "load"), form), *(Insert(it, "load") for it in places))
+    designer.controller.show_outline()
+    known = facts(designer.study)
+    assert duration(known.expected_s) != duration(sum(known.steps_s.values())), "the form is filled in twice"
+    note = next(row.note for row in designer.place.outline.rows if row.title == "Session, in order")
+    assert note == duration(known.expected_s)

@@ -230,6 +230,7 @@ class TypedText(_Typed, QPlainTextEdit):
         super().__init__()
         self.begin()
         self.setAccessibleName(name)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # the wheel scrolls past it
         self.setTabChangesFocus(True)
         self.setUndoRedoEnabled(False)
         self.setFont(font("label", weight=400))

@@ -237,6 +237,7 @@ class Choice(Themed, QComboBox):
     def __init__(self) -> None:
         super().__init__()
         self._named = PlainLabel()
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)  # Qt's own gives it the keyboard when the wheel scrolls past it
         self.setItemDelegate(QStyledItemDelegate(self))  # the theme gives the list's lines their height
 
     def setAccessibleName(self, name: str) -> None:
@@ -279,7 +280,7 @@ class Choice(Themed, QComboBox):
 
 
 class Number(QSpinBox):
-    """A whole number that is typed or changed by the arrow keys and the wheel.
+    """A whole number that is typed or changed by the arrow keys; the wheel scrolls the page, not the number.
 
     Qt ignores keys that a whole number cannot contain, so that "2,5" would become 25. Here they are typed; Enter
     rejects such a text, and leaving the field restores the number from before. Both show the reason.
@@ -288,6 +289,7 @@ class Number(QSpinBox):
     def __init__(self, lowest: int, highest: int, value: int) -> None:
         super().__init__()
         self._before = value
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setRange(lowest, highest)
         self.setValue(value)
         self.setFont(font("body", tabular=True))
@@ -308,6 +310,9 @@ class Number(QSpinBox):
     def focusInEvent(self, event: QFocusEvent) -> None:
         self._before = self.value()
         super().focusInEvent(event)
+
+    def wheelEvent(self, event: QWheelEvent) -> None:
+        event.ignore()
 
     def fixup(self, _text: str) -> str:
         self._say_refusal()

@@ -48,6 +48,13 @@ def test_the_outline_shows_each_element_once_with_its_name(name: str) -> None:
     assert steps == [("sequence", at) for at in range(len(study.document.get("sequence", ())))]
 
 
+def test_a_search_finds_the_section_of_elements_that_do_not_exist_yet() -> None:
+    ((_, study),) = studies(("slime",))
+    assert "groups" not in study.document
+    assert ("groups",) in {row.path for row in outline_rows(study, {}, "group")}
+    assert ("groups",) not in {row.path for row in outline_rows(study, {}, "liquid")}
+
+
 @pytest.mark.parametrize("words", ["viscosity", "hon", "order"])
 def test_what_is_found_has_the_words(words: str) -> None:
     ((_, study),) = studies(("slime",))
