@@ -198,6 +198,9 @@ class _PathBar(QWidget):
         if form.around == self._shown:
             return
         self._shown = form.around
+        held = any(step.hasFocus() for step in self.steps)
+        if held:
+            self.outline.setFocus(Qt.FocusReason.OtherFocusReason)  # else Qt moves the focus to the rail
         for part in self._parts:
             remove_widget(part)
         self.steps, self._parts = [], []
@@ -209,6 +212,9 @@ class _PathBar(QWidget):
                 self._steps.addWidget(part)
             self.steps.append(made)
             self._parts += [sign, made]
+        if held and self.steps:
+            self.steps[-1].show()  # at once: a hidden widget takes no focus
+            self.steps[-1].setFocus(Qt.FocusReason.OtherFocusReason)
 
 
 _SHORTCUT = Qt.FocusReason.ShortcutFocusReason

@@ -257,6 +257,18 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     assert ("blocks", "liquids") not in expanded(small)
 
 
+def test_a_step_of_the_path_keeps_the_keyboard_when_it_is_clicked_after_an_id_was_typed(designer: Any) -> None:
+    designer.open("kitchen", "conditions", "thin", width=1366)
+    designer.fill(designer.place.form.head.id, "thinner")
+    QApplication.processEvents()
+    step = designer.place.parts.path.steps[0]
+    designer.click_on(step)
+    QApplication.processEvents()
+    assert designer.editing.selected == ("conditions",)
+    assert designer.keyboard is designer.place.parts.path.steps[-1]
+    assert designer.keyboard.whole == "Conditions"
+
+
 def test_the_outline_and_the_measures_have_the_same_duration_of_a_session(designer: Any) -> None:
     designer.open()
     sequence = designer.value("sequence")
