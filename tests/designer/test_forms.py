@@ -198,6 +198,30 @@ def test_a_long_line_shows_its_start_after_the_keyboard_left_it(designer: Any) -
     assert line.cursorPosition() == len(line.text()), "typing goes on where it ended"
 
 
+def test_add_offers_the_conditions_that_a_block_does_not_have(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    listed, conditions = designer.value("blocks", "liquids", "conditions"), designer.value("conditions")
+    assert 0 < len(listed) < len(conditions)
+    field = designer.field("blocks", "liquids", "conditions")
+    offered = {field.names.itemText(at) for at in range(field.names.count())}
+    assert offered == {*conditions, "New condition …"} - {*listed}
+    designer.go_to("sequence")
+    names = designer.field("sequence").names
+    assert "welcome" in {names.itemText(at) for at in range(names.count())}, "a step can be repeated"
+
+
+def test_the_next_problem_of_a_scale_is_its_first_missing_label(designer: Any) -> None:
+    designer.open("kitchen", "scales", "agreement")
+    english = list(designer.value("scales", "agreement", "labels", "en"))
+    labels = {"en": english, "fr": ["pas du tout", *[""] * (len(english) - 2), "tout à fait"]}
+    designer.editing.make_step(
+        "Change", Set(("study", "languages"), ["en", "fr"]), Set(("scales", "agreement", "labels"), labels)
+    )
+    field = designer.field("scales", "agreement", "labels")
+    designer.place.form.focus_row(("scales", "agreement", "labels"))
+    assert designer.keyboard is field.lines[1][1]
+
+
 def test_the_wheel_over_a_list_or_a_text_leaves_keyboard_and_value(designer: Any) -> None:
     designer.open("kitchen", "blocks", "liquids")
     title = designer.field("blocks", "liquids", "title").lines["en"]

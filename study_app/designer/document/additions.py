@@ -62,23 +62,21 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
 
 
 def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
-    """Return edits of a block's design, conditions, phase or order, or of an exclusion rule, and those they require.
+    """Return edits of a block's design, phase or order, or of an exclusion rule, and those they require.
 
     A rule gets its usual limit. Keys that no longer belong to the block are removed; a questionnaire comes after the
-    block, once; the first condition becomes the standard unless the standard is among the conditions.
+    block, once; with a design, the first condition becomes the standard unless the standard is among the conditions.
     """
     if path[:2] == EXCLUSIONS and path[-1] == "rule":
         return (*edits, *_limit_edits(study, path, edits))
     if path[:1] == ("blocks",) and path[2:] in (("phase",), ("order",)):
         return (*edits, *_surplus_edits(study, path, edits))
-    if path[:1] != ("blocks",) or path[2:3] not in (("design",), ("conditions",)):
+    if path[:1] != ("blocks",) or path[2:3] != ("design",):
         return edits
     after = study.with_edits(*edits)[0].document
     block = value_at(after, path[:2])
     if not isinstance(block, Mapping):
         return edits
-    if path[2] == "conditions":
-        return (*edits, *_standard_edits(block, path[:2])) if "standard" in block else edits
     others: list[Edit] = [Unset((*path[:2], key)) for key in refused_at(after, path[:2]) if key in block]
     sequence, form = value_at(after, ("sequence",)), block.get("questionnaire")
     if "design" in block:

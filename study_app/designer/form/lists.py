@@ -290,8 +290,9 @@ class EntriesField(EntryList):
         super().show_value()
         if self.names is not None:
             row = self.row
-            items: list[tuple[str, Request]]
-            items = [(str(choice.value), AddEntry(row.path, str(choice.value))) for choice in row.choices]
+            repeats = row.path[0] == "sequences" or row.path[-1] == "sequence"
+            names = [str(choice.value) for choice in row.choices if repeats or choice.value not in (row.value or ())]
+            items: list[tuple[str, Request]] = [(name, AddEntry(row.path, name)) for name in names]
             self.names.show_items([*items, *row.additions])
 
     def fill_rows(self) -> None:

@@ -278,6 +278,11 @@ class _PointsField(Field):
             for line, text in zip(lines, texts, strict=True):
                 line.show_text(text)
 
+    def take_keyboard(self) -> None:
+        """Focus the first missing label, else the first one."""
+        missing = (line for lines in self.lines for line in lines if not line.text())
+        next(missing, self).setFocus(Qt.FocusReason.OtherFocusReason)
+
     def _count_written(self, code: str) -> int:
         return len((self.row.value or {}).get(code, ()))
 

@@ -119,17 +119,20 @@ def test_the_standard_is_one_of_the_blocks_conditions(study: Study) -> None:
     assert not any("^" in bound for bound in row.bounds)
 
 
-def test_the_standard_follows_the_conditions_of_its_block(study: Study) -> None:
+def test_another_standard_is_not_chosen_for_one_that_is_removed(study: Study) -> None:
     whole = after(study, SetValue(DESIGN, "abx"))
     conditions = ("blocks", "feel", "conditions")
     one = after(whole, RemoveKey((*conditions, 0)))
     (fault,) = one.faults
     assert (fault.path, fault.hint) == (conditions, "add another condition")
     assert fault.message == "the block has one condition, but its design compares at least two"
-    assert after(one, AddEntry(conditions, "late")).document["blocks"]["feel"]["standard"] == "slime"
-    three = after(whole, AddEntry(conditions, "late"))
-    assert three.document["blocks"]["feel"]["standard"] == "water"
-    assert after(three, RemoveKey((*conditions, 0))).document["blocks"]["feel"]["standard"] == "slime"
+    for two in (
+        after(one, AddEntry(conditions, "late")),
+        after(whole, AddEntry(conditions, "late"), RemoveKey((*conditions, 0))),
+    ):
+        assert two.document["blocks"]["feel"]["conditions"] == ("slime", "late")
+        assert two.document["blocks"]["feel"]["standard"] == "water"
+        assert [fault.path[-1] for fault in two.faults] == ["standard"]
 
 
 def test_a_repeated_form_is_counted_each_time_with_and_without_groups() -> None:
