@@ -369,8 +369,9 @@ def _design(protocol: Protocol) -> Iterator[str]:
         yield f"The order of blocks{f' in group {group}' if group else ''} is {words}."
     yield ("Each participant's trial orders are generated from the session's seed, as described below for each block.")
     for block in protocol.main_blocks:
-        kind = "levels" if block.stimulus is not None else "conditions"
-        yield f"Block {block.id} compares {kind} (described below)."
+        compared = f"levels of {block.stimulus}" if block.stimulus is not None else listed(list(block.conditions))
+        alone = block.stimulus is None and len(block.conditions) == 1
+        yield f"Block {block.id} {'presents' if alone else 'compares'} {compared}."
 
 
 def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:

@@ -102,7 +102,7 @@ class SetValue(Request):
 
 @dataclass(frozen=True, slots=True)
 class SetText(Request):
-    """Set a text in one language."""
+    """Set a text in one language; an empty one is removed if the text exists in another language."""
 
     path: Path
     language: str
@@ -111,6 +111,11 @@ class SetText(Request):
     def step(self, at: Situation) -> Step:
         languages = languages_of(at.study.document)
         value = value_at(at.study.document, self.path)
+        edit: Edit
+        title = f"Type {label_of(self.path[-1])}"
+        if isinstance(value, Mapping) and not self.text.strip() and value.keys() - {self.language}:
+            gone = (Unset((*self.path, self.language)),) if self.language in value else ()
+            return Step(title, gone, continues=(self.path, self.language))
         if isinstance(value, Mapping):
             edit = Set((*self.path, self.language), self.text)
         elif len(languages) == 1:
@@ -119,7 +124,7 @@ class SetText(Request):
             before = {languages[0]: value} if isinstance(value, str) else {}
             edit = Set(self.path, {**before, self.language: self.text})
         edits = (edit, *short_text_edits(at.study, self.path, self.language, self.text))
-        return Step(f"Type {label_of(self.path[-1])}", edits, continues=(self.path, self.language))
+        return Step(title, edits, continues=(self.path, self.language))
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,7 @@ from study_app.designer.participant.playable import (
     step_name,
 )
 from study_app.designer.parts import Segments, make_dense
+from study_app.designer.problems import problem_rows
 from study_app.designer.window import DesignerPlace, PanePage
 from study_app.gui.display.screens import choose_screens
 from study_app.gui.kit.commands import add_commands, command_tip
@@ -649,16 +650,15 @@ class ParticipantPreview(Card):
         """Return a note, in the page's language, on parts that are not shown as written."""
         first = step.shown.protocol.study.languages[0]
         faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
-        count = len(study.problems) - len(study.faults) + len(faults)
+        count = sum(row.fault.concerns(self._language, first) for row in problem_rows(study))  # as the header counts
         if not count:
             return "This page is not part of any session." if step.session == STANDALONE else ""
         values = "only the valid parts" if self._valid is None else "the last valid values"
         own = next((fault for fault in faults if fault.path[: len(self._selected)] == self._selected), None)
         if own is None:
             are = f"There {'is' if count == 1 else 'are'} {counted(count, 'problem')} elsewhere"
-            if faults:
-                first_name = unique_name(study.document, element_of(study, faults[0].path))
-                are += f" ({first_name})" if count == 1 else f" (the first: {first_name})"
+            first_name = unique_name(study.document, element_of(study, faults[0].path))
+            are += f" ({first_name})" if count == 1 else f" (the first: {first_name})"
             return f"{are}, so {values} are shown."
         shown = f"{values} are shown"
         if own.kind == "alike":

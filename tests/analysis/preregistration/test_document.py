@@ -60,6 +60,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
         "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±15 %." in text
     )
     assert "we simulated 50 trials per standard" in text
+    assert "- Block viscosity compares levels of damping." in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "the trial is repeated, for up to 3 presentations in total" in text
     assert "Hartung–Knapp 95 % interval if there are at least 3 participants" in text
@@ -79,6 +80,7 @@ def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     text = preregistration(load("rek2024"), "0" * 64)
     assert "Hypothesis, block delays: agreement with" in text
     assert "(comfortable) decreases with the delay." in text
+    assert "- Block liquids compares water, honey and light_oil." in text
     assert "within ±1 point?" in text
     assert "above chance (statements: “like_water” for water, “like_honey” for honey and “like_oil” for" in text
     assert "Alpha is 0.05. The p values of primary statements (all) are Holm-adjusted" in text

@@ -14,7 +14,7 @@ from PySide6.QtGui import QCursor, QImage
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.document.steps import DuplicateElement, SetText, SetValue
+from study_app.designer.document.steps import ChangeLanguage, DuplicateElement, SetText, SetValue
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.gui.key_presses import ignores_clicks
@@ -304,6 +304,21 @@ def test_a_note_on_a_problem_says_which_of_two_elements_of_the_same_title_has_it
     designer.editing.handle_request(SetValue(("device", "force_limit_n"), 60))
     designer.go_to(*ITEM)
     assert "There are 2 problems elsewhere (the first: " in tab.view.note
+
+
+def test_the_note_counts_the_missing_texts_of_a_language_once_as_the_header_does(designer: Any, tab: Any) -> None:
+    designer.editing.handle_request(ChangeLanguage("add", "nl"))
+    designer.editing.handle_request(ChangeLanguage("copy", "nl"))
+    designer.editing.handle_request(SetText(("pages", "welcome", "title"), "nl", ""))
+    designer.editing.handle_request(SetText(("pages", "thanks", "title"), "nl", " "))
+    assert [fault.message for fault in designer.study.faults] == ["is missing in Dutch"] * 2
+    tab.show_language("nl")
+    assert len(designer.place.problems.problems) == 1
+    assert "There is 1 problem elsewhere (Page " in tab.view.note
+    designer.editing.handle_request(SetValue(("device", "force_limit_n"), 60))
+    assert "There are 2 problems elsewhere (the first: " in tab.view.note
+    designer.editing.handle_request(SetText(("pages", "thanks", "title"), "nl", "Dank u"))
+    assert designer.value("pages", "thanks", "title") == {"en": "That was it", "nl": "Dank u"}
 
 
 def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:
