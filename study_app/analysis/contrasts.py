@@ -520,13 +520,14 @@ def _difference_words(contrast: ContrastResult) -> str:
         said = f"{what} did not differ significantly between {first} and {second}"
     else:
         said = f"{what} was not significantly {expected} in {first} than in {second}"
-    means = listed([mean_words(side) for side in contrast.sides if side.mean is not None])
+    decimals = _decimals(contrast)
+    means = listed([mean_words(side, decimals) for side in contrast.sides if side.mean is not None])
     higher = (
         ""
         if contrast.higher is None
         else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants."
     )
-    effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect)}"
+    effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect, decimals)}"
     unadjusted = "unadjusted " * (contrast.members > 1)
     size = "" if contrast.standardised is None else f", {_size_words(contrast.standardised)}"
     return (
@@ -536,10 +537,24 @@ def _difference_words(contrast: ContrastResult) -> str:
     )
 
 
-def mean_words(side: ContrastSide) -> str:
+def _decimals(contrast: ContrastResult) -> int:
+    """Return the decimals with which a difference is that of the means beside it; 2 if three digits do not suffice."""
+    means, effect = [side.mean for side in contrast.sides if side.mean is not None], contrast.effect
+    if len(means) != 2 or effect is None or contrast.ratio or not math.isclose(means[0] - means[1], effect):
+        return 2
+    for decimals in (2, 3):
+        first, second, shown = (
+            float(number(value, decimals).replace(number_text.MINUS, "-")) for value in (*means, effect)
+        )
+        if math.isclose(first - second, shown):
+            return decimals
+    return 2
+
+
+def mean_words(side: ContrastSide, decimals: int = 2) -> str:
     """Return the mean of one side with its interval: "0.61 [0.4, 0.82]"."""
     ends = "" if side.low is None or side.high is None else f" [{number(side.low)}, {number(side.high)}]"
-    return f"{number(side.mean)}{ends}"
+    return f"{number(side.mean, decimals)}{ends}"
 
 
 def _size_words(size: EffectSize | None) -> str:

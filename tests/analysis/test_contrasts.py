@@ -453,6 +453,23 @@ def test_power_tells_the_smallest_interaction() -> None:
     assert float(row.split("|")[3]) == pytest.approx(spread, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "said"),
+    [
+        (0.1741, -0.0011, ("means 0.174 [", " and −0.001 [", "mean difference 0.175,")),  # 0.17, 0.00 and 0.18
+        (0.1741, -0.0061, ("means 0.17 [", " and −0.01 [", "mean difference 0.18,")),
+        (0.6349, 0.4051, ("means 0.635 [", " and 0.405 [", "mean difference 0.230,")),
+    ],
+)
+def test_a_difference_agrees_with_the_means_beside_it(first: float, second: float, said: tuple[str, ...]) -> None:
+    contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"))
+    (found,) = evaluate(statements(contrast, 0.5)).contrasts
+    means = (first, second)
+    sides = tuple(replace(side, mean=mean) for side, mean in zip(found.sides, means, strict=True))
+    told = answer(replace(found, sides=sides, effect=first - second))
+    assert all(words in told for words in said), told
+
+
 def test_hypotheses_are_corrected_together_and_say_why_they_are_not_tested() -> None:
     contrast = Contrast(measure=ITEMS[0], blocks=("b",), conditions=("c2", "c1"))
     alike = Contrast(measure=ITEMS[1], blocks=("b",), groups=("one", "two"))
