@@ -824,7 +824,9 @@ class ResultsPlace(Place):
         facts = session_facts(answer.folder, answer.rows, answer.exclusions, {})
         facts.sort(key=lambda session: (not session.needs_care, session.participant, session.session))
         reveal = answer.reveal
+        figures = () if self.view.sealed and reveal is not None else self.view.figures  # they show codes
         self._update_view(
+            figures=figures,
             sessions=tuple(facts),
             listed=True,
             left_out=answer.exclusions,

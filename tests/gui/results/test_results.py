@@ -18,7 +18,7 @@ from study_app.analysis.study_worker import carry_out
 from study_app.analysis.worker_messages import Answer, Order, start_analysis_worker
 from study_app.errors import StudyError
 from study_app.gui.home.main_window import MainWindow
-from study_app.gui.results.figures import FigureCard
+from study_app.gui.results.figures import FigureCard, ResultsView
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.main_view import Place
@@ -133,7 +133,12 @@ def test_a_blinded_study_is_shown_by_code_and_by_name_once_unblinding_is_recorde
     assert b">Thick<" not in drawn
     assert [one.participant for one in shown.place.sessions.rows.shown] == ["P001", "P002", "P003"]
     assert shown.place.view.testing is None
+    views, show_view = list[ResultsView](), shown.place.show_view
+    shown.place.show_view = lambda view: (views.append(view), show_view(view))  # type: ignore[method-assign]
     shown.decide(shown.place.unblind, "AK", "collection closed")
+    opened = [view for view in views if view.opened]
+    assert any(view.figures for view in opened)
+    assert not [view for view in opened if any(b">L1<" in figure.svg for figure in view.figures)]
     (record,) = reveals(results / "demo")
     assert (record["by"], record["reason"]) == ("AK", "collection closed")
     assert shown.chips[1].endswith("by AK: collection closed")
