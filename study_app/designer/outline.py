@@ -288,7 +288,8 @@ def _addable_entry(study: Study, path: Path) -> Addable:
     )
 
 
-WIDTH, HIGHEST, ADD_ROW_PX, HELP_PX = 360, 520, 34, 78
+WIDTH, BESIDE_PX, HIGHEST, ADD_ROW_PX, HELP_PX = 360, 84, 520, 34, 78
+"""The least width of the list, what an entry needs beside its text, and heights [px]."""
 _MOVES = (Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
 
 
@@ -328,8 +329,10 @@ class AddList(Themed, QFrame):
         self._filter("")
         height = min(HIGHEST, 82 + HELP_PX + ADD_ROW_PX * len(every))
         screen = self.screen().availableGeometry()
-        at = QPoint(min(above.x(), screen.right() - WIDTH), max(screen.top(), above.y() - height))
-        self.setGeometry(at.x(), at.y(), WIDTH, height)
+        words = (self.list.fontMetrics().horizontalAdvance(entry.words) for entry in every)
+        width = max(WIDTH, max(words, default=0) + BESIDE_PX)
+        at = QPoint(min(above.x(), screen.right() - width), max(screen.top(), above.y() - height))
+        self.setGeometry(at.x(), at.y(), width, height)
         self.show()
         self.words.setFocus(Qt.FocusReason.PopupFocusReason)
 
@@ -346,7 +349,7 @@ class AddList(Themed, QFrame):
             item.setData(Qt.ItemDataRole.UserRole, entry)
             item.setToolTip(plain_tip(entry.help))
             item.setData(Qt.ItemDataRole.AccessibleDescriptionRole, entry.help)
-            item.setSizeHint(QSize(WIDTH - 40, ADD_ROW_PX))
+            item.setSizeHint(QSize(0, ADD_ROW_PX))
             self.list.addItem(item)
         self.list.setCurrentRow(0)
         if not self.list.count():

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent, QObject, Qt
+from PySide6.QtCore import QEvent, QObject, QPoint, Qt
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
@@ -15,13 +15,19 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from study_app.designer.document.additions import edits_to_duplicate
+from study_app.designer.document.steps import ChangeLanguage
+from study_app.designer.document.toml_edits import Set
+from study_app.designer.outline import addable_elements
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.widgets.cards import Chip
+from study_app.gui.widgets.labels import Elided
 from tests.designer.support.inputs import name_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.variants(2)]
 
 TAKE_KEYS = (QAbstractButton, QLineEdit, QPlainTextEdit, QComboBox, QAbstractItemView)
+ICON_AND_PADDING_PX = 18 + 4 + 2 * 10
 SIZES = pytest.mark.parametrize("size", [(1024, 640), (1366, 768), (1600, 1000)])
 
 
@@ -137,3 +143,36 @@ def test_measures_and_the_page_of_a_new_study_fit(
         assert not nameless(measures), path
     assert (designer.window.width(), designer.window.height()) == size
     assert not windows
+
+
+def test_the_sides_of_a_hypothesis_are_whole_in_a_narrow_window(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "parts")
+    designer.window.resize(1366, 768)
+    study, _ = designer.study.with_edits(*edits_to_duplicate(designer.study, ("blocks", "liquids"))[0])
+    designer.editing.make_step("Change", text=study.text)
+    first, second = (name for name, block in designer.value("blocks").items() if block.get("phase") != "practice")
+    contrast = {"measure": "d_prime", "blocks": [first, second], "groups": ["novice", "experienced"]}
+    designer.editing.make_step(
+        "Change", Set(("groups", "novice"), {}), Set(("groups", "experienced"), {}),
+        Set(("blocks", first, "title"), "The blue part"), Set(("blocks", second, "title"), "Green part"),
+        Set(("analysis", "contrasts"), [contrast]),
+    )  # fmt: skip
+    designer.go_to("analysis")
+    (line,) = designer.field("analysis", "contrasts").lines
+    assert line.second.currentText() == "Experienced, The blue part − Green part"
+    boxes = (line.measure, line.first, line.relation, line.second)
+    assert [box.toolTip() for box in boxes if box.grab()] == [""] * 4, "a tip shows the text that is elided"
+
+
+def test_each_addable_element_and_the_count_of_texts_are_whole(designer: Any) -> None:
+    designer.open("kitchen", "study", width=1366)
+    adding = designer.place.adding
+    adding.open(addable_elements(designer.study, ("study",)), QPoint(100, 600))
+    room = adding.list.viewport().width() - ICON_AND_PADDING_PX
+    assert max(adding.list.fontMetrics().horizontalAdvance(adding.list.item(at).text()) for at in range(30)) < room
+    adding.close()
+    designer.editing.handle_request(ChangeLanguage("add", "fr"))
+    QApplication.processEvents()
+    row = designer.field("study", "languages").rows[-1]
+    (note,) = (part for part in row.findChildren(Elided) if " of " in part.whole)
+    assert note.width() >= note.fontMetrics().horizontalAdvance(note.whole.partition(",")[0])

@@ -405,9 +405,9 @@ class LanguageListField(EntryList):
         codes = [str(code) for code in row.value] if isinstance(row.value, tuple) else []
         first = row.entries[0].title if row.entries else ""
         for at, (code, entry) in enumerate(zip(codes, row.entries, strict=True)):
-            title, note = label(entry.title, "label", "bad" if entry.faults else "text"), Elided("small", "text2")
-            note.show_text(entry.note)
-            note.setAlignment(RIGHT)
+            title = label(entry.title, "label", "bad" if entry.faults else "text")
+            note = cut_text(entry.note, right=True)
+            note.setMinimumWidth(note.fontMetrics().horizontalAdvance(entry.note.partition(",")[0]) + 2)
             description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
             shown = self.add_row(description, title, note, faulty=bool(entry.faults))
             if entry.faults and at:

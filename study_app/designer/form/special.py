@@ -514,9 +514,8 @@ class Hypothesis(QWidget):
         self.bound.setFixedWidth(64)
         self.bound.typed.connect(self._take_bound)
         self.away = IconButton("cross", f"Remove {name}", size=FIELD_PX, role="plain")
-        above = hbox((self.measure, 2), label("of", "label"), (self.first, 3), self.away, spacing=8)
-        below = hbox((self.relation, 2), (self.second, 3), self.within, self.bound, spacing=8)
-        below.addSpacing(FIELD_PX + 8)
+        above = hbox((self.measure, 3), label("of", "label"), (self.first, 5), self.away, spacing=8)
+        below = hbox((self.relation, 3), (self.second, 6), self.within, self.bound, spacing=8)
         vbox(above, below, spacing=4, margins=(0, 0, 0, 6), parent=self)
 
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
