@@ -566,7 +566,7 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
     assert "even a fall" not in told(16, 1.7)
     points = smallest_differences(
         contrast, (16,), 0.06, 2, [("20", "90%", 0.9)], "trials", "SD.", "±{:.2f}".format, (0.5, 0.5), planned=16,
-        unit=" points",
+        unit=" points", titles={},
     )  # fmt: skip
     assert f"find a difference smaller than ±{least:.2f} points with 80% power" in "\n".join(points)
     assert "**The planned 5 participants are too few to find a difference in d′ of 3 SD with 80% power.**" in told(
