@@ -594,7 +594,7 @@ def unreadable(story: Story) -> None:
 
 
 def repairs(story: Story) -> None:
-    """F8 leads to a field, Tab to its repair; a letter there goes to the field; no line moves below the pointer."""
+    """F8 leads to a field, Tab to its repair; a letter there goes to the field; no repair moves below the pointer."""
     designer, problems = story.designer, story.designer.place.problems
 
     def pointer(kind: QEvent) -> None:
@@ -607,12 +607,13 @@ def repairs(story: Story) -> None:
     story.expect("4 problems")
     story.play("ctrl+1 ctrl+4")
     story.act("pointer over it", lambda: pointer(QEnterEvent(QPointF(5, 5), QPointF(5, 5), QPointF(5, 5))))
+    shown = [line.row.fault for line in problems.lines]
     story.act("repair", lambda: designer.click_on(next(line for line in problems.lines if line.repairs).repairs[0]))
     story.expect("3 problems", undo="Use 8", selected="device", at="Force limit")
     assert designer.value("device", "force_limit_n") == 8
-    shown = [line.row for line in problems.lines]
+    assert [line.row.fault for line in problems.lines] == shown, "no line moves below the pointer"
     story.ask(SetValue(VERSION, 3))
-    assert [line.row for line in problems.lines] == shown, "no line moves below the pointer"
+    assert [line.row.fault for line in problems.lines] == [row.fault for row in designer.place.view.problems]
     story.act("pointer away", lambda: pointer(QEvent(QEvent.Type.Leave)))
     assert [line.row.fault for line in problems.lines] == [row.fault for row in designer.place.view.problems]
     story.play("ctrl+z ctrl+z ctrl+1 F8")
