@@ -230,7 +230,7 @@ def hold_session(folder: StudyFolder, who: str, delays: tuple[int | None, ...]) 
     """Hold a session in whose trials the device answered after so many ticks."""
     with begun(folder.path, who, small.protocol(), b"small") as store:
         for number, ticks in enumerate(delays, start=1):
-            which = {"block": "feeling", "phase": "main", "part": 1, "of": len(delays), "code": "L1"}
+            which: dict[str, Any] = {"block": "feeling", "phase": "main", "part": 1, "of": len(delays), "code": "L1"}
             store.append(TrialStarted(trial=number, attempt=1, index=number, **which))
             measured = {"loop_delay_ticks": 1, "device_delay_ticks": ticks}
             store.append(event_of("trial_ended", trial=number, attempt=1, outcome="complete", **measured))
