@@ -664,8 +664,8 @@ def contrast_section(results: Results) -> Iterator[str]:
     yield paragraph(" ".join(_tests_used(contrasts)), "soft")
     yield paragraph(_direction_words(kinds), "soft")
     yield paragraph(
-        "The p value is that of the t test. The largest p value is the largest of the t test, a bootstrap that adds a "
-        "participant as extreme as the most extreme one, and a t test corrected for skewness. The verdict depends on "
+        "The p value comes from the t test. The largest p value is the largest from the t test, a bootstrap that adds "
+        "a participant as extreme as the most extreme one, and a t test corrected for skewness. The verdict depends on "
         f"the largest p value{_holm_words(contrasts)}. The last two tests do not assume normal distributions, so "
         f"normality is not tested. {_UNADJUSTED * (len(contrasts) > 1)}{_BAYES} {_WEIGHTED * weighted}"
         f"{inclusion_words(contrast.contrast for contrast in contrasts)}",
@@ -701,7 +701,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("SD", lambda row: number(row.sd)),
         ("SE", lambda row: number(None if row.sd is None else row.sd / math.sqrt(len(row.values)))),
     )
-    logs = " For ratios, they are those of natural logarithms." * ("ratio" in kinds)
+    logs = " For ratios, they refer to natural logarithms." * ("ratio" in kinds)
     yield paragraph(f"SD is the standard deviation across participants, and SE is SD/√n.{logs}", "soft")
 
 

@@ -131,7 +131,7 @@ def test_a_text_loses_its_selection_with_the_keyboard(designer: Any) -> None:
 def test_a_liquid_file_is_chosen_before_a_liquid_changes(designer: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     preset = designer.file.parent / "presets" / "thin.toml"
     preset.parent.mkdir()
-    preset.write_text("format = 2\n[liquids.thin]\ndensity_kg_m3 = 913.5\n", encoding="utf-8")
+    preset.write_text("format = 2\n[liquids.thin]\ndensity_kg_m3 = 913.5\n", encoding="utf-8", newline="\n")
     answers = iter(["", str(preset)])
     monkeypatch.setattr("study_app.designer.form.card.choose_protocol", lambda _by, _title: next(answers))
     designer.open("kitchen", "liquids", "thin")
