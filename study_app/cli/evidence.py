@@ -416,7 +416,10 @@ _LOAD = click.Choice(("none", "gui", "gui+cpu"))
 )
 @click.option("--delays", "of_delays", is_flag=True, help="Measure the delay of the participant's picture instead.")
 @click.option(
-    "--devices", "of_devices", is_flag=True, help="Compare each emulated device with the scripted hand instead."
+    "--devices",
+    "of_devices",
+    is_flag=True,
+    help="Compare the lateness of each emulated device and the scripted hand instead.",
 )
 @click.option("--lsl", is_flag=True, help="Measure Lab Streaming Layer (LSL) streams instead.")
 @click.option(

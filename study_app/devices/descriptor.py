@@ -162,7 +162,7 @@ class DeviceDescriptor:
         for called, value, permitted in (("icon", self.icon, get_args(Icon)), ("kind", self.kind, get_args(Kind))):
             if value not in permitted:
                 raise DeviceError(
-                    f"device '{self.name}' has the unknown {called} {value!r}: choose one of {', '.join(permitted)}"
+                    f"device '{self.name}': unknown {called} {value!r}; choose one of {', '.join(permitted)}"
                 )
 
     @property

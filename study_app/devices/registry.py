@@ -113,7 +113,7 @@ def doctor_of(name: str) -> Doctor:
     if doctor is None:
         examined = ", ".join(device.usage for device in all_devices() if device.doctor is not None)
         raise DeviceError(
-            f"the doctor cannot examine '{name}'; it examines only {examined}: see 'liquid-study devices list'"
+            f"the doctor command does not support '{name}', only {examined}: see 'liquid-study devices list'"
         )
     return doctor
 

@@ -161,7 +161,7 @@ class Block(Table):
     break_every: int | None = Field(
         default=None, ge=1, le=10_000, description="Number of trials between breaks; default: no breaks."
     )
-    break_page: Id | None = Field(default=None, description="The page shown during a break (a page of kind break).")
+    break_page: Id | None = Field(default=None, description="The page shown during a break; its kind is 'break'.")
     task: Id = Field(description="The participant's task in each trial.")
     questionnaire: Id | None = Field(default=None, description="The questionnaire after each trial; default: none.")
 

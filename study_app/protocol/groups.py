@@ -101,8 +101,8 @@ def _session_number_error(session: int, last: int) -> StudyError:
     """Return the error about a session number beyond the last session."""
     permitted = "only session 1" if last == 1 else f"1 to {last}"
     return StudyError(
-        f"session {session} does not exist: according to sequences, each participant in this study "
-        f"has {'1 session' if last == 1 else f'{last} sessions'}; permitted: {permitted}"
+        f"session {session} does not exist: the key sequences defines "
+        f"{'1 session' if last == 1 else f'{last} sessions'} for each participant; permitted: {permitted}"
     )
 
 

@@ -289,7 +289,7 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
         advice = "" if well else f"{value}, {about}: free up some disk space"
         yield Check("Free space", "ok" if well else "failure", value, about=about, advice=advice)
 
-    about = "the key is drawn and sealed when the first session begins"
+    about = "the key is generated and sealed when the first session begins"
     if facts.key_hash is not None:
         about = f"the key is sealed; its hash begins with {facts.key_hash[:8]}"
     yield Check("Blinding", "ok", f"{protocol.study.blinding}-blind", about=about)

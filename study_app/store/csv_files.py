@@ -249,7 +249,7 @@ def write_columns(path: Path, table: np.recarray[Any, Any]) -> None:
             row = int(np.argmin(finite))
             raise StudyError(
                 f"{path} was not written, because {name} is {table[name][row]} in row {row + 1}; it must be finite: "
-                "reduce positions, speeds or parameters"
+                "use smaller positions, speeds or parameter values"
             )
     write_file(path, csv_text_of([names, *zip(*(table[name].tolist() for name in names), strict=True)]).encode())
 

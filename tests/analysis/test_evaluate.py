@@ -110,7 +110,7 @@ def test_of_five_no_pair_is_there_and_it_says_why(rek: Folder) -> None:
     why = "5 participants cannot show a difference between two conditions: the smallest attainable p is .062, and .188"
     assert liquids.absent[0].why.startswith(f"{why} after Holm's correction for 3 pairs, which is above 0.05")
     assert [one.what for one in delays.absent] == [
-        "lowest delay with a trend",
+        "shortest delay with a trend",
         "detection threshold",
         "cumulative mixed model",
     ]

@@ -484,9 +484,9 @@ def test_a_name_that_is_none_is_refused_with_those_there_are(name: str) -> None:
 
 
 def test_a_device_without_a_doctor_is_told_which_devices_have_one() -> None:
-    with pytest.raises(DeviceError, match="the doctor cannot examine 'mouse'; it examines only ") as refused:
+    with pytest.raises(DeviceError, match="the doctor command does not support 'mouse', only ") as refused:
         doctor_of("mouse")
-    listed = str(refused.value).partition("it examines only ")[2].partition(": see ")[0].split(", ")
+    listed = str(refused.value).partition("', only ")[2].partition(": see ")[0].split(", ")
     assert sorted(listed) == sorted(device.usage for device in DEVICES if device.doctor is not None)
 
 

@@ -62,7 +62,7 @@ class TestDoctor:
 
     def test_a_device_without_wires_is_not_looked_at(self):
         refused = liquid_study("doctor", "--device", "scripted")
-        assert "the doctor cannot examine 'scripted'" in str(refused.exception)
+        assert "the doctor command does not support 'scripted'" in str(refused.exception)
 
     @pytest.mark.parametrize(
         ("fault", "words"),

@@ -50,7 +50,7 @@ def test_it_tells_its_lines_and_then_what_was_found(begin):
 def test_what_is_no_falcon_is_told_in_a_sentence(begin):
     (refused,) = answers_to_the_last(begin("mouse"))
     assert isinstance(refused, Refused)
-    assert "the doctor cannot examine 'mouse'" in refused.sentence
+    assert "the doctor command does not support 'mouse'" in refused.sentence
 
 
 def test_a_process_that_dies_is_told(begin):

@@ -131,11 +131,7 @@ class TestDeviceOfAnotherPackage:
         ("toy_broken:TOY", "TOY = 3", "toy_broken:TOY must be a DeviceDescriptor, but has the type int"),
         ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"mouse"'), "device 'mouse' already exists: rename it"),
         ("toy_broken:TOY", DESCRIPTOR.replace('"toy-hand"', '"Toy 1"'), "the device name 'Toy 1' is not permitted"),
-        (
-            "toy_broken:TOY",
-            DESCRIPTOR.replace('"simulated"', '"dreamt"'),
-            "device 'toy-hand' has the unknown kind 'dreamt'",
-        ),
+        ("toy_broken:TOY", DESCRIPTOR.replace('"simulated"', '"dreamt"'), "device 'toy-hand': unknown kind 'dreamt'"),
     ],
 )
 def test_a_broken_entry_point_is_one_row_and_every_other_device_stays(site, qtbot, value, source, reason):

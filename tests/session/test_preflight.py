@@ -126,7 +126,7 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
         (OutletStatus(title="Serial port", lost="it is gone"), "warning Serial port: not available; it is gone"))),
     ("small", {"key_hash": "01234567" + 56 * "8"}, "ok Blinding: double-blind; the key is sealed; its hash begins with "
      "01234567"),
-    ("small", {"key_hash": None}, "ok Blinding: double-blind; the key is drawn"),
+    ("small", {"key_hash": None}, "ok Blinding: double-blind; the key is generated"),
     *(("small", {"device": device, "dynamics": dynamics, "velocity_errors": errors},
        f"{told}{unknown}" if device != "mouse" else "")
       for device in ("force-dimension:7", "mouse")

@@ -152,7 +152,7 @@ def line_words(participants: int) -> str:
 
 
 def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float) -> None:
-    """Mark the lowest delay with a trend by a dashed line, with its value on the side that has more room."""
+    """Mark the shortest delay with a trend by a dashed line, with its value on the side that has more room."""
     if lowest_ms is None:
         return
     dashed: Style = {"linewidth": 0.9, "linestyle": (0, (3, 2)), "zorder": 3, "gid": f"{axes.get_label()}-lowest"}
@@ -191,7 +191,7 @@ _RIGHT_PT: Final = 26.0
 def draw_threshold(
     threshold: Threshold, shares_of: Mapping[str, Mapping[float, float]], lowest_ms: float | None, look: Look
 ) -> Sheet:
-    """Draw shares, the fitted curve, its threshold with interval, and (dashed) the lowest delay with a trend.
+    """Draw shares, the fitted curve, its threshold with interval, and (dashed) the shortest delay with a trend.
 
     ``shares_of`` are each participant's shares by delay, drawn as small points.
     """
@@ -533,8 +533,8 @@ def answers_picture(
 ) -> Picture:
     """Draw a block's answers: diverging bars per setting or, for delays, a plot per statement against delay.
 
-    ``lowest`` maps items to the lowest delay with a trend [ms], which is marked. Raises AnalysisError if no session was
-    completed.
+    ``lowest`` maps items to the shortest delay with a trend [ms], which is marked. Raises AnalysisError if no session
+    was completed.
     """
     if not len(study.answers(block)):
         columns = ["participant", "session", "status", "excluded"]
@@ -549,7 +549,7 @@ def answers_picture(
     words = _caption(study, block)
     if lowest:
         words += (
-            " Dashed line: lowest delay with a trend (step-down test, error rate controlled across all statements); "
+            " Dashed line: shortest delay with a trend (step-down test, error rate controlled across all statements); "
             "it is an upper bound for the lowest noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)

@@ -165,7 +165,7 @@ def people_picture(
     groups = sorted({*members.values()})
     if study.split and not any(column.group for panel in panels for column in panel.columns):
         panels = [panel.split(members, groups) for panel in panels]
-        caption += " Diamonds show the mean of each group with Student's 95 % interval."
+        caption += " Diamonds show group means with 95 % confidence intervals (Student's t)."
     people = {person for panel in panels for column in panel.columns for person in column.values}
     own = {person: group for person, group in members.items() if person in people}
     shown = own if study.split in ("", EACH_GROUP) else None

@@ -244,7 +244,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         against, result = self.value, self.found
         if against and result.n < fewest_participants((first := against[0].found).alpha, first.bound):
             yield (
-                f"{lead_phrase(result)}: a comparison can count as equivalent only with "
+                f"{lead_phrase(result)}: equivalence can only be concluded with "
                 f"{min_sample_reason(first.alpha, first.bound)}. This study has {counted(result.n, 'participant')}."
             )
         open_ones = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
@@ -271,7 +271,7 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
 @dataclass(frozen=True, slots=True)
 class Lowest:
-    """The lowest delay with a trend in one statement, found by stepping down.
+    """The shortest delay with a trend in one statement, found by stepping down.
 
     The error rate of ``steps`` is controlled within the statement; that of ``over_all_ms``, the lowest delay whose
     steps all have p ≤ alpha / ``members``, over all statements of the family.
@@ -293,12 +293,12 @@ class Lowest:
 
 
 class LowestDelay(Finding[tuple[Lowest, ...]]):
-    """The lowest delay with a trend, stepping down from the longest."""
+    """The shortest delay with a trend, stepping down from the longest."""
 
     key = "lowest"
     place = 6
     row_place = 9
-    what = "lowest delay with a trend"
+    what = "shortest delay with a trend"
     kinds = ("delays",)
     waits = ("delays",)
     empty = ()
@@ -331,10 +331,10 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
                 yield row | {"item": lowest.item, "comparison": f"up to {step.longest_ms:g} ms"}
 
     def section(self) -> Iterator[str]:
-        """Yield the lowest delay with a trend, by statement."""
+        """Yield the shortest delay with a trend, by statement."""
         if not self.value:
             return
-        yield heading(3, "The lowest delay with a trend")
+        yield heading(3, "The shortest delay with a trend")
         yield table_of(
             self.value,
             ("Statement", lambda lowest: short_text(self.found, lowest.item)),

@@ -209,7 +209,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
             ("independent", "each interval is compared with known alternatives"),
         ),
     ),
-    optional("d_prime_other", "number", "Sensitivity under the other model."),
+    optional("d_prime_other", "number", "Sensitivity (d′) under the alternative to d_prime_model."),
     optional(
         "criterion",
         "number",

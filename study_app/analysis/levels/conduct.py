@@ -146,7 +146,7 @@ class Delivery(LevelStatistic[_Row]):
 
 def _rule(row: _Row) -> str:
     excludes = row["wrong"] / row["n"] > row["most"]
-    return f"{'excluded: above' if excludes else 'kept: not above'} {100 * row['most']:g} %"
+    return f"{'excluded: more than' if excludes else 'kept: at most'} {100 * row['most']:g} %"
 
 
 class _CatchTrials(LevelStatistic[_Row]):

@@ -818,7 +818,7 @@ HEADS: Final[dict[Question, str]] = {
     "settings differ": "conditions differ",
     "trend": "trend over delay",
     "lowest delay": "trend up to this delay",
-    "equivalence": "delay is equivalent",
+    "equivalence": "equivalent to the control",
 }
 """What a study shows, as the vertical axis of its plots says it."""
 

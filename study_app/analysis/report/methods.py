@@ -182,7 +182,7 @@ def _apparatus(study: Study) -> str:
     )
     device_words += f"{device['force_limit_n']:g} N"
     if _WITHOUT_FORCE.issuperset(names):
-        device_words = f"a device without force ({listed(names)})"
+        device_words = f"a device without force feedback ({listed(names)})"
     velocity = {None: "", "device": "; its velocity was measured by the device"}.get(
         study.estimator, f"; its velocity was estimated with the {study.estimator} filter"
     )

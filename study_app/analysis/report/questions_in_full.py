@@ -55,7 +55,7 @@ def appendix(contents: Sequence[RecordedContent]) -> Iterator[str]:
         yield bullets(sentences)
     if several:
         yield paragraph(
-            "The changes were identified from the receipts, which do not contain liquids or conditions.", "soft"
+            "The changes were identified from the receipts, which do not record liquids or conditions.", "soft"
         )
 
 

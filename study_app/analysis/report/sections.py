@@ -211,7 +211,7 @@ def _low_power(results: Results) -> Iterator[str]:
         kind, size = ("ratio", f"×/÷ {number(math.exp(least))}") if result.ratio else ("difference", number(least))
         yield (
             f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "
-            f"be found with {power}, so a smaller {kind} may exist."
+            f"be detected with {power}; a smaller one cannot be ruled out."
         )
 
 

@@ -82,7 +82,7 @@ def cumulative_model(
     design = np.eye(conditions)[:, 1:] if columns is None else np.asarray(columns, dtype=np.float64)
     if design.ndim != 2 or len(design) != conditions:
         raise AnalysisError(
-            f"columns of shape {design.shape} do not describe {conditions} conditions; specify a row each"
+            f"columns of shape {design.shape} do not match {conditions} conditions; specify one row for each condition"
         )
     given = ~np.isnan(array)
     takes_part = given.any(axis=(1, 2))
@@ -98,7 +98,7 @@ def cumulative_model(
         incomplete=int((given[takes_part].any(axis=2).sum(axis=1) < conditions).sum()),
     )
     if n < _FEWEST or len(np.unique(answered[~np.isnan(answered)])) < 2:
-        few = f"there are fewer than {_FEWEST} participants, for whom its error rate was not measured"
+        few = f"there are fewer than {_FEWEST} participants; the error rate of the test was not measured for so few"
         note = few if n < _FEWEST else "all participants gave the same answer in all conditions"
         return replace(model, no_interval=note, note=note)
     return _fitted(model, _Likelihood(answered, design, slopes=columns is not None and several == 1), direction)

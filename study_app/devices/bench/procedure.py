@@ -319,7 +319,13 @@ def _lines(results: Found, day: str) -> Iterator[str]:
         yield f"| {label} | {_row(tuple(getattr(motion, name) for motion in results.motions), digits)} |"
     if not results.fits:
         yield from ("", _NOT_FREE)
-    yield from ("", "## Largest stable damping", "", "| axis | N·s/m | why it ended |", "| --- | ---: | --- |")
+    yield from (
+        "",
+        "## Largest stable damping",
+        "",
+        "| axis | damping [N·s/m] | reason for stopping |",
+        "| --- | ---: | --- |",
+    )
     for axis, damping in zip(_AXES, results.damping, strict=True):
         yield f"| {axis} | {damping.damping_nspm:.0f} | {_ENDED[damping.ended]} |"
     yield from (

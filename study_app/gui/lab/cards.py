@@ -403,7 +403,7 @@ class _LimiterLine(Themed, QWidget):
             self.name.setFont(font("label", weight=weight))
             self.count.setFont(font("label", weight=weight, tabular=True))
             self.update()
-        self.setAccessibleName(f"{limiter.name}: {self.word.text() or 'did not act'}, {limiter.ticks} ticks")
+        self.setAccessibleName(f"{limiter.name}: {self.word.text() or 'inactive'}, {limiter.ticks} ticks")
 
     def paintEvent(self, _event: QPaintEvent) -> None:
         t = self.theme

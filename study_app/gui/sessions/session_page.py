@@ -172,7 +172,7 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bo
     if not judged:
         return f"Trials have not been measured yet.{later}"
     if not outside:
-        every = "The measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
+        every = "The only measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
         return f"{every} met the study's limits.{later}"
     return (
         f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded one of the study's "

@@ -52,7 +52,7 @@ def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float
     if jitter_ms:
         yield f"force jitter of {jitter_ms:g} ms"
     if loss:
-        yield f"{100 * loss:g} % of forces lost"
+        yield f"{100 * loss:g} % of force updates lost"
 
 
 def has_imperfect_link(protocol: Protocol) -> bool:

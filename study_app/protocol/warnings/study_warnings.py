@@ -341,7 +341,7 @@ def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Itera
         "liquid": ("liquid_ids",),
         "view": ("seen",),
         "visual delay": (DELAY,),
-        "late or lost force": tuple(OF_LINK),
+        "delay or loss of the force": tuple(OF_LINK),
     }
     for name in block.conditions:
         pair = [protocol.conditions[condition] for condition in (name, standard)]

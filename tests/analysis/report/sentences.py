@@ -866,7 +866,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"{LEAD}(.*) was in position (\d+) for all participants, so its effect cannot be distinguished from the effect "
      rf"of "
      r"that position\.", same_position),
-    (rf"{LEAD}a comparison can count as equivalent only with at least (\d+) participants\.", too_few_for_equivalence),
+    (rf"{LEAD}equivalence can only be concluded with at least (\d+) participants\.", too_few_for_equivalence),
     (rf"A smaller sample has more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of the "
      rf"population; if the answers of such a minority differ by {R} points, they shift the mean by as much as the "
      r"bound\.", missed_minority),
@@ -909,8 +909,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"shift the mean by as much as the bound\.",
      when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
     (rf"Hypothesis(?: (\d+))?: (?:with )?{N} participants (?:and the observed variation between them, a mean "
-     rf"difference must be at least {R} to be found with 80 % power, so a smaller difference may exist|are too few to "
-     r"find even (a difference of 3 SD|the largest difference on the scale) with 80 % power)\.", low_power),
+     rf"difference must be at least {R} to be detected with 80 % power; a smaller one cannot be ruled out|are "
+     r"too few to find even (a difference of 3 SD|the largest difference on the scale) with 80 % power)\.", low_power),
     (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Some participants were excluded from a test because a value was missing \(.*\)\.",

@@ -56,7 +56,7 @@ def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
             " A virtual ball with a diameter of 68 mm moved 10 times"
         )[0]
     assert said == {
-        "mouse": "device without force (mouse).",
+        "mouse": "device without force feedback (mouse).",
         "falcon:12": "haptic device (falcon); forces were computed at 1000 Hz and limited to 8 N.",
         "answers-only": "",
     }

@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_pdf")]
 
 
 def test_the_caption_of_delays_says_what_is_dashed(of_twelve: Path) -> None:
-    assert "Dashed line: lowest delay with a trend (step-down test" in read(of_twelve)
+    assert "Dashed line: shortest delay with a trend (step-down test" in read(of_twelve)
 
 
 def test_every_answer_stands_beside_its_figure_and_the_page_is_small(of_twelve: Path) -> None:

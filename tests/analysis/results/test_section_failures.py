@@ -22,7 +22,7 @@ TESTS = {
     "findings.recognition.recognition": ("liquids", "recognition test"),
     "findings.statement_tests.slope_tests": ("liquids", "test of means"),
     "findings.statement_tests.trend": ("delays", "trend test"),
-    "findings.delays.step_down": ("delays", "lowest delay with a trend"),
+    "findings.delays.step_down": ("delays", "shortest delay with a trend"),
     "findings.delays.tost": ("delays", "equivalence test"),
     "findings.delays.noticed": ("delays", "detection threshold"),
 }
@@ -32,7 +32,7 @@ WRITING = {
     "report.write_report.sections.of_levels": "texts: findings",
     "report.write_report.r_script": "report.R",
     "report.write_report.motion_csv": "motion.csv",
-    "findings.delays.LowestDelay.section": "lowest delay with a trend",
+    "findings.delays.LowestDelay.section": "shortest delay with a trend",
     "report.write_report.sections.conduct": "section “How the study was run”",
 }
 

@@ -89,7 +89,7 @@ def test_what_has_no_model_says_why() -> None:
     assert few.p is same.p is apart.p is None
     with pytest.raises(AnalysisError, match="at least 2"):
         cumulative_model(np.ones((9, 1, 1)))
-    with pytest.raises(AnalysisError, match="3 conditions; specify a row each"):
+    with pytest.raises(AnalysisError, match="3 conditions; specify one row for each condition"):
         cumulative_model(np.ones((9, 3, 1)), DELAYS)
 
 

@@ -46,7 +46,10 @@ def test_a_session_beyond_the_last_is_refused() -> None:
     study = sessions()
     assert steps_of(study, None, 2) == ("thick", "thin", "end")
     for refused in (lambda: steps_of(study, None, 3), lambda: check_session_number(study, 3)):
-        with pytest.raises(StudyError, match=r"^session 3 does not exist: .* has 2 sessions; permitted: 1 to 2$"):
+        with pytest.raises(
+            StudyError,
+            match=r"^session 3 does not exist: .* defines 2 sessions for each participant; permitted: 1 to 2$",
+        ):
             refused()
     check_session_number(study, 2)
 

@@ -85,4 +85,4 @@ def test_the_analysis_finds_delivered_delays_and_what_safety_withheld(rehearsed:
     assert ["Force held back by the safety layer" in one for one in sections] == [True, False]
     (block,) = (one for one in study.levels if one.id == "named")
     names = {one.condition: setting_name(one, block.settings) for one in block.settings}
-    assert names == {"water": "Water, force delayed by 15 ms, 20 % of forces lost"}
+    assert names == {"water": "Water, force delayed by 15 ms, 20 % of force updates lost"}
