@@ -5,13 +5,27 @@ from pathlib import Path
 import pytest
 
 from study_app.protocol.load import parse
+from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.streams import stream
 from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.progress import Progress
 from study_app.store.receipt import without_conditions
 from tests.journal_lines import event_of
+from tests.protocol.edited_studies import STUDIES
 from tests.protocol.trials.level_studies import text_of
+
+ORACLE = Path(__file__).parents[1] / "analysis" / "oracle"
+
+
+def assert_whole_with_key(folder: Path, text: bytes) -> None:
+    protocol = parse(text, "study")
+    open_or_draw_key(folder, protocol, random=stream(1, "key").random)
+    shown = json.loads(json.dumps(without_conditions(protocol)))
+    completed, expected = complete_protocol(shown, read_key(folder)).model_dump(), protocol.model_dump()
+    for block in (*completed["blocks"].values(), *expected["blocks"].values()):
+        block["conditions"], block["compares"] = sorted(block["conditions"]), None  # in the order of the codes
+    assert completed == expected
 
 
 @pytest.mark.parametrize(
@@ -26,10 +40,12 @@ from tests.protocol.trials.level_studies import text_of
 def test_the_protocol_is_whole_again_with_its_key_whoever_has_which_steps(tmp_path: Path, steps: Sequence[str]) -> None:
     groups = "".join(f"\n[groups.g{number}]\n{own}\n" for number, own in enumerate(steps))
     shared = () if "" in steps else (('sequence = ["viscosity"]\n', "" if steps else 'sequences = [["viscosity"]]\n'),)
-    protocol = parse(f"{text_of(*shared)}{groups}".encode(), "levels")
-    open_or_draw_key(tmp_path, protocol, random=stream(1, "key").random)
-    shown = json.loads(json.dumps(without_conditions(protocol)))
-    assert complete_protocol(shown, read_key(tmp_path)) == protocol
+    assert_whole_with_key(tmp_path, f"{text_of(*shared)}{groups}".encode())
+
+
+@pytest.mark.parametrize("path", [*map(shipped_file, shipped()), *STUDIES.glob("*.toml"), *ORACLE.glob("*.toml")])
+def test_the_protocol_of_every_study_is_whole_again_with_its_key(tmp_path: Path, path: Path) -> None:
+    assert_whole_with_key(tmp_path, path.read_bytes())
 
 
 def test_sessions_are_listed_while_a_participant_is_withdrawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from study_app.devices.rig import Rig
@@ -13,7 +14,7 @@ from study_app.errors import StoreError
 from study_app.haptics.model import gate
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.force_rules import FORCE_RULES, VERSIONS
-from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_SLEW, LIMITER_SLOPE
+from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_GLITCH, LIMITER_SLEW, LIMITER_SLOPE
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.session import replay as replay_module
@@ -83,6 +84,13 @@ def resumed_on_another_device(folder: Path) -> Path:
             wait(1500)
             runner.post(EndRequested(store.clock.seconds(), "aborted", ""))
     return place
+
+
+def test_the_task_of_an_interval_begins_with_its_first_sample_that_was_not_rejected() -> None:
+    samples = np.zeros(6, [("scene", "i4"), ("limiters", "u4"), ("time_ns", "i8")])
+    samples["scene"], samples["limiters"] = (4, 5, 5, 5, 5, 5), (0, LIMITER_GLITCH, 0, LIMITER_GLITCH, 0, 0)
+    samples["time_ns"] = (100, 200, 300, 1300, 2300, 2301)
+    assert replay_module._interval_samples(samples, 2e-6)["time_ns"].tolist() == [200, 300, 1300, 2300]
 
 
 def comes_out(place: Path, recordings: int) -> Replayed:

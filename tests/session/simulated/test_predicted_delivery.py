@@ -13,7 +13,9 @@ from study_app.cli import commands
 from study_app.designer.measures.simulation import run_simulation, simulation_of
 from study_app.gui.sessions.session_facts import sessions, status_chip
 from study_app.gui.sessions.session_page import read_record
-from study_app.protocol.load import load
+from study_app.haptics.model.scene import Scene
+from study_app.protocol.load import load, parse
+from study_app.session.simulated import predicted_delivery as predicted_delivery_module
 from study_app.session.simulated.predicted_delivery import predicted_delivery
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.exclusions import MISSING_RULE, exclusions, include
@@ -88,6 +90,22 @@ def test_all_short_trials_with_slime_are_delivered_as_predicted(device: str, tmp
     (path,) = folder.glob("data/*participants_data.csv")
     (row,) = csv.DictReader(path.read_text(encoding="utf-8").splitlines())
     assert (row["status"], row["responses"], row["trials_missing"]) == ("completed", str(TRIALS), "0")
+
+
+@pytest.mark.parametrize(("design", "missing"), [("3ifc", 38), ("4ifc", 48)])
+def test_a_trial_is_lost_where_every_attempt_has_an_undelivered_interval(
+    design: str, missing: int, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """One of five motions fails with the standard, two with the comparison: 100 · (1 − 0.8 · 0.8 · 0.6)² = 38."""
+
+    def withheld_shares(_rig: object, scene: Scene, *_: object) -> list[float]:
+        failing = 1 if scene.liquids[0].density_kg_m3 == 998.2 else 2
+        return [0.26] * failing + [0.24] * (5 - failing)
+
+    monkeypatch.setattr(predicted_delivery_module, "_withheld_shares", withheld_shares)
+    text = study_of("slime", tmp_path).read_text("utf-8").replace('"abx"\nrep', f'"{design}"\nrep')
+    prediction = predicted_delivery(parse(text.replace("repetitions = 4", "repetitions = 100").encode(), "study"), 1)
+    assert (prediction.missing, prediction.asked) == (missing, 100)
 
 
 def test_every_surface_says_that_no_trial_was_delivered(

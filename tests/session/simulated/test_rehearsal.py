@@ -17,9 +17,10 @@ from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.simulated import OBSERVER, Comparison, Observer
 from study_app.session.simulated import rehearsal
+from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
 from study_app.session.simulated.participant import AdjustingObserver
-from study_app.session.simulated.rehearsal import RehearsedSession, condition_features
+from study_app.session.simulated.rehearsal import RehearsedSession, condition_features, finish_session
 from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_out
 from study_app.session.tasks import TankView, TaskView
 from study_app.store.folders import StudyFolder
@@ -28,9 +29,12 @@ from study_app.store.journals.journal import Journal
 from study_app.store.journals.journal_events import Responses, SessionResumed
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
+from study_app.store.withdrawals import withdraw
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 from tests.session import small
+from tests.studies import made_up
+from tests.transcripts import Files
 
 HALF_M = (0.05, 0.03, 0.03)
 
@@ -152,6 +156,15 @@ def test_the_folder_of_another_study_is_named_before_an_id_that_is_used_in_it(tm
     write_description(folder, small.protocol().study)
     with pytest.raises(StoreError, match="contains the study 'small', not 'demo'"):
         rehearsal.rehearse("demo", participants=1, seed=1, results=folder.path)
+
+
+def test_no_session_is_begun_after_a_finished_one_or_a_withdrawal(tmp_path: Path) -> None:
+    study = rehearse_answers("demo", participants=2, seed=4, results=tmp_path / "demo", features=made_up("demo"))
+    withdraw(study, "P002", by="AB", reason="asked for it")
+    files, lines = Files(study), list[str]()
+    for participant in ("P001", "P002"):
+        finish_session("demo", participant, seed=1, device="scripted", results=study, progress=lines.append)
+    assert (list(files.files()), lines) == ([], [])
 
 
 @pytest.mark.slow

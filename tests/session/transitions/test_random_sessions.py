@@ -1,7 +1,9 @@
 """The transition table driven at random: no answer is lost, every trial is ended."""
 
 import copy
+from contextlib import suppress
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import pytest
@@ -43,12 +45,12 @@ from study_app.session.transitions.events import (
     WriteCompleted,
     WriteTables,
 )
-from study_app.session.transitions.page_builder import Moment, pages_of_step, preview, previewed_page
+from study_app.session.transitions.page_builder import Moment, build_page, pages_of_step, preview, previewed_page
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, initial_state
 from tests.protocol.edited_studies import text_of
 from tests.session import small
-from tests.session.transitions.states import EVENTS, event_of, state_in
+from tests.session.transitions.states import EVENTS, event_of, shown, state_in
 
 CHOICES = st.one_of(st.integers(1, 7), st.none())
 ANY_EVENT = st.one_of(
@@ -138,6 +140,17 @@ def test_every_trial_that_was_begun_is_ended_once_per_attempt(seed: int, data: s
     assert len(set(begun)) == len(begun)
     steps = state.plan.schedule.steps
     assert {trial for trial, _ in begun} == {step.number for step in steps if isinstance(step, Trial)}
+
+
+def test_the_page_that_an_event_shows_is_that_of_the_state_after_it() -> None:
+    phases = set()
+    for phase, kind in product(Phase, EVENTS):
+        with suppress(SessionError):
+            after, commands = advance(state_in(phase), event_of(kind))
+            if (page := shown(commands)) is not None:
+                assert page == build_page(after), (phase, kind)
+                phases.add(phase)
+    assert phases == set(Phase)
 
 
 def pages_of_session(shown: Any, language: str) -> list[Any]:

@@ -30,6 +30,9 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
         store.write_tables()
     with store.folder.journal.open("ab") as file:
         file.write(b'{"n":')
+    (responses,) = store.folder.path.glob("*responses_data.csv")
+    with responses.open("ab") as file:
+        file.write(b"P009,1")
     (store.folder.path / ".receipt.json.0123abcd.tmp").write_bytes(b"{")
     (study / "data" / ".x.csv.0123abcd.tmp").write_bytes(b"{")
     store.folder.recordings.mkdir()
@@ -44,6 +47,7 @@ def test_what_should_be_known_is_a_warning(study: Path, start: Start) -> None:
     for sentence in (
         "sub-P009/ses-01: is unfinished but can be resumed",
         "sub-P009/ses-01/journal.jsonl: it ends with an incomplete line of 5 bytes",
+        f"sub-P009/ses-01/{responses.name}: differs from the journal",
         "sub-P009/ses-01/journal.jsonl: contains 'weather' events, which this version does not recognise",
         "sub-P009/ses-01/.receipt.json.0123abcd.tmp: is an incomplete file",
         "sub-P009/ses-01/recordings: trial 1, attempt 1 does not have a recording: No space left on device",
