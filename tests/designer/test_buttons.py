@@ -11,6 +11,7 @@ import pytest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel
 
 from study_app.designer.document.fields import Row, rows
+from study_app.designer.document.steps import ChangeLanguage
 from study_app.designer.document.toml_edits import Set
 from study_app.protocol.source.document import Path
 from tests.designer.support.inputs import name_of
@@ -194,3 +195,28 @@ def test_each_number_of_a_form_has_the_unit_of_its_key_beside_it(designer: Any) 
                 assert texts & {*UNITS.values()} == {unit} - {""}, part.row.path
                 units.add(unit)
     assert units == {"", "mm", "s", "ms", "N", "Hz", "%", "kg/m³"}
+
+
+CODES = {"Dutch": "nl", "German": "de"}
+
+
+def test_each_button_of_a_language_copies_to_or_removes_the_language_that_it_names(designer: Any) -> None:
+    designer.open("kitchen")
+    for code in ("nl", "de"):
+        designer.editing.handle_request(ChangeLanguage("add", code))
+    designer.go_to("study")
+    text, words, names = designer.text, designer.value("pages", "welcome", "title", "en"), set()
+    for key in [key for key in _usable_buttons(designer) if {"Dutch", "German"} & set(key[-1].split())]:
+        designer.go_to("study")
+        _usable_buttons(designer)[key].click()
+        match key[-1].split():
+            case ["Copy", "the", "English", "text", "wherever", language, "is", "missing"]:
+                assert designer.value("pages", "welcome", "title") == {"en": words, CODES[language]: words}
+            case ["Remove", language, "from", "every", "text"]:
+                assert designer.value("study", "languages") == ("en", *({"nl", "de"} - {CODES[language]}))
+            case _:
+                pytest.fail(key[-1])
+        names.add(key[-1])
+        designer.editing.undo()
+        assert designer.text == text
+    assert len(names) == 4, names

@@ -5,12 +5,13 @@ from typing import Any
 
 import pytest
 import shiboken6
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
+from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
-from study_app.designer.document.toml_edits import Set
+from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.window import focus_stops
 from study_app.gui.widgets.controls import IconButton
 
@@ -310,3 +311,62 @@ def test_a_default_of_one_value_is_shown_without_brackets(designer: Any) -> None
     designer.editing.handle_request(RemoveKey(("liquids", "thin", "effects")))
     assert designer.form_row("liquids", "thin", "effects").row.default == ["drag"]
     assert designer.field("liquids", "thin", "effects").inner.list.currentText() == "drag"
+
+
+def test_conditions_are_listed_with_other_liquids_delay_and_whether_the_force_is_limited(designer: Any) -> None:
+    designer.open()
+    names = ("thin", "late", "both", "gone")
+    for path, value in (
+        (("conditions", "both"), {"liquids": ["thin", "thick"], "delay_ms": 7}),
+        (("blocks", "liquids", "conditions"), names),
+    ):
+        designer.editing.make_step("Change", Set(path, value))
+    designer.go_to("blocks", "liquids")
+    facts = designer.form_row("blocks", "liquids", "conditions").row.facts
+    assert {name: (fact.note, fact.liquid) for name, fact in zip(names, facts, strict=True)} == {
+        "thin": ("0 ms late", ("liquids", "thin")),
+        "late": ("Thin, 200 ms late", ("liquids", "thin")),
+        "both": ("2 liquids, 7 ms late", None),
+        "gone": ("not in the study", None),
+    }
+
+
+def test_the_faults_of_a_row_are_below_its_field_and_above_its_repairs(qtbot: Any, designer: Any) -> None:
+    designer.open()
+    designer.editing.make_step("Remove a key", Unset(("liquids", "thin", "density_kg_m3")))
+    designer.go_to("liquids", "thin")
+    row = designer.form_row("liquids", "thin", "density_kg_m3")
+    qtbot.waitUntil(lambda: bool(row.repairs))
+    QApplication.processEvents()
+    tops = [part.mapTo(row, QPoint()).y() for part in (row.field, row.wrong, row.repairs[0])]
+    assert tops == sorted(set(tops)), tops
+
+
+def test_a_text_is_handed_in_at_once_when_its_field_loses_the_keyboard_but_not_by_a_click(designer: Any) -> None:
+    """A click may be on what a step would remove."""
+    designer.open("kitchen", "conditions", "late")
+    line = designer.field("conditions", "late", "delay_ms").findChild(QLineEdit)
+    for number, reason in enumerate(Qt.FocusReason, start=137):
+        before = designer.value("conditions", "late", "delay_ms")
+        line.setFocus()
+        line.selectAll()
+        QTest.keyClicks(line, str(number))
+        QApplication.sendEvent(line, QFocusEvent(QEvent.Type.FocusOut, reason))
+        after = designer.value("conditions", "late", "delay_ms")
+        assert after == (before if reason == Qt.FocusReason.MouseFocusReason else number), reason
+
+
+def test_the_texts_of_questions_stand_in_a_column_for_each_language(designer: Any) -> None:
+    designer.open("kitchen")
+    designer.editing.handle_request(ChangeLanguage("add", "nl"))
+    texts = [{"en": "Thin?", "nl": "Dun?"}, {"en": "Honey" * 9, "nl": "Dik?"}, {"en": "New?", "nl": "Vers" * 20}]
+    items = designer.value(*ITEMS)
+    changed = [{**items[0], "id": f"q{number}", "text": text} for number, text in enumerate(texts)]
+    designer.editing.make_step("Change", Set(ITEMS, changed))
+    designer.go_to(*QUESTIONNAIRE)
+    places: dict[str, set[tuple[int, int]]] = {"en": set(), "nl": set()}
+    for shown in designer.place.form.findChildren(QLabel):
+        for language, found in places.items():
+            if shown.isVisible() and shown.text() in {text[language] for text in texts}:
+                found.add((shown.mapTo(designer.window, QPoint()).x(), shown.width()))
+    assert [len(place) for place in places.values()] == [1, 1], places

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
     QComboBox,
+    QLabel,
     QLineEdit,
     QPlainTextEdit,
     QWidget,
@@ -66,12 +67,15 @@ def nameless(place: Any) -> list[QWidget]:
 
 
 def cut(place: Any) -> list[str]:
-    """Return the words shown in chips and empty fields for which there is too little room."""
+    """Return the words shown in chips, empty fields and wrapped labels for which there is too little room."""
     chips = [one for one in place.form.findChildren(Chip) if one.isVisible() and one.width() < one.sizeHint().width()]
     lines = [one for one in place.form.inside.findChildren(QLineEdit) if one.isVisible() and not one.text()]
     room = [one.width() - one.fontMetrics().horizontalAdvance(one.placeholderText()) for one in lines]
-    return [one.word for one in chips] + [
-        one.placeholderText() for one, left in zip(lines, room, strict=True) if left < 0
+    wrapped = [one for one in place.form.inside.findChildren(QLabel) if one.isVisible() and one.wordWrap()]
+    return [
+        *(one.word for one in chips),
+        *(one.placeholderText() for one, left in zip(lines, room, strict=True) if left < 0),
+        *(one.text() for one in wrapped if one.height() < one.heightForWidth(one.width())),
     ]
 
 

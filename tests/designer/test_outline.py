@@ -57,6 +57,20 @@ def sequence(designer: Any) -> tuple[str, ...]:
     return tuple(designer.value("sequence"))
 
 
+def test_the_outline_scrolls_towards_the_edge_that_a_row_is_dragged_to(qtbot: Any, designer: Any) -> None:
+    designer.open()
+    tree = designer.place.outline.tree
+    tree.setFixedHeight(150)
+    start, bar = place_of(designer, *_thing(designer, 1)), tree.verticalScrollBar()
+    values = [bar.value()]
+    drag(qtbot, designer, start, QPoint(start.x(), 148), drop=False)
+    for y in (2, 2, 75):
+        values.append(bar.value())
+        event_move(tree.viewport(), QPoint(start.x(), y))
+    qtbot.keyClick(tree, Qt.Key.Key_Escape)
+    assert values[0] < values[1] > values[2] > bar.value(), values
+
+
 def test_a_row_is_dragged_to_where_the_line_is_and_esc_cancels(qtbot: Any, designer: Any) -> None:
     designer.open()
     before, text = sequence(designer), designer.text

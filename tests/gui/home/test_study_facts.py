@@ -18,6 +18,7 @@ from study_app.gui.home.study_facts import (
     study_facts,
 )
 from study_app.gui.sessions.session_facts import (
+    Extent,
     incidents_text,
     occurring_states,
     session_filter,
@@ -93,6 +94,12 @@ def told(folder: Path) -> Iterator[str]:
         yield f"go on with {offered.source}: {offered.heading}; {offered.line}"
         assert offered.folder == folder / "demo" / "data" / f"sub-{offered.participant}" / "ses-01"
     assert interrupted_session(found, [], now) is None
+
+
+def test_the_extent_of_a_study_counts_its_parts_trials_and_answers(monkeypatch):
+    extent = Extent(parts=(2, 3), settings=(17,), setting="trial", answers=(23, 5), expected_s=(61.0,))
+    monkeypatch.setattr("study_app.gui.home.study_facts.extent_of", lambda _protocol: extent)
+    assert study_facts("demo").extent == "2 to 3 parts, 17 trials, 5 to 23 answers"
 
 
 def test_sessions_are_told_as_they_were_held(tmp_path, pytestconfig):

@@ -296,6 +296,24 @@ def test_what_cannot_be_shown_is_said_in_one_sentence(
         assert opened.window.here == "home"
 
 
+def test_a_written_report_is_opened_and_of_exported_tables_the_folder(
+    qtbot: QtBot, results: Path, tmp_path: Path
+) -> None:
+    opened, file = Opened(qtbot, results), tmp_path / "report" / "report.html"
+    for button, label, path in (
+        (opened.place.report, "Open the report", file),
+        (opened.place.export, "Open the folder", file.parent),
+    ):
+        opened.click(button)
+        dialog: Any = opened.place.writing
+        dialog.editors["to"].show_value(str(file.parent))
+        dialog.show_written([file], ())
+        assert dialog.go_on.text() == label
+        opened.click(dialog.go_on)
+        assert opened.files.pop() == path
+        dialog.reject()
+
+
 def nobody_left() -> bool:
     return not any(child.name == "analysis" for child in multiprocessing.active_children())
 
