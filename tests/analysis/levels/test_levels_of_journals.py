@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.export.tables import wide_table
 from study_app.analysis.export_study import export
 from study_app.analysis.levels.tracks import OF_INTERVALS
 from study_app.analysis.report.write_report import report
@@ -92,6 +93,10 @@ def test_trials_of_tracks_have_the_condition_whose_number_is_varied(opened_level
     assert {
         level["block"]: (level["vary"], level["level"], level["direction"]) for level in levels if "vary" in level
     } == {name: (stimulus.vary, stimulus.level_kind, stimulus.direction) for name, stimulus in varied.items()}
+
+
+def test_answers_of_tracks_are_not_in_the_wide_table(opened_levels: Path) -> None:
+    assert [column.name for column in wide_table(load_study(opened_levels))[0].columns] == ["participant", "simulated"]
 
 
 def test_tracks_have_a_row_per_trial_with_what_it_presented(opened_levels: Path, tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Everything said and drawn of blocks of levels of which any number is missing, compared with reviewed files."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,11 +12,14 @@ import pytest
 from study_app import figure_style
 from study_app.analysis.data.blocks import LevelBlock, OwnDynamics
 from study_app.analysis.figures.level_figures import level_pictures
+from study_app.analysis.figures.summary_figures import estimates_of
 from study_app.analysis.levels.answers import Answers, LevelAnswers, SettingEstimate
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
 from study_app.analysis.levels.exponents import ExponentEstimate
 from study_app.analysis.levels.sensitivities import SensitivityEstimate
+from study_app.analysis.levels.statistic import LevelStatistic, statistics
 from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds
+from study_app.analysis.report import first_page
 from study_app.analysis.results import Failures, GroupAnswers, LevelsResult
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import Rated, default_design
@@ -250,3 +254,74 @@ def test_a_block_with_missing_numbers(part: int, pytestconfig: pytest.Config) ->
     kept = GOLDEN / Path(f"levels-{part}.txt")
     found = (line for number in range(6 * part, 6 * part + 6) for line in (f"== {number}", *lines_of(number)))
     compare(kept, each_once(found), pytestconfig, mask=CHANGING)
+
+
+CELLS = {
+    "thresholds": {"Standard": "standard", "threshold": "threshold", "95 % interval": "low high", "at": "compared",
+                   "width": "width", "flat width prior": "flat_width", "mean of reversals": "reversal_mean",
+                   "fit": "fit_p", "drift": "drift"},
+    "exponents": {"exponent": "exponent", "95 % interval": "low high"},
+    "settings": {"Standard": "standard", "PSE": "pse", "95 % interval": "low high", "JND": "jnd",
+                 "constant error": "constant_error", "hysteresis": "hysteresis"},
+    "sensitivities": {"d′": "d_prime", "95 % interval": "low high", "c": "criterion", "k": "criterion"},
+    "conduct": {"Standard": "standard", "trials": "trials", "repeated attempts": "repeated", "measured": "measured",
+                "mean level error": "error_mean", "largest": "error_largest", "RMS hand speed": "pace_mps",
+                "apparent mass": "apparent_mass_kg"},
+    "catches": {"session": "session", "n": "n", "incorrect": "wrong"},
+    "withheld": {"Standard": "standard", "intervals": "n", "mean": "mean_percent", "maximum": "most_percent"},
+}  # fmt: skip
+"""The numbers of a row that each column of the report's tables of levels shows."""
+OTHER_CELLS = {
+    "Participant", "Standard", "Comparison", "Level", "levels", "standards", "n", "with device damping", "percentage",
+    "rule",
+}  # fmt: skip
+"""Columns of names and of what is computed from several numbers."""
+NUMBER = re.compile(r"-?\d*\.?\d+(?:e[+-]\d+)?")
+
+
+def test_each_column_of_a_table_of_levels_shows_its_number() -> None:
+    checked = set()
+    for number in range(36):
+        found = filled(number)[1]
+        for statistic in statistics():
+            has_table = statistic.of(found) and statistic.shown is not LevelStatistic.shown
+            shown = statistic(found).shown() if has_table else ()
+            for title, cell_of in (column for column in shown if column is not None):
+                heading = re.sub(r" [\[(].*| [\d.]+ %$", "", title)
+                if (heading in OTHER_CELLS or heading[0] == "“") and heading not in CELLS.get(statistic.key, ()):
+                    continue
+                for row in statistic.of(found):
+                    values = [
+                        row[name] if isinstance(row, dict) else getattr(row, name)
+                        for name in CELLS[statistic.key][heading].split()
+                    ]
+                    numbers = [float(text) for text in NUMBER.findall(cell_of(row).replace("−", "-"))]
+                    assert numbers == ([] if None in values else pytest.approx(values, rel=0.05, abs=0.006)), title
+                    checked |= {(statistic.key, heading)} if numbers else set()
+    assert checked == {(key, heading) for key, headings in CELLS.items() for heading in headings}
+
+
+HAS_UNIT_OF_LEVELS = {"threshold": True, "pse": True, "exponent": False, "d_prime": False, "value": False}
+
+
+def test_each_sentence_of_the_first_page_on_levels_states_the_estimate_with_its_own_unit() -> None:
+    checked = set()
+    for number in range(60):
+        found = filled(number)[1]
+        if (estimates := estimates_of(found)) is None:
+            continue
+        attribute, is_weber = estimates.attribute, found.level_kind == "weber"
+        unit = f" {found.unit}" if HAS_UNIT_OF_LEVELS[attribute] and not is_weber else ""
+        before = "a Weber fraction of " if HAS_UNIT_OF_LEVELS[attribute] and is_weber else ""
+        sentences = first_page._estimate_words(found, estimates.group, attribute, estimates.words)
+        for row, sentence in zip(estimates.group, sentences, strict=True):
+            assert sentence.startswith(f"The mean {estimates.words} "), sentence
+            told = re.search(rf" was {before}(-?[\d.e-]+){unit} \((.+), n = (\d+)\)\.$", sentence.replace("−", "-"))
+            assert told is not None, sentence
+            assert float(told[1]) == pytest.approx(getattr(row, attribute), rel=0.01)
+            ends = [float(text) for text in NUMBER.findall(told[2].removeprefix("95 % "))]
+            assert ends == ([] if None in (row.low, row.high) else pytest.approx([row.low, row.high], rel=0.01))
+            assert int(told[3]) == getattr(row, "participants", row.n)
+            checked.add((attribute, is_weber))
+    assert {attribute for attribute, _ in checked} == set(HAS_UNIT_OF_LEVELS)
+    assert {("threshold", True), ("threshold", False), ("pse", True), ("pse", False)} <= checked

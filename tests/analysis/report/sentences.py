@@ -703,7 +703,8 @@ def form_times(match: re.Match[str], told: Told) -> bool:
         for part in (steps[:place], steps[place:])
     ]
     uses = list(zip(sides[::2], sides[1::2], strict=True))
-    exchanged = protocol["study"]["block_order"] != "fixed"
+    main = {name for name, block in protocol["blocks"].items() if name in steps and block["phase"] == "main"}
+    exchanged = main if protocol["study"]["block_order"] != "fixed" else set()
     between = {"b": "after “Block”", "other": "after “Other”"}
     times = {
         "before the first block"
@@ -711,12 +712,11 @@ def form_times(match: re.Match[str], told: Told) -> bool:
         else "after the last block"
         if not after
         else "between the blocks"
-        if exchanged
+        if before[-1] in exchanged
         else between[before[-1]]
         for before, after in uses
     }
-    blocks = [step for step in steps if step in protocol["blocks"]]
-    if len(uses) > 1 and all(before for before, _ in uses) and {before[-1] for before, _ in uses} == set(blocks):
+    if len(uses) > 1 and all(before for before, _ in uses) and {before[-1] for before, _ in uses} == main:
         times = {"after each main block"}
     asked = len(protocol["questionnaires"][form]["items"])
     return count(match["n"]) == asked and set(re.split(" and |, ", match["times"])) == times

@@ -156,6 +156,14 @@ def test_what_is_answered(pytestconfig: pytest.Config) -> None:
     compare(GOLDEN / "first-page.txt", lines, pytestconfig)
 
 
+def test_who_may_differ_more_is_told_of_the_delays_up_to_the_stated_one() -> None:
+    """Of twenty, no one differs up to 100 ms: the exact upper limit is 1 − 0.025 ** (1 / 20) = 16.8 %."""
+    results = of_delays(lambda person, _session, code, _item: 3 + person % 2 + 3 * (code == "D4"))
+    (text,) = [one.text for one in answers(results) if one.text.startswith("Up to ")]
+    assert text.startswith("Up to 100 ms, ")
+    assert "up to 17 % of people show" in text
+
+
 def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_the_threshold() -> None:
     def with_surer_steps(number: int, lowest: Lowest) -> Lowest:
         """Return the first two steps of one statement, and the first of the other, with a p that six digits keep."""

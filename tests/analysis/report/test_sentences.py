@@ -1,23 +1,31 @@
 """Each sentence of the reports of random studies is true of their numbers."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from study_app.analysis.contrasts import answer
 from study_app.analysis.data.blocks import other_questions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.report import methods as methods_module
+from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import empty_studies, limits, none_found
+from study_app.analysis.results import Failures
 from study_app.protocol.model import Contrast
 from tests.analysis.made_up import ITEMS
 from tests.analysis.random_studies import drawn
 from tests.analysis.report.sentences import Told, check, check_verdicts
 
 STUDIES = 300
+COVERING = {2, 9, 15, 16, 17, 19, 23, 29, 66, 68, 74, 75, 104, 106, 152, 158, 226, 263}
+"""The studies that together have every sentence, nearly every one twice; the nightly circle has them all."""
 
 
 def with_plan(rng: np.random.Generator) -> Study:
@@ -66,11 +74,14 @@ def with_forms(made: Study, rng: np.random.Generator) -> Study:
         form: {"title": None, "items": [{**question, "id": f"q{place}"} for place in range(rng.integers(1, 5))]}
         for form in ("start", "load", "end")
     }
-    order = rng.choice(["fixed", "random"])
+    order, phase = rng.choice(["fixed", "random"]), rng.choice(["main", "main", "practice"])
     kept = made.protocol | {
         "format": 2,
         "study": {"languages": ["en"], "block_order": str(order)},
-        "blocks": {"b": made.protocol["blocks"]["b"] | block, "other": block | {"title": {"en": "Other"}}},
+        "blocks": {
+            "b": made.protocol["blocks"]["b"] | block,
+            "other": block | {"title": {"en": "Other"}, "phase": str(phase)},
+        },
         "questionnaires": forms,
         "scales": {},
         "analysis": {"exclusions": rules},
@@ -102,7 +113,54 @@ def check_report(made: Study) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.variants(10)
-@pytest.mark.parametrize("number", range(STUDIES))
+@pytest.mark.parametrize(
+    "number",
+    [pytest.param(number, marks=() if number in COVERING else pytest.mark.nightly) for number in range(STUDIES)],
+)
 def test_each_sentence_is_true_of_its_numbers(number: int) -> None:
     check_report(with_plan(np.random.default_rng([9, number])))
+
+
+@pytest.mark.parametrize(
+    ("steps", "fixed", "shuffled"),
+    [
+        ("form p a b", "before the first block", "before the first block"),
+        ("p form a b", "after “P”", "after “P”"),
+        ("p a form b", "after “A”", "between the blocks"),
+        ("p a b form", "after the last block", "after the last block"),
+        ("p a form b form", "after each main block", "after each main block"),
+        ("p form a form b form", "after “P”, after “A” and after the last block",
+         "after “P”, between the blocks and after the last block"),
+    ],
+)  # fmt: skip
+def test_a_form_is_completed_between_the_blocks_if_main_blocks_are_exchanged(
+    steps: str, fixed: str, shuffled: str
+) -> None:
+    blocks = {name: {"title": {"en": name.upper()}, "phase": "main"} for name in "ab"}
+    blocks["p"] = {"title": {"en": "P"}, "phase": "practice"}
+    for order, times in (("fixed", fixed), ("random", shuffled)):
+        study: Any = SimpleNamespace(
+            protocol={"study": {"languages": ["en"], "block_order": order}, "blocks": blocks, "questionnaires": {}}
+        )
+        assert methods_module._form_times(study, tuple(steps.split()), "form") == times
+
+
+def test_missing_trials_are_those_of_included_sessions() -> None:
+    sessions = [(True, 30, 4), (False, 50, 7), (True, 20, 1)]
+    missing = [SimpleNamespace(asked=asked, count=count) for _, asked, count in sessions]
+    counted = [included for included, *_ in sessions]
+    participants = pd.DataFrame({"counted": [*counted, True], "missing": [*missing, None]})
+    study: Any = SimpleNamespace(levels=["block"], participants=participants)
+    assert methods_module._missing_trials(study).startswith("5 of 50 main trials were lost because ")
+
+
+@pytest.mark.slow
+def test_a_part_of_a_section_that_fails_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: Any) -> str:
+        raise ValueError
+
+    monkeypatch.setattr(sections, "incomplete_words", fail)
+    results = evaluate(drawn(np.random.default_rng(1)))
+    incomplete, failures = replace(results.blocks[0], incomplete={ITEMS[0]: ("P001",)}), Failures()
+    list(sections.block(incomplete, results, (), failures))
+    assert [failure.what for failure in failures.found] == ["missing answers"]
