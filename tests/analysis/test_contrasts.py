@@ -343,7 +343,7 @@ def test_limits_of_the_study_are_the_power_of_its_hypotheses_and_groups_that_exi
     )
     for place, least in enumerate(leasts, start=1):
         line = next(line for line in told if line.startswith(f"Hypothesis {place}: with {len(people)} participants"))
-        assert f"must be at least {least:.2f} to be found with 80 % power" in line
+        assert f"must be at least {least:.2f} to be detected with 80 % power" in line
     assert any(line.startswith("Participants were not assigned to groups at random") for line in told)
 
 
