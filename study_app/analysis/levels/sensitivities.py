@@ -256,10 +256,13 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
 
     def limits(self) -> Iterator[str]:
         if self.found.design in _FROM_SHARE_CORRECT and (perfect := list(filter(_is_perfect, self.own(self.found)))):
-            people = listed([str(estimate.participant) for estimate in perfect])
+            several = len(set(map(_where, self.own(self.found)))) > 1
+            people = listed(
+                [f"{row.participant} ({_where(row)})" if several else str(row.participant) for row in perfect]
+            )
             yield (
-                f"{self.found.title}: all answers of {people} were correct, so their d′ is a lower limit, which is "
-                "determined by the number of trials."
+                f"{self.found.title}: all answers of {people} were correct, so these values of d′ are lower limits "
+                "that depend on the number of trials."
             )
         if self.found.design != "2ifc" or self.found.vary is None:
             return

@@ -478,7 +478,7 @@ def deviations(study: Study) -> Deviations | None:
     """Return deviations from the plan; None without a preregistration or a planned number of participants."""
     sites = {prefix.removesuffix(DASH): read_commitment(place) for prefix, place in folders_of(study.folder).items()}
     if sites == {"": None}:  # a rehearsal or pilot has a folder of its own beside that of the study
-        sites[""] = read_commitment(study.folder.with_name(study.name))
+        sites[""] = read_commitment(study.folder.resolve().with_name(study.name))
     committed = next(filter(None, sites.values()), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:

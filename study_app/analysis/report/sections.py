@@ -181,9 +181,9 @@ def _late_devices(study: Study) -> Iterator[str]:
     if len(late):
         assumed = " or ".join(f"{ticks:g}" for ticks in sorted(set(late["loop_delay_ticks"])))
         yield (
-            f"In {len(late)} of {counted(len(rows), 'trial')} in the main blocks, the device answered after up to "
-            f"{late['device_delay_ticks'].max():g} ticks, although the servo assumed {assumed}. In these trials, the "
-            "force acted too late, and the passivity controller reduced it."
+            f"In {len(late)} of {counted(len(rows), 'trial')} in the main blocks, the device answered later than the "
+            f"servo assumed: after at least {late['device_delay_ticks'].max():g} ticks in one of them, instead of "
+            f"{assumed}. In these trials, the force acted too late, and the passivity controller reduced it."
         )
 
 

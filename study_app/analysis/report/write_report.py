@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
@@ -319,7 +320,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     files: dict[str, bytes] = {}
     for file, make in (
         ("report.R", lambda: r_script(study).encode()),
-        ("methods.txt", f"{texts['methods']}\n".replace("d_z", "dz").encode),
+        ("methods.txt", re.sub(r"\bd_z\b", "dz", f"{texts['methods']}\n").encode),
         ("tests.csv", lambda: tests_csv(results)),
         ("motion.csv", lambda: motion_csv(results)),
     ):

@@ -1,6 +1,7 @@
 """d′, criterion and shares of answers per participant, standard, comparison and level, from rows of tracks."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -134,6 +135,10 @@ def test_a_d_prime_from_correct_answers_alone_is_called_a_lower_limit() -> None:
     of_block = SimpleNamespace(title="Pairs", design="abx", vary="damping", statistics={Sensitivities.key: people})
     (limit,) = Sensitivities(cast("Any", of_block)).limits()
     assert limit.startswith("Pairs: all answers of P001 were correct")
+    others = [replace(estimate, standard=20.0) for estimate in (perfect, nearly)]
+    of_block.statistics[Sensitivities.key] = [*people, *others]
+    (limit,) = Sensitivities(cast("Any", of_block)).limits()
+    assert "all answers of P001 (8) and P001 (20) were correct" in limit
 
 
 def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is() -> None:

@@ -71,8 +71,8 @@ def test_limits_count_the_trials_in_which_the_device_answered_late() -> None:
     trials.loc[main[:3], "device_delay_ticks"] = 3.0, 4.0, 3.0
     (told,) = [line for line in limits(replace(study, trials=trials), results) if "device answered" in line]
     assert told.startswith(
-        f"In 3 of {len(main)} trials in the main blocks, the device answered after up to 4 ticks, although the servo "
-        "assumed 1. "
+        f"In 3 of {len(main)} trials in the main blocks, the device answered later than the servo assumed: after at "
+        "least 4 ticks in one of them, instead of 1. "
     )
 
 
