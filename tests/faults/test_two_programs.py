@@ -94,9 +94,9 @@ def test_two_programs_leave_a_sound_study(
             assert code == 0 or len(said.splitlines()) == 1 or words[0] in ("export", "report", "verify"), said
         assert verify_study(folder / "study").errors == (), ended
         effects = [words for words, code, _ in ended if code == 0]
-        if reveals := sum(words[0] == "unblind" for words in effects):
-            records = (folder / "study" / "blinding" / "reveals.jsonl").read_text("utf-8").splitlines()
-            assert [json.loads(record)["by"] for record in records] == ["AB"] * reveals
+        if any(words[0] == "unblind" for words in effects):  # an equal reveal is not recorded again
+            (record,) = (folder / "study" / "blinding" / "reveals.jsonl").read_text("utf-8").splitlines()
+            assert json.loads(record)["by"] == "AB"
         for words in effects:
             if words[0] == "withdraw":
                 assert not list((folder / "study" / "data").glob(f"sub-{words[2]}*"))
