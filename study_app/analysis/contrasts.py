@@ -434,9 +434,15 @@ def _measure_name(study: Study, contrast: Contrast) -> str:
     """Return the measure with the short text of its statement or question; "" if it has none."""
     if contrast.form is not None:
         where, measure = contrast.form, contrast.measure
-        scores = (f"{one.title} score" for one in study.others.scores if (one.where.id, one.name) == (where, measure))
-        questions = (one for one in study.others.questions if (one.where.id, one.id) == (where, measure))
-        named = chain(scores, (f"“{question.short}” ({question.where.title})" for question in questions))
+        scores = (
+            f"{score.title} score" for score in study.others.scores if (score.where.id, score.name) == (where, measure)
+        )
+        questions = (
+            f"“{question.short}” ({question.where.title})"
+            for question in study.others.questions
+            if (question.where.id, question.id) == (where, measure)
+        )
+        named = chain(scores, questions)
         return next(named, "")
     items = (item for block in study.blocks if block.id in contrast.blocks for item in block.items)
     item = next((item for item in items if item.id == contrast.measure), None)
@@ -529,7 +535,7 @@ def _difference_words(contrast: ContrastResult) -> str:
     )
     effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect, decimals)}"
     unadjusted = "unadjusted " * (contrast.members > 1)
-    size = "" if contrast.standardised is None else f", {_size_words(contrast.standardised)}"
+    size = "" if contrast.standardised is None else f", {_effect_size_words(contrast.standardised)}"
     return (
         f"{said} (means {means}; {effect}, {unadjusted}95 % confidence interval {interval(contrast.interval)}{size}, "
         f"{'adjusted ' * (contrast.members > 1)}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n})."
@@ -538,7 +544,7 @@ def _difference_words(contrast: ContrastResult) -> str:
 
 
 def _decimals(contrast: ContrastResult) -> int:
-    """Return the decimals with which a difference is that of the means beside it; 2 if three digits do not suffice."""
+    """Return the number of decimals (2 or 3) at which the shown difference equals that of the shown means, else 2."""
     means, effect = [side.mean for side in contrast.sides if side.mean is not None], contrast.effect
     if len(means) != 2 or effect is None or contrast.ratio or not math.isclose(means[0] - means[1], effect):
         return 2
@@ -557,7 +563,7 @@ def mean_words(side: ContrastSide, decimals: int = 2) -> str:
     return f"{number(side.mean, decimals)}{ends}"
 
 
-def _size_words(size: EffectSize | None) -> str:
+def _effect_size_words(size: EffectSize | None) -> str:
     return "–" if size is None else f"{size.name} {number(size.value)} {interval(size)}"
 
 
@@ -597,7 +603,7 @@ def contrast_methods(results: Results) -> Iterator[str]:
     if any(contrast.contrast.measure == "threshold" for contrast in contrasts):
         yield _WEIGHTED.rstrip()
     if any(contrast.standardised is not None for contrast in contrasts):
-        yield _sizes_words(contrasts)
+        yield _effect_size_notes(contrasts)
         yield _BAYES
     if bounds := [contrast for contrast in contrasts if contrast.contrast.bound is not None]:
         adjusted = f", Holm-adjusted across {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
@@ -690,7 +696,7 @@ def contrast_section(results: Results) -> Iterator[str]:
             *ends_of(lambda row: row[1]),
             words=2,
         )
-        yield paragraph(_sizes_words(contrasts), "soft")
+        yield paragraph(_effect_size_notes(contrasts), "soft")
     yield heading(3, "Descriptive statistics")
     yield table_of(
         [described for contrast in contrasts for described in _described(results, contrast)],
@@ -705,14 +711,15 @@ def contrast_section(results: Results) -> Iterator[str]:
     yield paragraph(f"SD is the standard deviation across participants, and SE is SD/√n.{logs}", "soft")
 
 
-def _sizes_words(contrasts: Sequence[ContrastResult]) -> str:
+def _effect_size_notes(contrasts: Sequence[ContrastResult]) -> str:
     logs = " For ratios, they are calculated from natural logarithms." * any(contrast.ratio for contrast in contrasts)
     return f"{_SIZES}{logs}{_DELTA * any(contrast.ordinal is not None for contrast in contrasts)}"
 
 
 def _row_words(results: Results, contrast: ContrastResult, words: str) -> str:
     """Return the name of a row: number of the hypothesis, measure, and the sides compared."""
-    place = f"{results.contrasts.index(contrast) + 1}. " if len(results.contrasts) > 1 else ""
+    places = (place for place, result in enumerate(results.contrasts, start=1) if result is contrast)
+    place = f"{next(places)}. " if len(results.contrasts) > 1 else ""
     return f"{place}{number_text.capitalised(contrast.effect_words)}: {words}"
 
 
@@ -733,14 +740,14 @@ def _described(results: Results, contrast: ContrastResult) -> Iterator[_Describe
         yield _Described(name, differences, contrast.effect, contrast.sd)
 
 
-_DIRECTIONS: Final = {"difference": "differences are first − second", "ratio": "ratios are first ÷ second"}
+_DIRECTIONS: Final = {"difference": "differences are first minus second", "ratio": "ratios are first divided by second"}
 
 
 def _direction_words(kinds: Sequence[str]) -> str:
     """Return which way differences and ratios go, and what their standard errors are."""
     logs = ", or of the mean logarithm for a ratio" * ("ratio" in kinds)
     return (
-        f"In text, figures and tables, {listed([_DIRECTIONS[kind] for kind in kinds])}, in the order of the "
+        f"In the text, figures and tables, {listed([_DIRECTIONS[kind] for kind in kinds])}, in the order of the "
         "hypothesis; effect sizes are positive if the first is higher. SE is the standard error of the mean "
         f"difference{logs}, and CI is the confidence interval of the t test."
     )

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from study_app import figure_style as style
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import Failure, Failures
-from study_app.analysis.wording import number
+from study_app.analysis.wording import number, with_d_z
 
 _T = TypeVar("_T")
 
@@ -48,7 +48,6 @@ _VARIABLES = {
 }
 """The colours of figures that the page has by name, since they change with light and dark."""
 _COLOUR = re.compile("|".join(_VARIABLES), re.IGNORECASE)
-_D_Z = re.compile(r"\bd_z\b")
 _LETTERS = re.compile(r"(<text.*?</text>)", re.DOTALL)
 HEAD = re.compile(r"^.*?(?=<svg)|<metadata>.*?</metadata>", re.DOTALL)
 _SIZE = re.compile(r'<svg [^>]*?viewBox="0 0 ([0-9.]+) ([0-9.]+)"[^>]*>')
@@ -65,9 +64,9 @@ def _environment() -> Environment:
 
 def _typeset(value: Any) -> Any:
     """Return a text with the subscript of d_z; other values are unchanged."""
-    if isinstance(value, Markup) or not isinstance(value, str) or not _D_Z.search(value):
+    if isinstance(value, Markup) or not isinstance(value, str) or "d_z" not in value:
         return value
-    return Markup(_D_Z.sub("d<sub>z</sub>", Markup.escape(value)))  # noqa: S704 - the text is escaped
+    return Markup(with_d_z(Markup.escape(value), "d<sub>z</sub>"))  # noqa: S704 - the text is escaped
 
 
 def render(template: str, **values: Any) -> Markup:

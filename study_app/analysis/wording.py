@@ -3,6 +3,7 @@
 Numbers have at most three significant digits, p values three decimals; report.json and tests.csv have all digits.
 """
 
+import re
 from collections.abc import Sequence
 from typing import Final, Protocol
 
@@ -14,6 +15,14 @@ _NUMBERS: Final = (
     *("no", "one", "two", "three", "four", "five", "six"),
     *("seven", "eight", "nine", "ten", "eleven", "twelve"),
 )
+
+
+_D_Z: Final = re.compile(r"\bd_z\b")
+
+
+def with_d_z(text: str, symbol: str) -> str:
+    """Return a text in which ``symbol`` stands for the effect size d_z."""
+    return _D_Z.sub(symbol, text)
 
 
 class Ends(Protocol):

@@ -299,7 +299,8 @@ def _liquid_rows(protocol: Protocol) -> list[tuple[str, ...]]:
     used = {liquid for condition in protocol.conditions.values() for liquid in condition.liquid_ids}
     rows: list[tuple[str, ...]] = []
     for name in protocol.liquids:
-        words = liquid_words(resolve(protocol.scene_of(name)).liquids[0].model_dump(mode="json"))
+        body = protocol.liquids[name].model_dump(mode="json").get("body")
+        words = liquid_words(resolve(protocol.scene_of(name)).liquids[0].model_dump(mode="json") | {"body": body})
         rows.append((name, words if name in used else f"{words}; not used in any condition"))
     return rows
 

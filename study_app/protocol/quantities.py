@@ -10,6 +10,7 @@ from typing import Any, Final
 
 from study_app.haptics.model.effect import Parameter
 from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.number_text import exact_text
 from study_app.protocol.model import MAX_FORCE_N
 
 _P = Parameter
@@ -127,6 +128,8 @@ def liquid_words(liquid: Mapping[str, Any]) -> str:
     region = liquid.get("region") or {"kind": "everywhere"}
     if region["kind"] != "everywhere":
         words.append(f"in a {region['kind']} ({', '.join(_parameter_words('region', region))})")
+    if body := liquid.get("body"):
+        words.append(f"with its own ball ({', '.join(_parameter_words('body', body))})")
     return ", ".join([*words, *(["effects selected automatically by size"] if effects == "auto" else [])])
 
 
@@ -139,14 +142,15 @@ def _parameter_words(table: str, values: Mapping[str, Any], defaults: Any = None
         row = QUANTITIES.get(f"{table}.{name}")
         if row is None or value is None:
             continue
-        if "kind" not in values and name != "exponent" and defaults.model_fields[name].default == value:
+        is_default = defaults is not None and "kind" not in values and defaults.model_fields[name].default == value
+        if is_default and name != "exponent":
             continue
         if row.choices:
             text = dict(row.choices).get(value, str(value))
         elif isinstance(value, list | tuple):
-            text = f"({', '.join(f'{part:g}' for part in value)})"
+            text = f"({', '.join(map(exact_text, value))})"
         else:
-            text = f"{value:g}"
+            text = exact_text(value)
         yield f"{row.label[0].lower()}{row.label[1:]} {text} {row.unit}".rstrip()
 
 

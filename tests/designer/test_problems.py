@@ -15,7 +15,8 @@ from tests.designer.support.designer import DEMO
 pytestmark = pytest.mark.slow
 
 
-def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer: Any, qtbot: Any) -> None:
+def four_problems(designer: Any, qtbot: Any) -> Any:
+    """Return the list of problems of a study without four keys, with the pointer over it."""
     text = "\n".join(line for line in DEMO.split("\n") if not line.startswith(("density_kg_m3", "min_s", "dwell_s")))
     designer.open()
     designer.editing.handle_request(RetypeFile(text))
@@ -24,6 +25,11 @@ def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer:
     problems.show()
     at = QPointF(5, 5)
     QApplication.sendEvent(problems, QEnterEvent(at, at, at))
+    return problems
+
+
+def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer: Any, qtbot: Any) -> None:
+    problems = four_problems(designer, qtbot)
     lines = tuple(problems.lines)
     qtbot.waitUntil(lambda: all(line.repairs for line in lines))
     for number, line in enumerate(lines, start=1):
@@ -39,14 +45,7 @@ def test_repairs_are_pressed_one_after_another_while_the_pointer_stays(designer:
 
 
 def test_a_problem_solved_in_the_form_leaves_the_list_under_the_pointer(designer: Any, qtbot: Any) -> None:
-    text = "\n".join(line for line in DEMO.split("\n") if not line.startswith(("density_kg_m3", "min_s", "dwell_s")))
-    designer.open()
-    designer.editing.handle_request(RetypeFile(text))
-    problems = designer.place.problems
-    qtbot.waitUntil(lambda: len(problems.problems) == 4)
-    problems.show()
-    at = QPointF(5, 5)
-    QApplication.sendEvent(problems, QEnterEvent(at, at, at))
+    problems = four_problems(designer, qtbot)
     qtbot.waitUntil(lambda: all(line.repairs for line in problems.lines))
     designer.click_on(problems.lines[0].repairs[0])
     assert [line.isEnabled() for line in problems.lines] == [False, True, True, True]

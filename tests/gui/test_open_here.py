@@ -1,4 +1,4 @@
-"""Opening a file with the system's program for it: a failure is told, with the path."""
+"""A file is opened with the system's program for it; if none can open it, a notice names the path."""
 
 import sys
 from pathlib import Path

@@ -109,6 +109,11 @@ def test_drawn_parameters_are_named_with_their_units(effect: str, kind: str, aut
         ({"effects": "auto"}, "1234 kg/m³, 0.5 Pa·s, effects selected automatically by size"),
         ({"wake": {"scaling": 5}, "effects": ["history", "wake"]},
          "1234 kg/m³, 0.5 Pa·s, wake (scaling 5 ticks), history"),
+        ({"wake": {"scaling": 1234567.25}, "effects": ["wake"]},
+         "1234 kg/m³, 0.5 Pa·s, wake (scaling 1234567.25 ticks)"),
+        ({"effects": "auto", "body": {"diameter_m": 0.037, "drag_coefficient": None, "density_kg_m3": 815.5}},
+         "1234 kg/m³, 0.5 Pa·s, with its own ball (diameter 0.037 m, body density 815.5 kg/m³), "
+         "effects selected automatically by size"),
     ],
 )  # fmt: skip
 def test_parameters_of_effects_that_do_not_act_are_left_out(changed: dict[str, Any], text: str) -> None:

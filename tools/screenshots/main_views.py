@@ -60,11 +60,9 @@ def _take_questions(camera: Camera, home: Any, theme: Theme) -> None:
 
 
 def _take_results(camera: Camera, controller: MainController, theme: Theme) -> None:
-    controller.window.go("results")
-    place: Any = controller.window.place("results")
     controller.window.resize(*HOME)
-    camera.until(lambda: place.view.studies, "the studies")
-    place.choose_study(controller.results / STUDY)
+    controller.show_study(controller.results / STUDY)
+    place: Any = controller.window.place("results")
     camera.until(
         lambda: place.view.figures and place.view.drawing is None and place.view.testing is None, "the figures"
     )

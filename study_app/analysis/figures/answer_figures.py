@@ -550,7 +550,7 @@ def answers_picture(
     if lowest:
         words += (
             " Dashed line: shortest delay with a trend (step-down test, error rate controlled across all statements); "
-            "it is an upper bound for the lowest noticeable delay."
+            "it is an upper bound for the shortest noticeable delay."
         )
     draw = partial(draw_block, study, block, lowest)
     table = pd.concat(part.aggregate(block).assign(group=group or part.split) for group, part in groups_shown(study))

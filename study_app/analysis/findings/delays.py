@@ -338,7 +338,7 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         yield table_of(
             self.value,
             ("Statement", lambda lowest: short_text(self.found, lowest.item)),
-            ("lowest", lambda row: "–" if row.over_all_ms is None else f"≤ {ms(row.over_all_ms)}"),
+            ("shortest", lambda row: "–" if row.over_all_ms is None else f"≤ {ms(row.over_all_ms)}"),
             ("uncorrected", lambda row: "–" if row.steps.lowest_ms is None else f"≤ {ms(row.steps.lowest_ms)}"),
             (
                 "longest delay and p at each step",
@@ -351,9 +351,9 @@ class LowestDelay(Finding[tuple[Lowest, ...]]):
         members = self.value[0].members
         yield paragraph(
             "If there is a trend, the longest delay is dropped and the trend is tested again; this is repeated until "
-            f"no trend remains. “Lowest” requires p ≤ alpha / {members} at every step, which controls the error rate "
+            f"no trend remains. “Shortest” requires p ≤ alpha / {members} at every step, which controls the error rate "
             f"across {all_of(members, 'statement')}; “uncorrected” requires p ≤ alpha, which controls it only within a "
-            "single statement. The lowest delay is an upper bound: it tends to be too long rather than too short, "
+            "single statement. The shortest delay is an upper bound: it tends to be too long rather than too short, "
             "because with few participants only long delays show a trend.",
             "soft",
         )

@@ -746,7 +746,7 @@ def _explained(question: Question, found: Powers) -> list[str]:
         case "lowest delay":
             return [
                 "If there is a trend, the longest delay is dropped and the rank correlations are tested again, until "
-                "no trend remains; the result is an upper bound for the lowest noticeable delay."
+                "no trend remains; the result is an upper bound for the shortest noticeable delay."
             ]
         case "equivalence":
             bound = found.plan.decided.equivalence_bound or STEPS

@@ -474,11 +474,20 @@ class Deviations:
     found: tuple[str, ...]
 
 
+def preregistration_folders(study: Study) -> dict[str, Path]:
+    """Return the folder of the preregistration for each site; for a rehearsal or pilot, it may be the study's folder.
+
+    The key is "" if the study has not been merged from sites.
+    """
+    folders = {prefix.removesuffix(DASH): folder for prefix, folder in folders_of(study.folder).items()}
+    if [*folders] == [""] and not (folders[""] / FILE).exists():
+        folders[""] = study.folder.resolve().with_name(study.name)
+    return folders
+
+
 def deviations(study: Study) -> Deviations | None:
     """Return deviations from the plan; None without a preregistration or a planned number of participants."""
-    sites = {prefix.removesuffix(DASH): read_commitment(place) for prefix, place in folders_of(study.folder).items()}
-    if sites == {"": None}:  # a rehearsal or pilot has a folder of its own beside that of the study
-        sites[""] = read_commitment(study.folder.resolve().with_name(study.name))
+    sites = {site: read_commitment(folder) for site, folder in preregistration_folders(study).items()}
     committed = next(filter(None, sites.values()), None)
     planned = (study.protocol.get("analysis") or {}).get("participants")
     if committed is None:
@@ -532,12 +541,12 @@ def deviations_section(study: Study) -> Iterator[str]:
         return
     yield heading(2, "Preregistration")
     if (committed := compared.commitment) is None:
-        lacks = (
-            f"The study's folder does not contain {FILE}, which “Write preregistration” in the designer and "
-            "liquid-study preregister write. If you have this file, copy it to that folder. "
+        missing = (
+            f"The study's folder does not contain {FILE}. “Write preregistration” in the designer or liquid-study "
+            "preregister --to writes this file. If you already have it, copy it to the folder. "
         )
-        lacks = "" if study.simulated else lacks
-        yield paragraph(f"{lacks}Only the number of participants is compared with the plan in the protocol.")
+        where = "" if study.simulated else missing
+        yield paragraph(f"{where}Only the number of participants is compared with the plan in the protocol.")
     else:
         yield paragraph(
             f"Preregistered: {committed.study}, version {committed.version}, protocol with SHA-256 "

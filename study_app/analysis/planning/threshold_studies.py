@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from study_app import __version__
-from study_app.analysis.data.blocks import decisions, display_language
+from study_app.analysis.data.blocks import block_titles, decisions, display_language
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.power_curves import (
     OF_BLOCK,
@@ -426,9 +426,9 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
 
 
 def _titles(protocol: Protocol) -> dict[str, str]:
-    """Return the titles of the blocks by id."""
-    language = display_language({"study": {"languages": protocol.study.languages}})
-    return {name: text_in(block.title, language) for name, block in protocol.blocks.items()}
+    """Return the titles of the blocks by ID, as in the report."""
+    blocks = {name: {"phase": block.phase, "title": block.title} for name, block in protocol.blocks.items()}
+    return block_titles({"study": {"languages": protocol.study.languages}, "blocks": blocks})
 
 
 def _log_bound(protocol: Protocol, contrast: Contrast) -> float | None:

@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
@@ -32,7 +31,7 @@ from study_app.analysis.levels.evaluate import level_entries
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.planned_exclusions import PlannedExclusions, Proposal, planned_exclusions
 from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
-from study_app.analysis.planning.preregistration import deviations
+from study_app.analysis.planning.preregistration import deviations, preregistration_folders
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards, figures_shown, first_page, presented_sentences
@@ -50,7 +49,7 @@ from study_app.analysis.results import (
     name,
     report_no_progress,
 )
-from study_app.analysis.wording import counted, listed
+from study_app.analysis.wording import counted, listed, with_d_z
 from study_app.errors import AnalysisError
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
@@ -176,7 +175,7 @@ def document(study: Study, results: Results, texts: Mapping[str, Any], failures:
         **{what: partial(as_json_types, text) for what, text in texts.items()},
         "results": lambda: as_json_types(results),
     }
-    if any((place / PREREGISTRATION).exists() for place in folders_of(study.folder).values()):
+    if any((folder / PREREGISTRATION).exists() for folder in preregistration_folders(study).values()):
         parts["preregistration"] = lambda: as_json_types(deviations(study))
     held = {name: failures.attempt(f"report.json, {name}", make) for name, make in parts.items()}
     content = {
@@ -320,7 +319,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     files: dict[str, bytes] = {}
     for file, make in (
         ("report.R", lambda: r_script(study).encode()),
-        ("methods.txt", re.sub(r"\bd_z\b", "dz", f"{texts['methods']}\n").encode),
+        ("methods.txt", with_d_z(f"{texts['methods']}\n", "dz").encode),
         ("tests.csv", lambda: tests_csv(results)),
         ("motion.csv", lambda: motion_csv(results)),
     ):

@@ -158,7 +158,7 @@ def _note(first: Step, lowest: float | None) -> str:
             "this is not evidence that there is none"
         )
     return (
-        f"{lowest:g} ms is the lowest delay at which the answers from {counted(first.trend.n, 'participant')} show a "
+        f"{lowest:g} ms is the shortest delay at which the answers from {counted(first.trend.n, 'participant')} show a "
         "trend; it is an upper bound, because participants may also notice shorter delays"
     )
 

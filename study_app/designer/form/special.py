@@ -610,7 +610,7 @@ def _comparisons(every: tuple[Compared, ...]) -> Iterator[dict[str, Any]]:
 
 
 def _comparison(value: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what a hypothesis compares, in any order and whatever it expects."""
+    """Return what a hypothesis compares, regardless of the order and the expected direction."""
     return {
         key: frozenset(entry) if isinstance(entry, list | tuple) else entry
         for key, entry in value.items()

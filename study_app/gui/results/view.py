@@ -208,10 +208,10 @@ def _rule_sentence(proposed: Exclusion | None) -> str:
 
 
 COLUMNS = (
-    Column("participant", "Participant", 90, 76),
-    Column("status", "Status", 120, 112),
-    Column("validity", "Validity", 110, 114),
-    Column("version", "Version", 60, 60),
+    Column("participant", "Participant", 108, 98),
+    Column("status", "Status", 112, 108),
+    Column("validity", "Validity", 100, 102),
+    Column("version", "Version", 60, 56),
 )
 _EVERY = "All states"
 

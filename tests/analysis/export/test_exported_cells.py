@@ -220,7 +220,7 @@ def test_every_cell_of_every_format_is_the_stored_one(stored: tuple[Results, dic
 
 
 def _described(path: Path) -> dict[str, dict[str, str]]:
-    """Return the description and unit that a file, or the file beside it, states for each column."""
+    """Return the description and unit of each column, as stated in the file or in its codebook."""
     if path.suffix == ".sav":
         labels = pyreadstat.read_sav(str(path), metadataonly=True)[1].column_names_to_labels
         parts = {name: label.removesuffix("]").rpartition(" [") for name, label in labels.items()}

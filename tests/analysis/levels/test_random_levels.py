@@ -275,7 +275,7 @@ OTHER_CELLS = {
     "Participant", "Standard", "Comparison", "Level", "levels", "standards", "n", "with device damping", "percentage",
     "rule",
 }  # fmt: skip
-"""Columns of names and of what is computed from several numbers."""
+"""Columns with names, and those computed from several numbers."""
 NUMBER = re.compile(r"-?\d*\.?\d+(?:e[+-]\d+)?")
 
 

@@ -16,7 +16,7 @@ from study_app.analysis.planning.preregistration import (
     deviations,
     deviations_section,
 )
-from study_app.analysis.report.write_report import report
+from study_app.analysis.report.write_report import report, report_files
 from study_app.errors import AnalysisError
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
 from study_app.store.folders import StudyFolder
@@ -119,7 +119,9 @@ def test_where_only_the_protocol_plans_participants_they_are_compared(answered: 
     )
 
 
-def test_the_preregistration_of_a_rehearsal_is_in_the_folder_of_its_study(answered: Results) -> None:
+def test_the_preregistration_of_a_rehearsal_is_in_the_folder_of_its_study(
+    answered: Results, monkeypatch: pytest.MonkeyPatch
+) -> None:
     rehearsal = answered.folder.rename(answered.folder.with_name("small-rehearsal-1"))
     (study := answered.folder.with_name("small")).mkdir()
     committed(replace(answered, folder=study), participants=7)
@@ -127,6 +129,10 @@ def test_the_preregistration_of_a_rehearsal_is_in_the_folder_of_its_study(answer
     assert compared is not None
     assert compared.commitment is not None
     assert compared.found == ("there are fewer participants than planned (3 instead of 7)",)
+    monkeypatch.chdir(rehearsal)
+    assert deviations(load_study(Path())) == compared
+    files, _ = report_files(load_study(Path()))
+    assert json.loads(files["report.json"])["preregistration"]["found"] == list(compared.found)
 
 
 def test_the_report_of_people_says_where_a_preregistration_is_missing(answered: Results) -> None:

@@ -175,7 +175,7 @@ def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_t
     results = changed(evaluate(made), LowestDelay, with_surer_steps)
     (block,) = results.blocks
     lines = list(page_lines("".join(LowestDelay(block, results).section())))
-    at = next(at for at, line in enumerate(lines) if line.startswith("Statement | lowest | uncorrected | "))
+    at = next(at for at, line in enumerate(lines) if line.startswith("Statement | shortest | uncorrected | "))
     assert [line.split(" | ")[:3] for line in lines[at + 1 : at + 3]] == [
         ["Different", "≤ 100 ms", "≤ 50 ms"],
         ["Harder", "≤ 150 ms", "≤ 50 ms"],
