@@ -534,11 +534,12 @@ def _difference_words(contrast: ContrastResult) -> str:
         else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants."
     )
     effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect, decimals)}"
-    unadjusted = "unadjusted " * (contrast.members > 1)
+    unadjusted = "unadjusted " * (contrast.members > 1) + "two-sided " * (expected is not None)
+    p_kind = "adjusted " * (contrast.members > 1) + "one-sided " * (expected is not None)
     size = "" if contrast.standardised is None else f", {_effect_size_words(contrast.standardised)}"
     return (
         f"{said} (means {means}; {effect}, {unadjusted}95 % confidence interval {interval(contrast.interval)}{size}, "
-        f"{'adjusted ' * (contrast.members > 1)}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n})."
+        f"{p_kind}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n})."
         f"{higher}{_bayes_words(contrast)}"
     )
 
@@ -654,8 +655,8 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("n", lambda row: str(row.n)),
         ("t", lambda row: number(row.statistic)),
         ("df", lambda row: "–" if row.freedom is None else str(row.freedom)),
-        ("p", lambda row: p_value(row.p)),
-        ("largest p", lambda row: p_value(row.largest_p)),
+        ("t-test p", lambda row: p_value(row.p)),
+        ("p", lambda row: p_value(row.largest_p)),
         ("adjusted p", lambda row: p_value(row.p_adjusted)) if len(contrasts) > 1 else None,
         ("equivalence p", lambda row: p_value(row.p_equivalent)) if bounds else None,
         (f"mean {' or '.join(kinds)}", lambda row: number(row.effect)),
@@ -670,9 +671,9 @@ def contrast_section(results: Results) -> Iterator[str]:
     yield paragraph(" ".join(_tests_used(contrasts)), "soft")
     yield paragraph(_direction_words(kinds), "soft")
     yield paragraph(
-        "The p value comes from the t test. The largest p value is the largest from the t test, a bootstrap that adds "
-        "a participant as extreme as the most extreme one, and a t test corrected for skewness. The verdict depends on "
-        f"the largest p value{_holm_words(contrasts)}. The last two tests do not assume normal distributions, so "
+        "The column “t-test p” is from the t test alone. The column “p” is the largest p value from the t test, a "
+        "bootstrap that adds a participant as extreme as the most extreme one, and a t test corrected for skewness. "
+        f"The verdict depends on it{_holm_words(contrasts)}. The last two tests do not assume normal distributions, so "
         f"normality is not tested. {_UNADJUSTED * (len(contrasts) > 1)}{_BAYES} {_WEIGHTED * weighted}"
         f"{inclusion_words(contrast.contrast for contrast in contrasts)}",
         "soft",

@@ -481,7 +481,7 @@ class Contrast(Table):
         where = "" if len(self.blocks) == 2 or self.is_interaction else f" in block {self.blocks[0]}"
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
-        near = "" if self.bound is None else f"; equivalent within {self.bound:g}"
+        near = "" if self.bound is None else f", with an equivalence bound of {self.bound:g}"
         kind = " (interaction)" if self.is_interaction else ""
         return f"{self.effect_words(within, measure)} {moves} {first} {joint} {second}{kind}{where}{near}"
 

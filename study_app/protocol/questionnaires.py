@@ -78,6 +78,28 @@ def score(
     return rule.factor * total + rule.offset
 
 
+def score_range(rule: Score, bounds: Mapping[str, tuple[float, float] | None]) -> tuple[float, float] | None:
+    """Return the lowest and the highest possible score; None if an item has no bounds, or a weighted sum has none.
+
+    ``bounds`` are each item's smallest and largest answer.
+    """
+    ends = [bounds.get(name) for name in rule.items]
+    known = [pair for pair in ends if pair is not None]
+    if len(known) < len(ends) or (rule.weights_from and rule.combine == "sum"):
+        return None
+    if rule.weights_from:
+        low, high = min(low for low, _ in known), max(high for _, high in known)
+    else:
+        weights = [rule.weights.get(name, 1.0) for name in rule.items]
+        total = sum(weights) if rule.combine == "mean" else 1.0
+        if total == 0:
+            return None
+        weighted = [sorted(weight * end / total for end in pair) for weight, pair in zip(weights, known, strict=True)]
+        low, high = (sum(side) for side in zip(*weighted, strict=True))
+    low, high = sorted(rule.factor * end + rule.offset for end in (low, high))
+    return low, high
+
+
 class Questionnaire(Table):
     """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
 

@@ -105,9 +105,9 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     assert found.p == pytest.approx(student.sf(expected.mean / error, 5))
     page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
     first = page[page.index('class="first"') :].replace("\u00a0", " ")
-    asked = "Threshold is higher in Late than in Prompt; equivalent within 1.25"
+    asked = "Threshold is higher in Late than in Prompt, with an equivalence bound of 1.25"
     assert first.index(asked) < first.index("Prompt: ")
-    assert f"; mean ratio {found.effect:.2f}, 95 % confidence interval" in first
+    assert f"; mean ratio {found.effect:.2f}, two-sided 95 % confidence interval" in first
     for side, own in zip(found.sides, (late, prompt), strict=True):
         assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
 

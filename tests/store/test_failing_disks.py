@@ -406,7 +406,7 @@ def problems_after(
         yield from (f"{path.name} is left" for path in set(folder.rglob(".*.tmp")) - before)
     if code != 0:
         code, message = run(writer, folder)
-        if code != 0 and not re.search("already|is not excluded", message):
+        if code != 0 and not re.search("already|has been excluded since|is not excluded", message):
             yield f"the same command fails: {code} {message}"
         yield from (f"unsound: {error}" for error in verify_study(results).errors)
         if (counts := recorded(results)) != whole:

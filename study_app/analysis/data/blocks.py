@@ -15,7 +15,7 @@ from study_app.protocol.blocks import Compared, Phase
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of, follows_in
 from study_app.protocol.presented.presentation import link_descriptions
-from study_app.protocol.questionnaires import Score, instruments, published_name
+from study_app.protocol.questionnaires import Score, instruments, published_name, score_range
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.table import text_in
 from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
@@ -567,6 +567,11 @@ class PlacedQuestion:
         return self.question.bounds(self.context)
 
     @property
+    def scale_ends(self) -> tuple[float, float] | None:
+        """The ends of its answer scale; None for a number that is entered."""
+        return None if self.question.kind_id == "number" else self.bounds
+
+    @property
     def cannot_judge(self) -> str | None:
         """The answer off the scale, or None."""
         return getattr(self.question.view(0, self.context), "cannot_judge", None)
@@ -590,6 +595,11 @@ class PlacedScore:
             return name
         published = published_name(self.instrument)
         return published if name.upper() == published else f"{published} {name}"
+
+    @property
+    def bounds(self) -> tuple[float, float] | None:
+        """The lowest and the highest possible score; None if there are none."""
+        return score_range(self.score, {question.id: question.scale_ends for question in self.questions})
 
 
 @dataclass(frozen=True, slots=True)

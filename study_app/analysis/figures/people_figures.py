@@ -18,6 +18,7 @@ from study_app import figure_style as style
 from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, picture_of
 from study_app.analysis.statistics.outcome import student_interval
+from study_app.analysis.wording import percent
 from study_app.protocol.groups import EACH_GROUP
 
 _A_ROW: Final = 3
@@ -78,11 +79,11 @@ class Column:
     ends: Mapping[str, tuple[float, float]] | None = None
     group: str = ""
 
-    def of_group(self, people: Mapping[str, str], group: str, *, log: bool) -> "Column":
-        """Return the column of one group of ``people``, with the mean of its values and Student's 95 % interval."""
+    def of_group(self, people: Mapping[str, str], group: str, *, log: bool, level: float = 0.95) -> "Column":
+        """Return the column of one group of ``people``, with the mean of its values and Student's interval."""
         values = {person: value for person, value in self.values.items() if people.get(person) == group}
         ends = None if self.ends is None else {who: own for who, own in self.ends.items() if who in values}
-        mean = mean_of(math.log(value) for value in values.values()) if log else mean_of(values.values())
+        mean = mean_of((math.log(value) if log else value for value in values.values()), level)
         if mean is not None and log:
             low, high = (None if end is None else math.exp(end) for end in (mean.low, mean.high))
             mean = Mean(value=math.exp(mean.value), low=low, high=high)
@@ -101,6 +102,7 @@ class Panel:
     share : its width as a share of all panels of a row
     line, bound : a number, and the ends of a range, to be marked
     log : whether the scale is logarithmic
+    level : the confidence level of the intervals of means
     ends : ends of the scale; by default from the numbers
     ticks : positions and names below the columns; by default each column's own
     """
@@ -113,6 +115,7 @@ class Panel:
     line: float | None = None
     bound: tuple[float, float] | None = None
     log: bool = False
+    level: float = 0.95
     ends: tuple[float, float] | None = None
     ticks: tuple[tuple[float, str], ...] = ()
 
@@ -128,7 +131,11 @@ class Panel:
 
     def split(self, people: Mapping[str, str], groups: Sequence[str]) -> "Panel":
         """Return the panel with a column for each of ``groups`` of ``people`` in place of each column."""
-        columns = [column.of_group(people, group, log=self.log) for column in self.columns for group in groups]
+        columns = [
+            column.of_group(people, group, log=self.log, level=self.level)
+            for column in self.columns
+            for group in groups
+        ]
         if len(groups) == 1:
             return replace(self, columns=tuple(columns))
         bases = np.array(self.xs)
@@ -165,7 +172,7 @@ def people_picture(
     groups = sorted({*members.values()})
     if study.split and not any(column.group for panel in panels for column in panel.columns):
         panels = [panel.split(members, groups) for panel in panels]
-        caption += " Diamonds show group means with 95 % confidence intervals (Student's t)."
+        caption += f" Diamonds show group means with {percent(panels[0].level)} confidence intervals (Student's t)."
     people = {person for panel in panels for column in panel.columns for person in column.values}
     own = {person: group for person, group in members.items() if person in people}
     shown = own if study.split in ("", EACH_GROUP) else None
@@ -193,7 +200,8 @@ def numbers_of_panels(panels: Sequence[Panel], members: Mapping[str, str] = Mapp
     for person in people:
         values = (next((it.values[person] for it in same if person in it.values), None) for same in columns.values())
         rows.append(row(person, members.get(person, ""), values))
-    means = {"value": "mean", "low": "lower end of the 95 % interval", "high": "upper end of the 95 % interval"}
+    interval = _interval_words(panels)
+    means = {"value": "mean", "low": f"lower end of the {interval}", "high": f"upper end of the {interval}"}
     for field, words in means.items():
         for group in dict.fromkeys(column.group for same in columns.values() for column in same):
             own = (next((it.mean for it in same if it.group == group), None) for same in columns.values())
@@ -201,12 +209,16 @@ def numbers_of_panels(panels: Sequence[Panel], members: Mapping[str, str] = Mapp
     return "".join("\t".join(cells) + "\n" for cells in rows)
 
 
-def mean_of(values: Iterable[float]) -> Mean | None:
-    """Return the mean with Student's 95 % interval; None without numbers."""
+def _interval_words(panels: Sequence[Panel]) -> str:
+    return f"{percent(panels[0].level)} interval"
+
+
+def mean_of(values: Iterable[float], level: float = 0.95) -> Mean | None:
+    """Return the mean with Student's interval; None without numbers."""
     array = np.array([*values], dtype=float)
     if not len(array):
         return None
-    low, high = student_interval(array)
+    low, high = student_interval(array, level)
     return Mean(value=float(array.mean()), low=low, high=high)
 
 
@@ -252,7 +264,7 @@ def draw_people(
     height = head + sum(title_pt) + sum(name_pt) + len(rows) * (panel_pt + _ROW_GAP_PT) + (8.0 if below else 2.0)
     sheet = look.sheet(height, width_pt)
     sheet.text(MARGIN_PT, 28, above, size=SMALL, colour=style.TEXT_SOFT)
-    _legend(sheet, groups)
+    _legend(sheet, groups, _interval_words(panels))
     y = head
     for row, wide, of_titles, of_names, title, name in zip(rows, widths, titles, names, title_pt, name_pt, strict=True):
         x = 0.0
@@ -293,10 +305,10 @@ def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
     return [ruler.wrap(name, room, SMALL) for _, name in panel.names]
 
 
-def _legend(sheet: Sheet, groups: Sequence[str]) -> None:
+def _legend(sheet: Sheet, groups: Sequence[str], interval: str) -> None:
     """Draw the legend of points, diamonds and groups at the right."""
     x = sheet.width_pt - MARGIN_PT
-    for words, marker, size in (("mean, 95 % interval", "D", 3.6), ("participant", "o", 2.6)):
+    for words, marker, size in ((f"mean, {interval}", "D", 3.6), ("participant", "o", 2.6)):
         x -= sheet.text_width(words, SMALL)
         sheet.text(x, 28, words, size=SMALL, colour=style.TEXT_SOFT)
         colour = style.TEXT if marker == "D" else style.PARTICIPANT

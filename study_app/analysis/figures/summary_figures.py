@@ -232,7 +232,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
     tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
     if scores:
         tables = [
-            (score.title, None, score.where, scored(study, score).rename(columns={"score": "value"}))
+            (score.title, score.bounds, score.where, scored(study, score).rename(columns={"score": "value"}))
             for score in scores
         ]
     else:
@@ -242,13 +242,7 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
             if question.where.id == where and question.bounds is not None
         ]
         tables = [
-            (
-                question.short,
-                None if question.question.kind_id == "number" else question.bounds,
-                question.where,
-                study.answers_to(question),
-            )
-            for question in asked
+            (question.short, question.scale_ends, question.where, study.answers_to(question)) for question in asked
         ]
     numbers = []
     in_hypotheses = [contrast.within for contrast in study.contrasts]

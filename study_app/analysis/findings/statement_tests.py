@@ -45,7 +45,7 @@ from study_app.analysis.statistics.outcome import Interval, Outcome, false_disco
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
 from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
 from study_app.analysis.statistics.trend import trend
-from study_app.analysis.wording import all_of, counted, listed, number, p_equals, p_value, significant
+from study_app.analysis.wording import all_of, counted, listed, number, p_equals, p_value, percent, significant
 
 ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare it with"
 
@@ -401,7 +401,9 @@ class Effects(Finding[tuple[Effect, ...]]):
         if not self.value:
             return None
         over_delay = bool(result.delays_ms)
-        bound = drawing.results.decided.equivalence_bound if over_delay else None
+        decided = drawing.results.decided
+        bound = decided.equivalence_bound if over_delay else None
+        level = 0.95 if bound is None else 1 - 2 * decided.alpha
         answers = study.answers(drawing.block)
         people = sorted(answers["participant"].unique())
         codes = {column: code for code, column in reversed(drawing.block.columns.items())}
@@ -414,7 +416,7 @@ class Effects(Finding[tuple[Effect, ...]]):
                 numbers = dict(zip(people, shown[:, place].tolist(), strict=True))
                 numbers = {who: value for who, value in numbers.items() if not math.isnan(value)}
                 words = name(result, codes[place + over_delay]).removesuffix(" ms")
-                columns.append(Column(name=words, values=numbers, mean=mean_of(numbers.values())))
+                columns.append(Column(name=words, values=numbers, mean=mean_of(numbers.values(), level)))
             panels.append(
                 Panel(
                     title=item.short,
@@ -422,6 +424,7 @@ class Effects(Finding[tuple[Effect, ...]]):
                     places=result.delays_ms[1:],
                     line=0.0 if over_delay else None,
                     bound=None if bound is None else (-bound, bound),
+                    level=level,
                     ends=None if over_delay else (LEVELS[0] - 0.5, LEVELS[-1] + 0.5),
                 )
             )
@@ -430,8 +433,8 @@ class Effects(Finding[tuple[Effect, ...]]):
             f"Each participant's answers about each {settings_noun(result)}"
         )  # fmt: skip
         caption = (
-            f"{what} ({drawing.simulated}n = {result.n}). Diamonds: means with 95 % confidence intervals (Student's "
-            "t), not corrected for the number of intervals. Conclusions are based on the tests."
+            f"{what} ({drawing.simulated}n = {result.n}). Diamonds: means with {percent(level)} confidence intervals "
+            "(Student's t), not corrected for the number of intervals. Conclusions are based on the tests."
             + (f" Band: equivalence bounds of ±{bound:g}." if bound else "")
         )
         return people_picture(

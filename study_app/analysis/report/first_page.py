@@ -241,7 +241,8 @@ def _number_words(numbers: Numbers) -> str:
         f"{number(mean.value)}{_mean_ends(mean)}{f' {_setting_words(name)}' if name else ''}" for name, mean, _ in means
     ]
     n = max(count for *_, count in means)
-    text = f"{what} was {listed(parts)} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
+    scale = "" if numbers.bounds is None else " on a scale from {:g} to {:g}".format(*numbers.bounds)
+    text = f"{what} was {listed(parts)}{scale} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
     if len(means) != 2:
         return text
     (first, one), (second, other) = numbers.by_setting

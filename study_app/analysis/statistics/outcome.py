@@ -271,12 +271,12 @@ _ROUNDING: Final = 1e-12
 """Values that differ by less than this share of them are equal."""
 
 
-def student_interval(values: Array) -> tuple[float | None, float | None]:
-    """Return the 95 % interval of a mean (Student 1908); None for a single value and for equal ones."""
+def student_interval(values: Array, level: float = 0.95) -> tuple[float | None, float | None]:
+    """Return the confidence interval of a mean (Student 1908); None for a single value and for equal ones."""
     n = len(values)
     if n < 2 or (spread := float(np.std(values, ddof=1))) <= _ROUNDING * float(np.abs(values).max()):
         return None, None
-    half = float(student.ppf(0.975, n - 1)) * spread / math.sqrt(n)
+    half = float(student.ppf((1 + level) / 2, n - 1)) * spread / math.sqrt(n)
     return float(values.mean()) - half, float(values.mean()) + half
 
 

@@ -56,6 +56,17 @@ def test_numbers_can_be_pasted_into_a_table() -> None:
     assert [row[0] for row in rows[6:]] == ["lower end of the 95 % interval", "upper end of the 95 % interval"]
 
 
+def test_means_of_an_equivalence_test_have_its_90_percent_interval() -> None:
+    """t(3) at 95 % is 2.353363; the SD of 1, 2, 4 and 5 is √(10 / 3)."""
+    panel = Panel(columns=(Column(name="Late", values=PEOPLE),), level=0.9).split(dict.fromkeys(PEOPLE, "all"), ["all"])
+    rows = dict(line.split("\t") for line in numbers_of_panels([panel]).splitlines())
+    half = 2.353363 * np.sqrt(10 / 3) / 2
+    ends = [float(rows[f"{end} end of the 90 % interval"]) for end in ("lower", "upper")]
+    assert ends == pytest.approx([3 - half, 3 + half], abs=1e-5)
+    texts = [text.get_text() for text in draw_people([panel], LOOK, above="Points").figure.findobj(Text)]
+    assert "mean, 90 % interval" in texts
+
+
 @pytest.mark.parametrize("panels", [1, 2, 5, 9])
 @pytest.mark.parametrize("shared", [True, False])
 def test_no_text_leaves_the_figure_or_touches_another(panels: int, shared: bool) -> None:

@@ -367,6 +367,7 @@ def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
         and all(mean_holds(text, side) for text, side in zip(means.split(" and "), sides, strict=True))
         and (match["adjusted"] is not None) == (len(told.results["contrasts"]) > 1)
         and (match["unadjusted"] is None) == (match["adjusted"] is None)
+        and [match[side] is None for side in ("two", "one")] == [one["contrast"]["expected"] is None] * 2
         and is_number(effect, one["effect"])
         and is_number(effect, mean)
         and is_number(match["low"], one["interval"]["low"])
@@ -793,9 +794,9 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"Agreement with {ITEM} (?:was (?P<shown>higher|lower) in .* than in .*|did not differ significantly between .*"
      r" and .*|was not significantly (?P<lower>higher|lower) in .* than in .*)"
      rf" \(means (?P<means>{R}(?: {ENDS})? and {R}(?: {ENDS})?); mean difference (?P<effect>{R})"
-     rf", (?P<unadjusted>unadjusted )?95 % confidence interval \[(?P<low>{R}), (?P<high>{R})\], "
+     rf", (?P<unadjusted>unadjusted )?(?P<two>two-sided )?95 % confidence interval \[(?P<low>{R}), (?P<high>{R})\], "
      rf"(?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
-     r"(?P<adjusted>adjusted )?p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
+     r"(?P<adjusted>adjusted )?(?P<one>one-sided )?p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
     (r"It was higher in (\S+) for (\d+) of (\d+) participants\.", higher_for_so_many),
     (r"The data are ([\d.]+) times as likely if there is (a|no) difference as if there is (one|none) \(JZS Bayes "
      r"factor, Cauchy prior with scale 0\.707\)\.", bayes_factor),

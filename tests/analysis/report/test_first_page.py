@@ -15,7 +15,7 @@ from study_app.analysis.evaluate import evaluate, evaluate_block
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, Lowest, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
-from study_app.analysis.findings.statement_tests import DelayTrend, Pairs, with_gates
+from study_app.analysis.findings.statement_tests import DelayTrend, Effects, Pairs, with_gates
 from study_app.analysis.page_layout import Drawing
 from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
@@ -183,6 +183,25 @@ def test_lowest_delays_are_told_by_statement_and_the_shortest_in_the_figure_of_t
     picture = DetectionThreshold(block, results).figure(Drawing(made, made.blocks[0], block, results, "threshold", ()))
     assert picture is not None
     assert picture.caption.endswith("the shortest delay at which any statement shows a trend, 100 ms.")
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.02])
+def test_the_figure_of_differences_has_the_intervals_of_the_equivalence_tests(alpha: float) -> None:
+    made = study(delays(DELAYS), list(everybody(delays(DELAYS), 20, rising_answer(3))), replace(DECIDED, alpha=alpha))
+    results = evaluate(made)
+    (block,) = results.blocks
+    picture = Effects(block, results).figure(Drawing(made, made.blocks[0], block, results, "effects", ()))
+    assert picture is not None
+    rows = {line.split("\t")[0]: line.split("\t")[1:] for line in picture.numbers.splitlines()}
+    level = f"{100 - 200 * alpha:.0f} %"
+    lows, highs = (rows[f"{end} end of the {level} interval"] for end in ("lower", "upper"))
+    tested = ContrastsWithControl.of(block)
+    assert len(lows) == len(tested) == 6
+    for contrast, low, high in zip(tested, lows, highs, strict=True):
+        ends = contrast.found.interval
+        assert (ends is None) == (low == "")
+        assert ends is None or [float(low), float(high)] == pytest.approx([ends.low, ends.high])
+    assert f"means with {level} confidence intervals" in picture.caption
 
 
 @pytest.mark.parametrize(("participants", "n"), [(1, 5), (10, 12), (200, 24)])
