@@ -237,6 +237,7 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures  # noqa: PLC0415
     from study_app.analysis.report.first_page import cards, presented_sentences  # noqa: PLC0415
     from study_app.analysis.report.study_figures import pictures  # noqa: PLC0415
+    from study_app.analysis.results import Failures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
     going("testing", 0.0)
@@ -248,8 +249,9 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
         drawn.append(picture)
         send(_figure(picture))
         going("drawing", _EVALUATION + (1 - _EVALUATION) * min(1.0, number / 8))
+    presented = Failures().value("the presented liquids", lambda: presented_sentences(study), {})
     page = []
-    for place, card in enumerate(cards(results, numbers, presented_sentences(study))):
+    for place, card in enumerate(cards(results, numbers, presented)):
         figure, answer = card.figure_of(drawn), " ".join(card.sentences)
         if figure is None:
             shown = FigureDrawn(name=f"answer-{place}", title=card.question, caption=answer, verdict=card.badge)

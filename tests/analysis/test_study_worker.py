@@ -119,6 +119,18 @@ def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path)
     assert asked[0].numbers.startswith("participant\t")
 
 
+def test_the_first_page_is_shown_if_the_presented_liquids_cannot_be_named(
+    study: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(_study: object) -> None:
+        raise LookupError("no such liquid")
+
+    told(OpenKey(study, "AK", "done"))
+    monkeypatch.setattr("study_app.analysis.report.first_page.presented_sentences", fail)
+    (first,) = of_kind(FirstPage, told(ReadStudy(study)))
+    assert len(first.names) == 3
+
+
 def test_trials_can_be_named_for_leaving_out_and_then_do_not_count(study: Path) -> None:
     (found,) = of_kind(StudyFound, told(ReadStudy(study)))
     number, words = found.trials["P001", 1][0]
