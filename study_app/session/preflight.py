@@ -25,7 +25,7 @@ from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.sequences import enrolment_number
 from study_app.protocol.warnings.untranslated import UntranslatedText, listed_places
 from study_app.protocol.wording.languages import language_name
-from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, SAMPLE_BYTES, sealed_bytes
+from study_app.store.blinded.sealing import recording_bytes
 from study_app.store.missing_trials import limit_reason
 from study_app.video.sources import VideosFound
 
@@ -271,9 +271,8 @@ def _screen_and_disk_checks(facts: Measurements, protocol: Protocol) -> Iterator
         value, well = f"{facts.probe_s * 1e3:.1f} ms", facts.probe_s <= _SLOW_PROBE_S
         yield _warning_unless("Results folder", value, "time to write a file", "Use a local disk.", well=well)
 
-    rates = SAMPLE_BYTES * protocol.device.rate_hz, FRAMES_BYTES_PER_S  # while measures are sealed
     planned = recordings_of(protocol) if facts.recordings else ()
-    recorded = sum(count * sum(sealed_bytes(each_s, rate) for rate in rates) for count, each_s in planned)
+    recorded = sum(count * recording_bytes(each_s, protocol.device.rate_hz) for count, each_s in planned)
     needed = _SPARE * (_TABLES_BYTES + recorded)
     about = f"a session needs about {_megabytes(needed)} MB"
     if facts.free_bytes is None:

@@ -65,6 +65,11 @@ class MissingTrials:
         return dict(Counter(limit for trial in self.missing for limit in trial.broken).most_common())
 
     @property
+    def reason_texts(self) -> list[str]:
+        """The violated limits as texts, the most frequent first."""
+        return [limit_reason(limit, self.limits) for limit in self.reasons]
+
+    @property
     def tracks(self) -> dict[tuple[str, str], int]:
         """The number of missing trials of each block and code, in the order of the trials."""
         return dict(Counter((trial.block, trial.code) for trial in self.missing))

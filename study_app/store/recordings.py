@@ -28,7 +28,7 @@ from pyarrow import parquet
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, SampleField, records
 from study_app.store.atomic import cannot_read, parse_json, read_regular, write_file
-from study_app.store.blinded.sealing import FRAMES_BYTES_PER_S, MARK, SAMPLE_BYTES, open_file, seal_file, sealed_bytes
+from study_app.store.blinded.sealing import MARK, frames_bytes, open_file, samples_bytes, seal_file
 from study_app.store.csv_files import Column, Kind
 from study_app.store.journals.journal_events import plain_json
 
@@ -331,7 +331,7 @@ class SamplesFile:
         checks = {"rows": self.check_rows, "device_force": self._device, "effect_force": self._effect}
         facts = {"format": _FORMAT, "kind": "samples", **self._facts, "dropped": dropped, "crc32": checks}
         rate_hz = self._facts["rate_hz"]
-        size = sealed_bytes((self.rows + dropped) / rate_hz, SAMPLE_BYTES * rate_hz)
+        size = samples_bytes((self.rows + dropped) / rate_hz, rate_hz)
         return self._half.finish(facts, self.rows, size, self._secret)
 
 
@@ -346,7 +346,7 @@ def write_frames(
     painted, shown, *video = frames.T
     columns = {"painted_ns": painted, "sample_ns": shown, "age_ns": painted - shown}
     half.write({**columns, **dict(zip(_NO_VIDEO, video, strict=True))})
-    size = sealed_bytes(seconds, FRAMES_BYTES_PER_S)
+    size = frames_bytes(seconds)
     return half.finish({"format": _FORMAT, "kind": "frames", **facts}, len(frames), size, secret)
 
 

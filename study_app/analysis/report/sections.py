@@ -55,7 +55,7 @@ from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of
-from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials, limit_reason
+from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials
 from study_app.store.study_runs import recorded_contents
 
 
@@ -601,12 +601,7 @@ def _missing(study: Study) -> Iterator[str]:
                     [f"{_track(study, *of)}: {n}" for of, n in lost_trials.missing.tracks.items()]
                 ),
             ),
-            (
-                "reason",
-                lambda lost_trials: listed(
-                    [limit_reason(limit, lost_trials.missing.limits) for limit in lost_trials.missing.reasons]
-                ),
-            ),
+            ("reason", lambda lost_trials: listed(lost_trials.missing.reason_texts)),
             ("session", lambda lost_trials: "included" if lost_trials.counted else "not included"),
             words=5,
         )

@@ -20,9 +20,9 @@ from study_app.store.atomic import parse_json
 from study_app.store.journals import journal_events as events
 
 MARK: Final = b"This file is sealed until the study is unblinded: liquid-study unblind RESULTS\n"
-SAMPLE_BYTES: Final = 64
+_SAMPLE_BYTES: Final = 64
 """Bytes per sample of a sealed recording: more than the samples of any device need."""
-FRAMES_BYTES_PER_S: Final = 6_000
+_FRAMES_BYTES_PER_S: Final = 6_000
 """Bytes per second for the sealed frames of a recording: enough for more than 240 frames per second."""
 _FACTS_BYTES: Final = 16_384  # of a recording without rows
 _TAG_BYTES = 16
@@ -58,8 +58,22 @@ def open_text(whose: Sequence[object], text: str, secret: bytes, names: frozense
     )
 
 
-def sealed_bytes(seconds: float, bytes_per_s: float) -> int:
-    """Return the size in bytes of a sealed recording of this duration; it is constant for up to twice the time."""
+def samples_bytes(seconds: float, rate_hz: float) -> int:
+    """Return the size in bytes of the sealed samples of a recording; it is constant for up to twice the time."""
+    return _sealed_bytes(seconds, _SAMPLE_BYTES * rate_hz)
+
+
+def frames_bytes(seconds: float) -> int:
+    """Return the size in bytes of the sealed frames of a recording; it is constant for up to twice the time."""
+    return _sealed_bytes(seconds, _FRAMES_BYTES_PER_S)
+
+
+def recording_bytes(seconds: float, rate_hz: float) -> int:
+    """Return the size in bytes of the sealed samples and frames of a recording."""
+    return samples_bytes(seconds, rate_hz) + frames_bytes(seconds)
+
+
+def _sealed_bytes(seconds: float, bytes_per_s: float) -> int:
     return _FACTS_BYTES + round(bytes_per_s * 2.0 ** math.ceil(math.log2(max(seconds, 1.0))))
 
 
