@@ -6,14 +6,12 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.haptics.model.layout import BUTTON_STOP
-from study_app.session.transitions.events import Chosen, Continue, Event, ForceStopped, Stepped, Submitted
+from study_app.session.transitions.events import STEP_S, Chosen, Continue, Event, ForceStopped, Stepped, Submitted
 from study_app.session.transitions.state import Phase, SessionState
 
 CONTINUE: Final = 1 << 0
 ANSWERS: Final = (1 << 1, 1 << 2)
 """Bits of the device's second button (first of two answers, or "less") and third (second answer, or "more")."""
-STEP_S: Final = 0.125
-"""Interval between the steps of an adjustment while a button or key is held [s]."""
 
 
 class DeviceButtons:

@@ -6,7 +6,7 @@ order given: safety of the hand first (``StopForce``, ``StopTrial``, ``Rest``), 
 """
 
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
 from study_app.protocol.questions import Value
@@ -176,6 +176,10 @@ class Retracted(Event):
     """The participant removed the answer to ``item`` by emptying its field."""
 
     item: str
+
+
+STEP_S: Final = 0.125
+"""Interval between the steps of an adjustment while a button or key is held [s]."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,9 +25,8 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.numbers import read_number
 from study_app.protocol.questions import Value, plain_number
 from study_app.protocol.wording.languages import Words
-from study_app.session.device_buttons import STEP_S
 from study_app.session.pages import ChoicePage, DesignPage, FeedbackPage, Interval, NumberPage, TaskPage
-from study_app.session.transitions.events import Chosen, ItemShown, Stepped, Submitted
+from study_app.session.transitions.events import STEP_S, Chosen, ItemShown, Stepped, Submitted
 
 _QUESTION_PX = 26
 _ASKING = 0.8  # share of the present trial's bar that is full
