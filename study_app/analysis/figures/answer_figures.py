@@ -352,6 +352,7 @@ _PANELS_A_ROW: Final = 3
 _ROW_PT: Final = 19.0
 _BAR_PT: Final = 12.4
 _LABEL_SIZE: Final = 7.5
+_COUNTED: Final = "number of answers"
 _WIDEST_ANSWER_PT: Final = 15.0
 _PANEL_PADDING_PT: Final = 7.0
 _NEUTRAL_GAP_PT: Final = 8.0
@@ -379,6 +380,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
     ruler = Sheet(style.PAGE_WIDTH_PT, 72, look.fonts)
     wrapped = [ruler.wrap(item.short, 118, _LABEL_SIZE) for item in block.items]
     label_pt = max(ruler.text_width(line, _LABEL_SIZE) for lines in wrapped for line in lines)
+    label_pt = max(label_pt, ruler.text_width(_COUNTED, SMALL))
     most = _PANELS_A_ROW - _PANELS_A_ROW % len(tables) or _PANELS_A_ROW  # the groups of a setting share a row
     columns = min(len(panels), most)
     panel_pt = (style.PAGE_WIDTH_PT - 2 * MARGIN_PT - label_pt - 6) / columns
@@ -396,7 +398,7 @@ def draw_agreement(study: Study, block: Block, look: Look) -> Sheet:
         if column == 0:
             for number, lines in enumerate(wrapped):
                 sheet.lines(MARGIN_PT, top + (number + 0.5) * _ROW_PT + 2.7, lines, 8.4, size=_LABEL_SIZE)
-            sheet.text(MARGIN_PT, top + plot_pt + 10, "number of answers", size=SMALL, colour=style.TEXT_SOFT)
+            sheet.text(MARGIN_PT, top + plot_pt + 10, _COUNTED, size=SMALL, colour=style.TEXT_SOFT)
         else:
             sheet.line((x, x), (top - 14, top + plot_pt + 10), color=style.BORDER, linewidth=0.5)
         x += (panel_pt - widths.total) / 2

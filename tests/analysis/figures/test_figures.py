@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,28 @@ def delays(study: Study, **look: Any) -> Figure:
     return drawn(study, study.blocks_of("delays")[0], **look)
 
 
+def check_texts(figure: Figure) -> None:
+    """Check that no text leaves the figure or touches another."""
+    figure.canvas.draw()  # tick labels have their places only then
+    boxes = [(text.get_text(), text.get_window_extent().padded(-1)) for text in shown(figure)]
+    width, height = figure.bbox.size
+    for word, box in boxes:
+        assert box.x0 >= 0, word
+        assert box.y0 >= 0, word
+        assert box.x1 <= width, word
+        assert box.y1 <= height, word
+    for (word, box), (other, beside) in combinations(boxes, 2):
+        assert not box.overlaps(beside), (word, other)
+
+
+def test_a_short_statement_leaves_room_for_the_title_of_the_counts(rek: Results) -> None:
+    twelve(rek, people=5)
+    rek.open()
+    study = load_study(rek.folder)
+    block = study.blocks_of("liquids")[0]
+    check_texts(drawn(study, replace(block, items=(replace(block.items[0], short="Wet"),))))
+
+
 @pytest.mark.parametrize("fonts", [style.fonts(), style.FALLBACK_FONTS], ids=["screen", "print"])
 @pytest.mark.parametrize("opened", [pytest.param(False, marks=pytest.mark.nightly), True], ids=["blinded", "opened"])
 @pytest.mark.parametrize("people", [pytest.param(1, marks=pytest.mark.nightly), 30])
@@ -42,16 +65,7 @@ def test_no_text_leaves_the_figure_or_touches_another(rek: Results, fonts, opene
         rek.open()
     study = load_study(rek.folder)
     for figure in (liquids(study, fonts=fonts), delays(study, fonts=fonts)):
-        figure.canvas.draw()  # tick labels have their places only then
-        boxes = [(text.get_text(), text.get_window_extent().padded(-1)) for text in shown(figure)]
-        width, height = figure.bbox.size
-        for word, box in boxes:
-            assert box.x0 >= 0, word
-            assert box.y0 >= 0, word
-            assert box.x1 <= width, word
-            assert box.y1 <= height, word
-        for (word, box), (other, beside) in combinations(boxes, 2):
-            assert not box.overlaps(beside), (word, other)
+        check_texts(figure)
         for text in figure.texts:
             if not text.get_text().startswith("n "):
                 assert not any(text.get_window_extent().overlaps(axes.bbox) for axes in figure.axes), text.get_text()
