@@ -255,6 +255,8 @@ class _NamesList(KeysOpenList):
         super().__init__()
         make_dense(self, name)
         self.setPlaceholderText(placeholder)
+        self.setMinimumContentsLength(12)  # a form is narrower than the longest description of a liquid
+        self.setSizeAdjustPolicy(self.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
         self.activated.connect(self._choose_at)
 
     def show_items(self, items: Iterable[tuple[str, Any]]) -> None:
