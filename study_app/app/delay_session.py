@@ -366,10 +366,10 @@ class _Painting(QObject):
         )
         participant = ParticipantWindow(words("en"), clock=time.perf_counter, windowed=shown_on is operated_on)
         place_window(operator, operated_on, corner=shown_on is operated_on)
-        task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="The servo is being timed.")
+        task = Explore(kind="explore", min_s=0.0, max_s=3600.0, instruction="Measuring the timing of the servo.")
         self._page = TaskPage(
             trial=1,
-            instruction="The servo is being timed.",
+            instruction="Measuring the timing of the servo.",
             task=task,
             workspace_m=protocol.device.workspace_m,
             body_radius_m=0.0034,

@@ -59,10 +59,10 @@ def _error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
         force = f"< {_SMALLEST_N:g} N" if errors.force_n < _SMALLEST_N else f"{errors.force_n:.3f} N"
     note = f"for drag and wake; there is no reference for {without}" if without else "along programmed paths"
     return (
-        ErrorRow(measure="Wake, relative to Σ|e|/S", value=wake, note=note),
-        ErrorRow(measure="Force, largest", value=force, note=note),
+        ErrorRow(measure="Largest relative wake error", value=wake, note=note),
+        ErrorRow(measure="Largest force error", value=force, note=note),
         ErrorRow(
-            measure="Lag of the velocity filter", value=f"{1e3 * errors.lag_s:z.1f} ms", note="at constant acceleration"
+            measure="Velocity filter lag", value=f"{1e3 * errors.lag_s:z.1f} ms", note="at constant acceleration"
         ),
     )
 

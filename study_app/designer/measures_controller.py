@@ -40,7 +40,7 @@ _IDLE_MS: Final = 20
 _REST_MS: Final = 800
 _LOOK_MS: Final = 100
 _NOT_WRITTEN: Final = "The preregistration was not written"
-_LATE: Final = "The study already has {count}, for which the text is not a preregistration."
+_LATE: Final = "The study already has {count}; the text cannot preregister data that already exist."
 _FAILED: Final = "the simulation process could not be started"
 
 
@@ -156,8 +156,8 @@ class MeasuresController(QObject):
     def _without_power(self) -> str:
         """Return why the text has no power."""
         if failed := self._latest.failed:
-            return f"The text does not include the power: {failed}"
-        return "The text does not include the power, because its simulation has not finished."
+            return f"The text does not include a power analysis: {failed}"
+        return "The text does not include a power analysis, because the simulation has not finished."
 
     def _write_text(self, file: Path, text: bytes, note: str) -> None:
         try:
@@ -165,7 +165,7 @@ class MeasuresController(QObject):
         except StudyError as error:
             self._place.message.emit(_NOT_WRITTEN, f"{error}.")
             return
-        said = f"{note} Register it before the first session. The report lists deviations from it.".lstrip()
+        said = f"{note} Register this text before the first session. The report will list deviations from it.".lstrip()
         self._place.file_message.emit("Preregistration written", f"{file}\n\n{said}", file)
         self.show_measures()
 

@@ -387,7 +387,7 @@ class ProblemsCard(Card):
         self._column = column = vbox(spacing=0, margins=0, parent=inside)
         if rows and not listed:
             column.addWidget(
-                label(f"This element does not have any problems; the others have {len(rows)}", "label", "text2")
+                label(f"This element does not have any problems; the other elements have {len(rows)}", "label", "text2")
             )
         column.addStretch()
         self.lines = []

@@ -280,7 +280,7 @@ class Saving(QObject):
         try:
             act()
         except StudyError as error:
-            self.place.message.emit("This could not be done", f"{error}.")
+            self.place.message.emit("The action failed", f"{error}.")
         self._show_banner(opened)
 
     def _show_banner(self, opened: Document) -> None:

@@ -88,7 +88,7 @@ def _kept_label(version: Kept, now: datetime) -> str:
     if version.origin == "draft":
         return f"Unsaved edits from another window, {when}"
     stated = _STATED.search((kept_content(version.hash) or b"").decode("utf-8", "replace"))
-    how = "saved" if version.origin == "saved" else "in the file before it was saved"
+    how = "saved" if version.origin == "saved" else "the file before it was saved"
     by = f" by {version.by}" if version.by else ""
     return f"{stated[1] if stated else 'No version'}: {how}{by} {when}"
 

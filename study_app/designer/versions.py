@@ -298,7 +298,7 @@ class Changes(Card):
         self.version = make_dense(Choice(), "Version to compare with")
         self.version.setMinimumWidth(120)
         self.restore = small_button("undo", "Restore", height=34)
-        self.restore.setToolTip("Restore the text of this version in a single step")
+        self.restore.setToolTip("Replace the study's text with the text of this version (one undo step)")
         self.note = label("", "label", "text2", wraps=True)
         self.difference = _DifferenceText()
         self.top = QWidget()

@@ -48,7 +48,7 @@ _CHOICES: Final = {
         _P(
             "knee.law",
             "Knee law",
-            choices=(("sqrt", "Square root"), ("square", "Square (thesis wording)"), ("none", "None")),
+            choices=(("sqrt", "Square root"), ("square", "Square (as worded in the thesis)"), ("none", "None")),
         ),
     )
 }

@@ -12,9 +12,9 @@ _Vector = tuple[float, float, float]
 
 TITLES: Final = {
     "circle": "Three circles, then a stop",
-    "reverse": "Circles, then against the flow",
+    "reverse": "Circles, then a reversal",
     "line": "Straight line",
-    "stop": "Straight, then a stop",
+    "stop": "Straight line, then a stop",
     "zigzag": "Turns of 90°",
     "reach": "Back-and-forth reaches",
 }

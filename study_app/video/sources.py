@@ -431,7 +431,7 @@ class Videos:
                 "source": without_login(camera.source),
                 "size": list(camera.size),
                 "rate_hz": round(1e9 / camera.newest.period_ns, 3),
-                "age": "unknown" if age_ns is None else "by the source's time stamps",
+                "age": "unknown" if age_ns is None else "from the source's time stamps",
             }
         return description
 

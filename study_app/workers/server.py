@@ -58,7 +58,7 @@ class Crashed:
     def sentence(self) -> str:
         """The description of the event for the user."""
         if self.exit_code is not None and self.exit_code < 0:
-            return f"the process ended with signal {-self.exit_code}"
+            return f"the process was ended by signal {-self.exit_code}"
         return f"the process ended with exit code {self.exit_code}; the terminal may show why"
 
 

@@ -122,7 +122,7 @@ def test_a_session_of_delays_is_held_and_its_recordings_are_read(qapp, monkeypat
         trials = found.on("virtual, 60 Hz", load)
         assert [trial.delay_s for trial in trials] == [0.0, 0.2]
         for trial in trials:
-            assert trial.paced == "by the clock"
+            assert trial.paced == "timed by the computer's clock"
             assert trial.frames > 2
             assert (trial.errors_ms > 1e3 * SETTLED_S - 0.001).all(), "nothing is drawn before it was settled"
 

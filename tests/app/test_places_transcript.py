@@ -116,11 +116,11 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
     asks: dict[str, Any] = {
         "entered": place.enter, "left": place.leave, "study_asked": place._choose_study,
         "remedy_asked": place._apply_remedy,
-        "leave_out_asked": lambda asked: place._order_decision("leaving out", of.LeaveOut, **exclusion(asked)),
+        "leave_out_asked": lambda asked: place._order_decision("excluding data", of.LeaveOut, **exclusion(asked)),
         "take_back_asked": lambda asked: place._order_decision(
             "reversing the exclusion", of.TakeBack, **exclusion(asked)
         ),
-        "unblind_asked": lambda by, reason: place._order_decision("opening the key", of.OpenKey, by=by, reason=reason),
+        "unblind_asked": lambda by, reason: place._order_decision("unblinding the study", of.OpenKey, by=by, reason=reason),
         "tables_asked": lambda *asked: place._start_writing(of.WriteTables, *asked),
         "report_asked": lambda to, _extras: place._start_writing(of.WriteReport, to), "stop_asked": place._stop_writing,
         "open_asked": place._opener, "choose": place.choose_study, "others": place.show_results,

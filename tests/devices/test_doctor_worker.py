@@ -58,4 +58,4 @@ def test_a_process_that_dies_is_told(begin):
     examination.process.kill()
     *_, crashed = answers_to_the_last(examination)
     assert crashed == Crashed(-9)
-    assert crashed.sentence == "the process ended with signal 9"
+    assert crashed.sentence == "the process was ended by signal 9"

@@ -118,11 +118,11 @@ _SIMULATED: Final = "scripted"
 _LOOK_S: Final = 0.01
 FOLDER: Final = "liquid-study-play-"
 _OUTCOMES: Final = {
-    "completed": "to the end",
-    "incomplete": "to the end, but some trials were not delivered",
+    "completed": "completed",
+    "incomplete": "completed, but some trials were not delivered",
     "aborted": "stopped",
     "withdrawn": "no consent",
-    "broken": "it failed",
+    "broken": "failed",
 }
 
 
@@ -266,7 +266,7 @@ class Playing(QObject):
         session, pilot.session = pilot.session, None
         self._left = [earlier for earlier in (*self._left, session) if earlier.is_opening]
         if session.error is not None:
-            self.place.message.emit("Playing was stopped", f"{session.error}.")
+            self.place.message.emit("Playback was stopped", f"{session.error}.")
         elif session.code == BUG:
             self.place.message.emit("A bug in the program stopped the pilot", "The terminal shows the details.")
         if session.has_begun:

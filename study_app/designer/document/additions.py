@@ -48,7 +48,7 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
         raise Refused(f"the kind {kind!r} is not available here; choose one of these: {', '.join(map(str, named))}")
     node = table_of((named[kind],), {})
     if node is None:
-        raise Refused(f"there is no table of kind {kind}")
+        raise Refused(f"a table of kind {kind} cannot be added")
     value = value_at(study.document, path)
     table = value if isinstance(value, Mapping) else {}
     edits: list[Edit] = [Unset((*path, name)) for name in table if name != key and name not in node["properties"]]

@@ -202,7 +202,7 @@ class SwitchKey(Request):
         gone = () if value_at(at.study.document, self.path) is None else (Unset(self.path),)
         value = _first_value(at.study.with_edits(*gone)[0], place)
         if value in ("", []):
-            raise Refused(f"{label_of(self.to)} needs an element that does not exist yet: add it first")
+            raise Refused(f"{label_of(self.to)} refers to an element that does not exist yet: add that element first")
         return Step(f"Specify {label_of(self.to)}", (*gone, Set(place, value)))
 
 

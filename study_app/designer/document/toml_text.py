@@ -82,7 +82,7 @@ def apply_splices(text: str, splices: Iterable[Splice]) -> str:
     end = 0
     for at, before, after in splices:
         if at < end or text[at : at + len(before)] != before:
-            raise ValueError("these splices were made for a different text")
+            raise ValueError("the text has changed since these edits were computed")
         parts += (text[end:at], after)
         end = at + len(before)
     return "".join((*parts, text[end:]))

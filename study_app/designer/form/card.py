@@ -186,7 +186,7 @@ class _RowWidget(Themed, QWidget):
         self.field = _field_for(row) if special is None or special.make is None else special.make(row)
         if special is not None and special.adds is not None:
             self.field.add_extra(special.adds(self.field))
-        self.keys = Segments("Choose which of the two to use") if row.keys else None
+        self.keys = Segments("Choose one of the two keys") if row.keys else None
         self.words = label(row.label, "label", wraps=True)
         if not wide:
             self.words.setFixedWidth(_LABEL_PX)

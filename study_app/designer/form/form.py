@@ -151,7 +151,7 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
     for name in dict.fromkeys(step for _, step in blocks):
         title, block = distinct_title(document, ("blocks", name)), value_at(document, ("blocks", name))
         if isinstance(block, Mapping) and "design" not in block and (other := block.get("questionnaire")) != path[1]:
-            instead = "" if other is None else f", instead of {title_of(document, (path[0], str(other)))}"
+            instead = "" if other is None else f"; replaces {title_of(document, (path[0], str(other)))}"
             asked = SetValue(("blocks", name, "questionnaire"), path[1])
             yield f"After each trial of {title}\t(about that trial{instead})", asked
     ends = {
@@ -161,7 +161,7 @@ def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple
         yield from as_step(f"After {distinct_title(document, ('blocks', name))}\t(once, about the block)", after)
     if len(ends) > 1:
         yield from as_step(
-            f"After each block\t({len(ends)} times, for comparison)", _places_after(place for place, _ in main)
+            f"After each block\t({len(ends)} times, to compare the blocks)", _places_after(place for place, _ in main)
         )
     lasts = {
         place[:-1]: place if step in names(document, "pages") else _places_after([place])[0] for place, step in steps

@@ -116,7 +116,7 @@ def run_simulation(order: Simulation, send: Send, stop: Stop) -> Simulated:
             rehearse=lambda: condition_features(protocol, seed=1, progress=show_progress),
             progress=show_progress,
         ):
-            progress = f"{estimate.studies} of {estimate.asked} studies per sample size"
+            progress = f"{estimate.studies} of {estimate.asked} studies simulated per sample size"
             simulated = replace(simulated, table=estimate_markdown(estimate), waiting=progress)
             send(simulated)
     return replace(simulated, waiting="")

@@ -158,7 +158,7 @@ def has_graphics_card() -> bool:
 LEAD_NS: Final = 5_000_000  # time before a swap at which a frame is drawn: twice the tank's drawing time at 1080p
 STALE_REFRESHES: Final = 8  # refreshes without a swap after which the clock alone paces
 _NS_PER_S: Final = 1_000_000_000
-LOCKED, BY_CLOCK = "locked to the screen's swaps", "by the clock"
+LOCKED, BY_CLOCK = "synchronized with the screen's refresh", "timed by the computer's clock"
 
 
 class Frames(QObject):

@@ -250,7 +250,7 @@ class NewSessionDialog(QDialog):
             choice_field("device", "Device", {name: device_label(name) for name in devices}),
             choice_field("screen", "Participant's screen", screen_titles),
             Field("windowed", "In a window instead of full screen", "check"),
-            Field("pilot", "Pilot: marked by a frame, stored separately", "check"),
+            Field("pilot", "Pilot: marked with a frame and stored separately", "check"),
             Field("results", "Results folder for this study", "folder"),
             choice_field("group", "Group", {name: name for name in self.facts.protocol.groups}, aside=_GROUP_HINT),
             Field(

@@ -186,7 +186,7 @@ def _draft_facts(file: Path, draft_words: LoadWords) -> DraftFacts | None:
     if draft is None:  # it was saved meanwhile
         return None
     title = draft_words().draft_title(draft.text, file.parent) if draft_words else ""
-    note = DraftNote(f"Draft of {time_text(draft.kept_at)}, never saved", draft.kept_at)
+    note = DraftNote(f"Draft from {time_text(draft.kept_at)}, never saved", draft.kept_at)
     return DraftFacts(source=str(file), title=title or file.stem, origin=_origin_of(str(file)), draft=note)
 
 
@@ -273,7 +273,7 @@ def _draft_note(source: str, draft_words: LoadWords) -> DraftNote | None:
                 if draft_words
                 else ""
             )
-            return DraftNote(f"Draft of {time_text(draft.kept_at)}, not saved{edited}", draft.kept_at)
+            return DraftNote(f"Draft from {time_text(draft.kept_at)}, not saved{edited}", draft.kept_at)
     return None
 
 

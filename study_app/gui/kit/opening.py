@@ -42,5 +42,5 @@ def _check_opened(process: subprocess.Popen[bytes], path: Path, polls: int) -> N
 def _show_not_opened(path: Path) -> None:
     window = QApplication.activeWindow() or next(filter(QWidget.isVisible, QApplication.topLevelWidgets()), None)
     if window is not None:
-        sentence = f"No program on this computer could open {path.resolve()}. Open it with another program."
+        sentence = f"This computer could not open {path.resolve()}. Open the file with a suitable program."
         Question(window, getattr(window, "theme", LIGHT), "Not opened", sentence).open()

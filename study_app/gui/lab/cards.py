@@ -424,7 +424,7 @@ class LimiterCard(_ReadingCard):
     """The active limiters, and the number of ticks in which each acted in the last ten seconds."""
 
     def __init__(self) -> None:
-        why = "Limiters would reveal the settings."
+        why = "Limiter counts would reveal the settings."
         super().__init__("Limiters", label("ticks, last 10 s", "small", "text2"), why)
         self.lines: list[_LimiterLine] = []
         self._lines = vbox(spacing=0, margins=(-8, 0, -8, 0))

@@ -545,7 +545,7 @@ class FormPanel(Card):
         column.addWidget(Rule())
         column.addWidget(self.said)  # above the buttons, so that they stay in place when it appears
         add_parts(column, self.back, self.open)
-        self.hidden = MaskedPanel(HIDDEN, "Parameters would reveal the settings.")
+        self.hidden = MaskedPanel(HIDDEN, "The parameters would reveal the settings.")
         self._stack = QStackedLayout()
         self._stack.addWidget(whole)
         self._stack.addWidget(self.hidden)

@@ -82,7 +82,7 @@ def _hint_text(view: OperatorView) -> str:
     if view.state == "trouble":
         return "The force is off. All answers so far are on disk."
     if view.state == "force off":
-        return "The force returns only after you turn it on again."
+        return "The force stays off until you turn it on again."
     if view.state == "paused":
         return "An interrupted trial starts again."
     return "You will be asked for a reason; both recordings are kept." if view.may_repeat else ""
@@ -276,7 +276,7 @@ class DeviceCard(Card):
         self.name = label("", "card")
         self.chip = Chip("neutral", "ring", "Waiting", small=True)
         self.diagnose = ActionButton("pulse", "Diagnose …", key="D", height=36)
-        self.diagnose.setToolTip("First turns off the force and pauses the session")
+        self.diagnose.setToolTip("Turns off the force and pauses the session first")
         self._most = ALL_ROWS
         self._view: OperatorView | None = None
         row = hbox(self.icon, self.name, STRETCH, self.chip, spacing=10)

@@ -458,7 +458,7 @@ _FAST_S: Final = 0.3
 def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: Mapping[str, str]) -> tuple[str, ...]:
     """Return lines about the track of ``trial``; ``choices`` maps its answers to labels.
 
-    A line that ends in "check" deserves attention.
+    A line that says "unusually" deserves attention.
     """
     own = [planned.number for planned in schedule.trials if (planned.block, planned.code) == (trial.block, trial.code)]
     answers = [progress.trial_answers[number] for number in own if number in progress.trial_answers]
@@ -466,7 +466,7 @@ def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: M
     given_up = [lost for lost in progress.missing_trials.missing if lost.trial in own]
     reasons = Counter(reason for number in own for reason in progress.repeated.get(number, ()))
     return (
-        f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} answered",
+        f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} trials answered",
         *(_answer_lines(answers, choices) if answers else ()),
         *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
         *(f"not delivered {count}: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
@@ -478,9 +478,9 @@ def _answer_lines(answers: Sequence[TrialAnswer], choices: Mapping[str, str]) ->
     given = [str(answer.value) for answer in answers]
     shares = ", ".join(f"{label} {100 * given.count(choice) / len(given):.0f} %" for choice, label in choices.items())
     run = max(len(list(same)) for _, same in groupby(given))
-    lines = [*([shares] if shares else []), f"longest run {run}" + (": check" if run >= _LONG_RUN else "")]
+    lines = [*([shares] if shares else []), f"longest run {run}" + (", unusually long" if run >= _LONG_RUN else "")]
     seconds = [answer.seconds for answer in answers if answer.seconds is not None]
     if seconds:
         middle = median(seconds)
-        lines.append(f"median response time {middle:.2f} s" + (": check" if middle < _FAST_S else ""))
+        lines.append(f"median response time {middle:.2f} s" + (", unusually short" if middle < _FAST_S else ""))
     return lines

@@ -112,7 +112,7 @@ _RECONNECT = (
 )
 _WAITS = (
     "The force is off and nothing has been lost. Free up some disk space or reconnect the drive. The session will then "
-    "resume in a paused state."
+    "be paused until you resume it."
 )
 _AFTERWARDS = "The session is closed and the force is off. Everything in the journal is safe."
 _WAITS_AT_END = (

@@ -406,7 +406,7 @@ class _MaskingQuestion(QWidget):
 
 _SIZE = (860, 620)
 _ABOUT = (
-    "These values are measured for two seconds with the simulated hand. Each session measures them again with its own "
+    "These values are measured over two seconds with the simulated hand. Each session measures them again with its own "
     "device and limits. This page is also available under This machine."
 )
 _MEASURING = "Measuring … On first use the force model is compiled, which may take a minute."

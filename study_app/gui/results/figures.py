@@ -522,7 +522,7 @@ class _WorkLine(Card):
             self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
             self.bar.show_share(going.share)
         elif untested:
-            self.words.show_text("The computation was stopped, so results of tests and some figures are missing.")
+            self.words.show_text("The computation was stopped, so test results and some figures are missing.")
 
 
 class _TroubleCard(Card):

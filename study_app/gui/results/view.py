@@ -161,7 +161,7 @@ class LeaveOutDialog(Question):
             theme,
             "Exclude from the analysis",
             f"{_rule_sentence(proposed)}The chosen session or trial is excluded from measures, figures and tests. No "
-            "data are deleted: exclusions.csv and every report state what was excluded, who excluded it and why.",
+            "data are deleted; exclusions.csv and every report state what was excluded, who excluded it and why.",
             ActionButton("minus", "Exclude", role="primary"),
             fields=(
                 choice_field(
@@ -204,7 +204,7 @@ class LeaveOutDialog(Question):
 def _rule_sentence(proposed: Exclusion | None) -> str:
     if proposed is None:
         return ""
-    return f"{exclusion_text(proposed)} meets the rule “{proposed.rule_or_person.replace('_', ' ')}”. "
+    return f"{exclusion_text(proposed)} meets the exclusion rule “{proposed.rule_or_person.replace('_', ' ')}”. "
 
 
 COLUMNS = (
@@ -566,8 +566,8 @@ class ResultsPlace(Place):
             text = opened if len(opened) <= most else f"{opened[: most - 1].rstrip()}…"
             chips.append(("neutral", "eye", text, opened))
         if self.view.doubts:
-            text = "1 file is" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files are"
-            chips.append(("warn", "warning", f"{text} not as recorded", "\n".join(self.view.doubts)))
+            text = "1 file differs" if len(self.view.doubts) == 1 else f"{len(self.view.doubts)} files differ"
+            chips.append(("warn", "warning", f"{text} from the record", "\n".join(self.view.doubts)))
         if [chip.word for chip in self.chips] != [text for _, _, text, _ in chips]:
             for chip in self.chips:
                 remove_widget(chip)
@@ -598,7 +598,7 @@ class ResultsPlace(Place):
             warning=later,
             width=QUESTION_PX,
         )
-        decide = partial(self._order_decision, "opening the key", OpenKey)
+        decide = partial(self._order_decision, "unblinding the study", OpenKey)
         dialog.accepted.connect(lambda: decide(by=dialog.value("by"), reason=dialog.value("reason")))
         self._open_dialog(dialog)
 
@@ -614,7 +614,7 @@ class ResultsPlace(Place):
     def _ask_leave_out(self, proposed: Exclusion | None) -> None:
         included = [session for session in self.view.sessions if session.excluded is None]
         dialog = LeaveOutDialog(self, self.theme, included, self.view.trials, self.sessions.rows.chosen, proposed)
-        decide = partial(self._order_decision, "leaving out", LeaveOut)
+        decide = partial(self._order_decision, "excluding data", LeaveOut)
 
         def leave_out() -> None:
             participant, session, trial = dialog.chosen

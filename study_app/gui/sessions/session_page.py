@@ -309,11 +309,11 @@ def _trial_limits_text(trial: TrialRecord) -> str:
     if trial.broken:
         said += "; ".join(trial.broken) + "."
     else:
-        said += "not known yet." if trial.valid is None else "within all limits."
+        said += "whether it met the limits is not known yet." if trial.valid is None else "within all limits."
     if trial.lost:
         said += f" The recording was lost: {trial.lost}."
     if trial.unconfirmed:
-        said += f" Chosen but not confirmed, and therefore not in the tables: {', '.join(trial.unconfirmed)}."
+        said += f" These answers were chosen but not confirmed, so they are not in the tables: {', '.join(trial.unconfirmed)}."
     return said
 
 

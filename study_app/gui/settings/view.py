@@ -161,8 +161,8 @@ def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
         )
     text = f"{write_number(offset.mean_ms, _DECIMALS)} ± {write_number(offset.spread_ms, _DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
-    where = "" if offset.screen == screen else f" for a different screen ({offset.screen}), so it is not used here"
-    return f"{text} by {offset.how}{when}{where}."
+    where = "" if offset.screen == screen else f" It is for a different screen ({offset.screen}), so it is not used here."
+    return f"{text} ({offset.how}{when}).{where}"
 
 
 class DisplayTest(QWidget):
@@ -381,7 +381,7 @@ class _ScreensCard(Card):
             remove_widget(old)
         for at, radio in enumerate(self.radios, start=1):
             radio.setChecked(at == chosen)
-        self.note.setText(f"{missing} is not connected, so the last screen is used instead." if missing else "")
+        self.note.setText(f"{missing} is not connected, so the last screen in the list is used instead." if missing else "")
         self.note.setVisible(bool(missing))
 
 

@@ -246,7 +246,7 @@ class WatchWindow(Themed, QDialog):
         self.presented = Chip("neutral", "lock", "Blinded: shown by code")
         self.interval = Choice()
         self.interval.setAccessibleName("Interval")
-        self.seen = Toggle("As on the screen")
+        self.seen = Toggle("As the participant saw it")
         self.seen.setToolTip(
             "Shows the ball with the delay that the participant saw; the arrows and curves are not delayed"
         )

@@ -170,5 +170,5 @@ def _edge_reason(problem: Problem, k: int, z: Floats) -> str:
     if it.field in NO_LESS_THAN and z[k] - problem.least[k] < problem.most[k] - z[k]:
         return f" (it cannot be less than {NO_LESS_THAN[it.field]})"
     if it.whole and z[k] > problem.least[k]:
-        return " (it cannot exceed the scaling or the duration of the measurement)"
+        return " (limited by the scaling or by the duration of the measurement)"
     return ""

@@ -124,7 +124,7 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     assert designer.messages.pop()[1] == "It describes the saved study. Save the study first."
     designer.saving.save()
     write.click()
-    assert "does not include the power" in designer.messages.pop()[1]
+    assert "does not include a power analysis" in designer.messages.pop()[1]
     file = designer.results / "thicker" / "preregistration.md"
     before = file.read_text(encoding="utf-8")
     assert before == preregistration_of(str(designer.editing.opened.file))
@@ -140,7 +140,7 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     write.click()
     said = " ".join(one.text() for one in designer.place.prompt.findChildren(QLabel))
     assert f"{file} differs from the text generated" in said
-    assert "already has 1 session, for which the text is not a preregistration" in said
+    assert "already has 1 session; the text cannot preregister data that already exist" in said
 
 
 def test_a_preregistration_can_be_opened_and_is_compared_with_the_saved_study(

@@ -75,7 +75,7 @@ def test_a_simulation_ends_between_two_batches() -> None:
     assert [answer.waiting for answer in sent] == [
         "predicting which trials can be delivered …",
         "simulating observers …",
-        "10 of 200 studies per sample size",
+        "10 of 200 studies simulated per sample size",
     ]
     assert [bool(answer.table) for answer in sent] == [False, False, True]
     assert "**Preliminary: 10 of 200 studies were simulated.**" in sent[-1].table

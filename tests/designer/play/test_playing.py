@@ -119,7 +119,7 @@ def test_a_likert_study_is_played_from_its_third_trial(qtbot: Any, likert: Any, 
     player = play_to_the_end(qtbot, likert)
     assert [page.trial for page in player.pages if isinstance(page, TaskPage)] == [3, 4]
     assert not player.operated
-    assert "to the end" in likert.place.header.strip.words.text()
+    assert "completed" in likert.place.header.strip.words.text()
     assert list(folders.iterdir())
     study = kept(qtbot, likert)
     qtbot.waitUntil(lambda: likert.place.header.version.words == "Piloted")
@@ -194,7 +194,7 @@ def test_stop_above_the_page_closing_the_window_a_failure_and_leaving_the_place_
         qtbot.waitUntil(lambda: not pilots.is_under_way, timeout=10_000)
         assert window(ParticipantWindow) is None
     ((title, sentence),) = likert.messages
-    assert title == "Playing was stopped"
+    assert title == "Playback was stopped"
     assert "the device is gone" in sentence
     caplog.clear()
     likert.window.go("designer")

@@ -76,7 +76,7 @@ def make_two_interval(user: User) -> None:
     user.write("Repetitions", "2")
     shorten(user)
     user.select("Liquids", "Session, in order")
-    user.choose("Choose which of the two to use", "Stimulus")
+    user.choose("Choose one of the two keys", "Stimulus")
     user.press("Add Trial design")
     user.press("Add Method")
 

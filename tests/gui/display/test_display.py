@@ -81,7 +81,7 @@ def test_frames_follow_the_swaps_of_a_surface(screen):
         screen.now_ns = swap_ns
         screen.frames.note_swap()
         swap_ns += period_ns
-    assert (screen.frames.is_locked, screen.frames.pacing) == (True, "locked to the screen's swaps")
+    assert (screen.frames.is_locked, screen.frames.pacing) == (True, "synchronized with the screen's refresh")
     lead_ns = min(LEAD_NS, period_ns // 2)
     ahead_ns = [(swap_ns - drawn_ns) % period_ns for drawn_ns in screen.drawn_ns[-20:]]
     assert ahead_ns == pytest.approx([lead_ns] * 20, abs=2)
@@ -92,7 +92,7 @@ def test_without_swaps_the_clock_goes_on(screen):
     screen.frames.note_swap()
     assert screen.frames.is_locked
     screen.run(2 * STALE_REFRESHES * screen.frames.period_ns * 1e-9)
-    assert (screen.frames.is_locked, screen.frames.pacing) == (False, "by the clock")
+    assert (screen.frames.is_locked, screen.frames.pacing) == (False, "timed by the computer's clock")
     assert len(screen.drawn_ns) >= 2 * STALE_REFRESHES - 1
 
 

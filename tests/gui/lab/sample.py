@@ -95,9 +95,9 @@ def still_view(bench: Workbench | None = None, **fields: Any) -> LabView:
         ),
         "tick_ns": 161.0,
         "errors": (
-            ErrorRow(measure="Wake, relative to Σ|e|/S", value="4e−15"),
-            ErrorRow(measure="Force, largest", value="< 0.001 N"),
-            ErrorRow(measure="Lag of the velocity filter", value="9 ms"),
+            ErrorRow(measure="Largest relative wake error", value="4e−15"),
+            ErrorRow(measure="Largest force error", value="< 0.001 N"),
+            ErrorRow(measure="Velocity filter lag", value="9 ms"),
         ),
         "limiters": LimiterCounts().rows(8.0, 1.5),
     }

@@ -156,7 +156,7 @@ def test_a_reversed_sign_is_noticed_and_the_explained_share_is_told():
     assert right.warnings == ()
     assert right.explained == pytest.approx(1 - np.sum(right.residual_n**2) / np.sum(force_n**2))
     assert right.explained > 0.99
-    assert f"the law explains {100 * right.explained:.1f} % of its mean square" in right.summary()
+    assert f"the force law explains {100 * right.explained:.1f} % of the mean squared force" in right.summary()
     assert wrong.explained < 0.01
     left = f"{100 * right.share:.0f} % of the force instead of {100 * wrong.share:.0f} %"
     assert any(left in warning and "opposite sign" in warning for warning in wrong.warnings)

@@ -23,7 +23,7 @@ FAILURES = FailureTable(
         ),
         FailureMode(
             id="rate",
-            tested="it keeps up with 1 kHz",
+            tested="it maintains a rate of 1 kHz",
             symptom="it delivers fewer than 900 new positions per second",
             cause="the computer is too slow",
             cure="close other programs",
