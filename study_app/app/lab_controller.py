@@ -61,9 +61,7 @@ def _error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
     return (
         ErrorRow(measure="Largest relative wake error", value=wake, note=note),
         ErrorRow(measure="Largest force error", value=force, note=note),
-        ErrorRow(
-            measure="Velocity filter lag", value=f"{1e3 * errors.lag_s:z.1f} ms", note="at constant acceleration"
-        ),
+        ErrorRow(measure="Velocity filter lag", value=f"{1e3 * errors.lag_s:z.1f} ms", note="at constant acceleration"),
     )
 
 

@@ -120,7 +120,9 @@ def test_results(qtbot: Any, pytestconfig: pytest.Config) -> None:
         "take_back_asked": lambda asked: place._order_decision(
             "reversing the exclusion", of.TakeBack, **exclusion(asked)
         ),
-        "unblind_asked": lambda by, reason: place._order_decision("unblinding the study", of.OpenKey, by=by, reason=reason),
+        "unblind_asked": lambda by, reason: place._order_decision(
+            "unblinding the study", of.OpenKey, by=by, reason=reason
+        ),
         "tables_asked": lambda *asked: place._start_writing(of.WriteTables, *asked),
         "report_asked": lambda to, _extras: place._start_writing(of.WriteReport, to), "stop_asked": place._stop_writing,
         "open_asked": place._opener, "choose": place.choose_study, "others": place.show_results,

@@ -48,7 +48,9 @@ def test_the_receipt_says_distance_width_and_offset_of_the_participants_screen(q
     offset = DisplayOffset(mean_ms=20, spread_ms=1, measured="2026-11-20", screen=screen.name())
     settings = MachineSettings(viewing_distance_mm=600, screen_width_mm=300, display_offset=offset)
     screens = described_screens(settings, screen, screen)
-    assert screens["participant"]["frames"] == "timed by the computer's clock", "nothing tells of swaps without a display"
+    assert screens["participant"]["frames"] == "timed by the computer's clock", (
+        "nothing tells of swaps without a display"
+    )
     assert screens["participant"]["viewing_distance_mm"] == 600
     assert screens["participant"]["display_offset"]["mean_ms"] == 20
     assert screens["participant"]["text_scale"] == pytest.approx(text_scale_on(settings, screen), abs=0.001)

@@ -66,7 +66,7 @@ class _PowerCard(Card):
 
     def __init__(self) -> None:
         self.preregister = small_button("file", "Write preregistration")
-        self.preregister.setToolTip("Write a text that states the saved study's hypotheses, design, sample size and analysis")
+        self.preregister.setToolTip("Write a text with the saved study's hypotheses, design, sample size and analysis")
         super().__init__("Power", self.preregister, padding=16, gap=8)
         self.setAccessibleName("Power")
         self.changed = label("The study has changed since it was preregistered.", "small", "warn", wraps=True)

@@ -60,7 +60,7 @@ COMMANDS: Final = (
     Command("part before", "Previous part", ("Shift+F6",), run=lambda place: place.parts.cycle(-1)),
     Command("find", "Find in the study", ("Ctrl+F",), run=lambda place: place.parts.focus_find()),
     Command("next problem", "Next problem", ("F8",), run=lambda place: place.open_next_problem()),
-    Command("file", "Switch between the form and the file", ("Ctrl+E",), run=lambda place: place.parts.switch_to_file()),
+    Command("file", "Switch between form and file", ("Ctrl+E",), run=lambda place: place.parts.switch_to_file()),
     Command("home", "Home", ("Alt+Home",), run=lambda place: place.leave_for_home()),
     Command("back", "Previous element", ("Alt+Left",), run=lambda place: place.ask("back")),
     Command("page", "Participant's page", ("Ctrl+Return",)),

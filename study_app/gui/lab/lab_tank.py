@@ -373,7 +373,7 @@ class LabTank(Themed, QWidget):
         pairs: list[tuple[Words, Words]] = [
             (
                 (self._first_note(), "lock" if bench.blind else ""),
-                (f"a turn of more than {angle:g}° starts a new segment" if isinstance(angle, int | float) else "", _RING),
+                (f"a turn over {angle:g}° starts a new segment" if isinstance(angle, int | float) else "", _RING),
             ),
             (
                 (

@@ -313,7 +313,8 @@ def _trial_limits_text(trial: TrialRecord) -> str:
     if trial.lost:
         said += f" The recording was lost: {trial.lost}."
     if trial.unconfirmed:
-        said += f" These answers were chosen but not confirmed, so they are not in the tables: {', '.join(trial.unconfirmed)}."
+        answers = ", ".join(trial.unconfirmed)
+        said += f" These answers were chosen but not confirmed, so they are not in the tables: {answers}."
     return said
 
 

@@ -161,7 +161,9 @@ def _offset_sentence(offset: DisplayOffset | None, screen: str) -> str:
         )
     text = f"{write_number(offset.mean_ms, _DECIMALS)} ± {write_number(offset.spread_ms, _DECIMALS)} ms"
     when = f", {offset.measured}" if offset.measured else ""
-    where = "" if offset.screen == screen else f" It is for a different screen ({offset.screen}), so it is not used here."
+    where = (
+        "" if offset.screen == screen else f" It was measured on another screen ({offset.screen}) and is not used here."
+    )
     return f"{text} ({offset.how}{when}).{where}"
 
 
@@ -381,7 +383,9 @@ class _ScreensCard(Card):
             remove_widget(old)
         for at, radio in enumerate(self.radios, start=1):
             radio.setChecked(at == chosen)
-        self.note.setText(f"{missing} is not connected, so the last screen in the list is used instead." if missing else "")
+        self.note.setText(
+            f"{missing} is not connected, so the last screen in the list is used instead." if missing else ""
+        )
         self.note.setVisible(bool(missing))
 
 

@@ -68,7 +68,7 @@ class Fit(Estimates):
     def summary(self) -> str:
         lasted_s = self.motion.t_s[-1] - self.motion.t_s[0]
         left = f"residual {self.rms_n:.3g} N RMS, {100 * self.share:.1f} % of the force"
-        law = f"the force law explains {100 * self.explained:.1f} % of the mean squared force"
+        law = f"the law explains {100 * self.explained:.1f} % of the mean squared force"
         return f"{len(self.motion.t_s)} rows over {lasted_s:.3g} s; {left}; {law}"
 
 

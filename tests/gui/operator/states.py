@@ -138,7 +138,10 @@ DISK: Actions = {
     "pushed to the limit": pushed(5.8),
     "hardly pushed": pushed(0.02),
     "track": told(
-        beyond={"main_trials": (3, 9), "track": ("Track V1: 9 of at most 24 trials answered", "longest run 8, unusually long")}
+        beyond={
+            "main_trials": (3, 9),
+            "track": ("Track V1: 9 of at most 24 trials answered", "longest run 8, unusually long"),
+        }
     ),
     "waiting for the disk": told(force_on=False, trouble="no space left on the disk: free some", waits=True),
     "recording lost": told(("recording_lost", {"trial": 3, "attempt": 1, "reason": "No space left on device"})),

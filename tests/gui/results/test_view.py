@@ -204,7 +204,9 @@ def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
     assert [place.dialog.value(name) for name in ("session", "trial", "by", "reason")] == [
         ("P003", 1), None, "", "0 of 40"
     ]  # fmt: skip
-    assert any("P003 meets the exclusion rule “below chance”. " in one.text() for one in place.dialog.findChildren(QLabel))
+    assert any(
+        "P003 meets the exclusion rule “below chance”. " in one.text() for one in place.dialog.findChildren(QLabel)
+    )
     place.dialog.editors["by"].show_value("AB")
     click(qtbot, place.dialog.go_on)
     assert place.reader.orders[-1] == LeaveOut(

@@ -137,7 +137,7 @@ def test_a_length_beyond_what_was_measured_ends_at_the_edge():
     short = paths.programmed_motion("line", moving_s=0.2)
     found = fit(override_all(TANK, {"length": 100}), "tank", ["length"], short, force_of(TANK, short))
     assert found.values["length"] == 200
-    assert any("reached the end of its range, 200 (it cannot exceed" in warning for warning in found.warnings)
+    assert any("reached the end of its range, 200 (limited by the scaling" in warning for warning in found.warnings)
 
 
 def test_a_missing_effect_shows_in_residuals_that_follow_one_another():
@@ -156,7 +156,7 @@ def test_a_reversed_sign_is_noticed_and_the_explained_share_is_told():
     assert right.warnings == ()
     assert right.explained == pytest.approx(1 - np.sum(right.residual_n**2) / np.sum(force_n**2))
     assert right.explained > 0.99
-    assert f"the force law explains {100 * right.explained:.1f} % of the mean squared force" in right.summary()
+    assert f"the law explains {100 * right.explained:.1f} % of the mean squared force" in right.summary()
     assert wrong.explained < 0.01
     left = f"{100 * right.share:.0f} % of the force instead of {100 * wrong.share:.0f} %"
     assert any(left in warning and "opposite sign" in warning for warning in wrong.warnings)
