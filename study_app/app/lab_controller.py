@@ -57,7 +57,7 @@ def _error_rows(errors: Errors) -> tuple[ErrorRow, ...]:
     wake, force = "no wake" if errors.wake is None else share, "no drag"
     if errors.force_n is not None:
         force = f"< {_SMALLEST_N:g} N" if errors.force_n < _SMALLEST_N else f"{errors.force_n:.3f} N"
-    note = f"for drag and wake; there is no reference for {without}" if without else "along programmed paths"
+    note = f"for drag and wake only; no reference exists for {without}" if without else "along programmed paths"
     return (
         ErrorRow(measure="Largest relative wake error", value=wake, note=note),
         ErrorRow(measure="Largest force error", value=force, note=note),

@@ -229,7 +229,7 @@ def replay(session_folder: Path) -> Replayed:
             continue
         path = session.path / line.recording
         if not is_there(path):
-            replayed.missing += (f"{name}: {line.recording} is missing, although the journal mentions it",)
+            replayed.missing += (f"{name}: {line.recording} is missing, although the journal lists it",)
             continue
         seed = link_seed(drawn_from, participant, *which)
         interval = which[-1]

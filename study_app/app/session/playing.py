@@ -42,7 +42,7 @@ from study_app.store.study_versions import keep_content
 
 _END_SHOWN_MS: Final = 2500
 log = logging.getLogger(__name__)
-_STOPPED: Final = "stopped while playing in the study designer"
+_STOPPED: Final = "stopped during playback in the study designer"
 
 
 class PlayedSession(LiveSession):

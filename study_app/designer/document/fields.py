@@ -426,6 +426,7 @@ _LABELS: Final = {
     "3down1up": "3-down 1-up",
     "4down1up": "4-down 1-up",
     "alpha": "Significance level (alpha)",
+    "velocity.alpha": "Filter weight (alpha)",
     "begin": "First level",
     "between_s": "Between trials",
     "bias_sd": "Response bias (SD)",
@@ -593,7 +594,7 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
 def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...], value: Any, *, required: bool) -> Row:
     first = nodes[0]
     common: dict[str, Any] = {
-        "label": label_of(path[-1]),
+        "label": label_at(path),
         "unit": unit_of(next((step for step in reversed(path) if isinstance(step, str)), "")),
         "help": first.get("description", ""),
         "value": value,
@@ -693,6 +694,11 @@ def label_of(step: str | int) -> str:
     unit = _unit_suffix(step)
     plain = step.removesuffix(f"_{unit}") if unit else step
     return plain.replace("_", " ").strip().capitalize()
+
+
+def label_at(path: Path) -> str:
+    """Return the label of the key at a path, where the same key may have different labels in different tables."""
+    return _LABELS.get(".".join(map(str, path[-2:]))) or label_of(path[-1])
 
 
 def name_label(name: str) -> str:

@@ -32,6 +32,7 @@ from study_app.designer.document.fields import (
     edits_to_replace,
     element_noun,
     initial_value,
+    label_at,
     label_of,
     named_at,
     references_to,
@@ -97,7 +98,7 @@ class SetValue(Request):
 
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Set(self.path, self.value))
-        return Step(f"Change {label_of(self.path[-1])}", edits, continues=self.path if self.typing else None)
+        return Step(f"Change {label_at(self.path)}", edits, continues=self.path if self.typing else None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +113,7 @@ class SetText(Request):
         languages = languages_of(at.study.document)
         value = value_at(at.study.document, self.path)
         edit: Edit
-        title = f"Type {label_of(self.path[-1])}"
+        title = f"Type {label_at(self.path)}"
         if isinstance(value, Mapping) and not self.text.strip() and value.keys() - {self.language}:
             gone = (Unset((*self.path, self.language)),) if self.language in value else ()
             return Step(title, gone, continues=(self.path, self.language))
@@ -142,7 +143,7 @@ class RemoveKey(Request):
 
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Unset(self.path))
-        return Step(f"Remove {label_of(self.path[-1])}", edits)
+        return Step(f"Remove {label_at(self.path)}", edits)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +154,7 @@ class AddKey(Request):
 
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Set(self.path, _first_value(at.study, self.path)))
-        return Step(f"Add {label_of(self.path[-1])}", edits)
+        return Step(f"Add {label_at(self.path)}", edits)
 
 
 @dataclass(frozen=True, slots=True)

@@ -143,7 +143,7 @@ class RehearsalDialog(Work):
 
 _FRAME = 60  # of a window, at most
 INSIDE, OUTSIDE = "in the workspace", "outside the workspace: Home will not list its sessions"
-_HOLDS = "It will contain the folders protocols and results."
+_HOLDS = "The workspace will contain the folders protocols and results."
 _ROW_HINT = "the session uses that participant's order; leave empty if no one is being replaced"
 _PLACE_HINT = (
     "the session uses that participant's order and position in the group; leave empty if no one is being replaced"

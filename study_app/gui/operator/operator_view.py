@@ -468,8 +468,8 @@ def track_lines(progress: Progress, schedule: Schedule, trial: Trial, choices: M
     return (
         f"Track {trial.code}: {len(answers)} of at most {grouped(len(own))} trials answered",
         *(_answer_lines(answers, choices) if answers else ()),
-        *(f"repeated {count}: {reason}" for reason, count in reasons.items()),
-        *(f"not delivered {count}: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
+        *(f"{count} repeated: {reason}" for reason, count in reasons.items()),
+        *(f"{count} not delivered: {REASONS.get(limit, limit)}" for limit, count in limits.items()),
         *([f"{len(given_up)} unanswered because no attempt was within limits"] if given_up else []),
     )
 

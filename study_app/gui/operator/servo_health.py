@@ -224,7 +224,7 @@ class ForceFigures:
 
 def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[str, str], ...]:
     """Return share of the limit, limiters and withheld force, or as many rows that say they are hidden."""
-    share, limiters = f"Force relative to {protocol.device.force_limit_n:g} N", "Limiters acted"
+    share, limiters = f"Force relative to {protocol.device.force_limit_n:g} N", "Limited ticks"
     withheld = f"Force held back, limit {protocol.limits.withheld_percent:g}{THIN_SPACE}%"
     if protocol.study.blinding == "double":
         return (share, "hidden"), (limiters, "hidden"), (withheld, "hidden")
@@ -232,7 +232,7 @@ def force_rows(protocol: Protocol, forces: ForceFigures | None) -> tuple[tuple[s
         return (share, "–"), (limiters, "–"), (withheld, "–")
     most_first = sorted(forces.limiters, key=lambda counted: -counted[1])
     return (
-        (share, f"{forces.share:.0%}, most {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
+        (share, f"{forces.share:.0%}, peak {forces.most:.0%}".replace("%", f"{THIN_SPACE}%")),
         (limiters, ", ".join(f"{name} {grouped(ticks)}" for name, ticks in most_first) or "none"),
         (withheld, f"{forces.withheld:.1%}".replace("%", f"{THIN_SPACE}%")),
     )

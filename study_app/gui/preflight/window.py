@@ -149,7 +149,7 @@ def _device_check(devices: Sequence[Backend]) -> Check:
     """Return the check of the connected haptic devices; without one, sessions use the mouse."""
     haptic = [device for device in devices if device.state.startswith("connected")]
     missing = [device.name for device in devices if device.state == NOT_AVAILABLE]
-    about = f"cannot be used now: {', '.join(missing)}" if missing else "every device can be used"
+    about = f"not available now: {', '.join(missing)}" if missing else "all devices are available"
     if haptic:
         return Check("Haptic devices", "ok", ", ".join(device.name for device in haptic), about=about)
     advice = "Connect a device, then open Devices; without a device you can use only the mouse and the simulated hand."

@@ -167,7 +167,7 @@ def pushes(world: World, count: int = 400) -> Any:
 def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_participant_the_same_in_both(
     make: Any, world: World
 ) -> None:
-    names = ("Force relative to 6 N", "Limiters acted", "Force held back, limit 5\u2009%")
+    names = ("Force relative to 6 N", "Limited ticks", "Force held back, limit 5\u2009%")
     told, seen = {}, []
     for blinding, limit_n in (("single", 6.0), ("double", None)):
         bridge = make(blinding=blinding, force_limit_n=limit_n)
@@ -192,7 +192,7 @@ def test_the_operator_sees_forces_in_a_single_blind_study_alone_and_the_particip
         bridge.leave_without_asking()
         world.samples = records(SAMPLE, 0)
     assert told == {
-        "Single-blind": ["50\u2009%, most 50\u2009%", "force 7", "6.2\u2009%"],
+        "Single-blind": ["50\u2009%, peak 50\u2009%", "force 7", "6.2\u2009%"],
         "Double-blind": ["hidden", "hidden", "hidden"],
     }
     assert seen[0] == seen[1]

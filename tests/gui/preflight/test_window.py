@@ -108,8 +108,8 @@ def test_the_checks_of_devices_and_of_compiled_code() -> None:
     checks = [*map(_device_check, ((falcon, inverse, mouse), (mouse,)))]
     checks += [_compiled_check(*compiled) for compiled in ((None, 0), (folder, 0), (folder, 7))]
     assert [(check.verdict, check.value, check.about) for check in checks] == [
-        ("ok", "Falcon", "cannot be used now: Inverse3"),
-        ("warning", "none connected", "every device can be used"),
+        ("ok", "Falcon", "not available now: Inverse3"),
+        ("warning", "none connected", "all devices are available"),
         ("warning", "not stored", "no folder is writable"),
         ("ok", "stored", kept),
         ("ok", "7 functions compiled", kept),
