@@ -206,7 +206,7 @@ class DesignerController(QObject):
         numbers = number_rows(opened.study.document, path)
         if not numbers or opened.read_only:
             why = opened.read_only or "This element does not have any numeric fields."
-            self.place.message.emit("A series of copies cannot be made from this element", why)
+            self.place.message.emit("This element cannot be copied as a series", why)
             return
         self.editing.select(path)
         card = SeriesCard(opened.study, path, numbers)

@@ -189,9 +189,9 @@ def _warning_unless(name: str, value: str, about: str, advice: str, *, well: boo
 def _servo_checks(facts: Measurements, protocol: Protocol) -> Iterator[Check]:
     """Yield the checks of the device's response, its force delay and the servo's rate."""
     share = f"{100 * facts.fresh_share:.0f} %"
-    about = f"{facts.device} sends a new sample on {share} of ticks"
+    about = f"{facts.device} sends a new sample in {share} of the ticks"
     if facts.timing.ticks == 0 or facts.fresh_share < _LEAST_FRESH:
-        advice = f"{facts.device} sends a new sample on only {share} of ticks: check its cable and power"
+        advice = f"{facts.device} sends a new sample in only {share} of the ticks: check its cable and power"
         yield Check("Device", "failure", "not responding", about=about, advice=advice)
     else:
         yield Check("Device", "ok", "responding", about=about)

@@ -141,7 +141,7 @@ def read_watched(session_folder: Path, trial: int, attempt: int = 1, interval: i
     which: events.Which = (trial, attempt, interval if started.has_intervals else None)
     stored = next((line for line in lines if isinstance(line, _STORED) and line.which == which), None)
     if not isinstance(stored, events.Recorded):
-        why = "no recording was requested, or it was interrupted" if stored is None else stored.reason
+        why = "no recording was requested, or the recording was interrupted" if stored is None else stored.reason
         raise StoreError(f"{named} does not have a recording ({why}): choose another trial")
     secret = None if shown is None else shown.nonce
     recorded = recordings.read_samples(session.path / stored.recording, secret)

@@ -67,8 +67,8 @@ def timing(
 
 LIVE = OutletStatus(title="LSL markers", listens=True)
 FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
-    ("small", {"fresh_share": 0.49}, "failure Device: not responding; mouse sends a new sample on 49 % of ticks"),
-    ("small", {"fresh_share": 0.5}, "ok Device: responding; mouse sends a new sample on 50 % of ticks"),
+    ("small", {"fresh_share": 0.49}, "failure Device: not responding; mouse sends a new sample in 49 % of the ticks"),
+    ("small", {"fresh_share": 0.5}, "ok Device: responding; mouse sends a new sample in 50 % of the ticks"),
     ("small", timing(0.0, ticks=0), "failure Servo rate: 0.0 Hz"),
     *(("small", timing(hz), f"{verdict} Servo rate: {hz} Hz; requested: 1000 Hz") for hz, verdict in (
         (490.0, "failure"), (501.0, "warning"), (979.0, "warning"), (981.0, "ok"),

@@ -509,7 +509,7 @@ def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
     """Return the number of an element that a series varies."""
     number = next((row for row in number_rows(document, path) if row.path == field), None)
     if number is None:
-        raise Refused("choose one of this element's numeric values")
+        raise Refused("choose one of this element's numeric fields")
     return number
 
 
@@ -520,10 +520,10 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
         if why := violated_bound(document, row, value):
             raise Refused(f"{exact_text(value)} is not permitted: {row.label} must be {why}")
         if value in known:
-            raise Refused(f"{exact_text(value)} is listed twice or equals the original's value")
+            raise Refused(f"{exact_text(value)} is listed twice or is equal to the original value")
         known.append(value)
     if not 0 < len(values) <= _MOST:
-        raise Refused(f"a series must have 1 to {_MOST} copies")
+        raise Refused(f"a series must contain 1 to {_MOST} copies")
 
 
 def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:

@@ -50,7 +50,7 @@ class CostRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ErrorRow:
-    """A deviation of the felt setting from its reference as text: ("Force, largest", "< 0.001 N")."""
+    """A deviation of the felt setting from its reference as text: ("Largest force error", "< 0.001 N")."""
 
     measure: str
     value: str

@@ -74,7 +74,7 @@ from study_app.workers.server import Crashed, Refused
 
 WIDTH, QUESTION_PX = 600, 560
 _WARNED = 3
-"""Of so many files that are not as recorded each is named."""
+"""Of so many files that differ from the record each is named."""
 
 
 class _Extra(NamedTuple):

@@ -169,10 +169,10 @@ def study() -> Study:
     [
         ((2000,), "2000 is not permitted: Visual delay must be at most 1000"),
         ((-5, 30), "-5 is not permitted: Visual delay must be at least 0"),
-        ((30, 30.0), "30 is listed twice or equals the original's value"),
-        ((30, 0), "0 is listed twice or equals the original's value"),
-        ((), "a series must have 1 to 24 copies"),
-        (tuple(range(1, 26)), "a series must have 1 to 24 copies"),
+        ((30, 30.0), "30 is listed twice or is equal to the original value"),
+        ((30, 0), "0 is listed twice or is equal to the original value"),
+        ((), "a series must contain 1 to 24 copies"),
+        (tuple(range(1, 26)), "a series must contain 1 to 24 copies"),
     ],
 )
 def test_values_are_refused_in_one_sentence(study: Study, values: tuple[float, ...], why: str) -> None:
