@@ -204,7 +204,7 @@ _SECTIONS_OF_TABLES: Final = frozenset(_ICONS) - {
 
 _HELP: Final = {
     "designs": "2IFC and other trial designs",
-    "liquids": "A liquid whose values you enter. To copy a shipped liquid, such as water or slime, type its name.",
+    "liquids": "A new liquid; you enter its values. To copy a shipped liquid, such as water or slime, type its name.",
 }
 """What a section is for, where its name does not say it."""
 

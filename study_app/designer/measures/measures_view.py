@@ -164,8 +164,8 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
     if evenness.balanced:
         verdict: Verdict = ("ok", "check", "balanced")
         if rows is not None:
-            rounds = counted(participants // rows, "round")
-            verdict = ("ok", "check", f"balanced: {participants} participants complete {rounds} of {rows} orders")
+            times = counted(participants // rows, "time")
+            verdict = ("ok", "check", f"balanced: {participants} participants, each of the {rows} orders {times}")
     elif rows is not None and participants % rows:
         last = participants - participants % rows
         even = f"{last} or {last + rows}" if last else f"{rows}"

@@ -206,7 +206,7 @@ class ForceCard(_PlotCard):
         if self.show_blind(view.workbench.blind):
             return
         limit = view.workbench.in_hand.scene.force_limit_n
-        a, b = ("A, felt now", "B, same motion") if view.felt == "A" else ("A, same motion", "B, felt now")
+        a, b = ("A (felt now)", "B (same motion)") if view.felt == "A" else ("A (same motion)", "B (felt now)")
         self.legend.show_entries(((A, a), (B, b), (_LIMIT, f"limit {limit:g} N")))
         trace = view.trace
         nothing = np.empty(0)

@@ -428,7 +428,7 @@ class ComputerWindow(Question):
         area.setAccessibleName("Checks")
         inside, close = QWidget(), ActionButton("", "Close", role="primary")
         vbox(self.state, self.bar, (area, 1), spacing=12, margins=0, parent=inside)
-        super().__init__(parent, theme, "Check of this computer", _ABOUT, close, back="Check again", inside=inside)
+        super().__init__(parent, theme, "Computer check", _ABOUT, close, back="Check again", inside=inside)
         self.setModal(True)
         self.back.clicked.disconnect(self.reject)
         self.back.clicked.connect(self.asked)

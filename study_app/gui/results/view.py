@@ -385,7 +385,7 @@ _NO_QUESTIONS: Final = Trouble(
 )
 _NONE_COMPLETE: Final = Trouble(
     title="No complete session to show",
-    sentence="Figures appear once a session is complete and not excluded. Start or continue a session on Home.",
+    sentence="Figures appear once there is a complete, included session. Start or continue a session on Home.",
     button="Go to Home",
     remedy="home",
 )

@@ -170,7 +170,7 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bo
     later = " The delay error, the withheld force and the targets reached will be checked after unblinding."
     later = later if sealed and not verdict else ""
     if not judged:
-        return f"Trials have not been measured yet.{later}"
+        return f"No trials have been measured yet.{later}"
     if not outside:
         every = "The only measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
         return f"{every} met the study's limits.{later}"

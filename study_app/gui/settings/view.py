@@ -323,7 +323,7 @@ FIELDS = (
     choice_field("device", "Device", {name: title_of(name) for name in list_devices()}),
     Field("camera", "Camera for conditions that show a camera image", longest=CAMERA_LENGTH, placeholder=USUAL),
     Field(
-        "proofs", "Folder for the study's proof, written when a session ends", "folder",
+        "proofs", "Folder for the proof that is written when a session ends", "folder",
         hint="A folder that people with access to the results cannot change. Leave empty to disable.",
         parse=_check_path, write=_text_or_empty,
     ),

@@ -243,7 +243,7 @@ class WatchWindow(Themed, QDialog):
         self.lacking = label("", "label", "warn", wraps=True)
         self.room = QStackedWidget()
         self.room.addWidget(self.sentence)
-        self.presented = Chip("neutral", "lock", "Blinded: shown by code")
+        self.presented = Chip("neutral", "lock", "Blinded: shown as a code")
         self.interval = Choice()
         self.interval.setAccessibleName("Interval")
         self.seen = Toggle("As the participant saw it")

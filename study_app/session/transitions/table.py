@@ -123,7 +123,7 @@ def initial_state(
             f"language {language!r}: {protocol.study.name} is available only in {known}; choose one of these languages"
         )
     if not secret and any(block.design is not None for block in protocol.blocks.values()):
-        raise SessionError("the levels in this study are drawn from the sealed key, so the key's secret is required")
+        raise SessionError("the levels in this study are generated from the sealed key, so its secret is required")
     return SessionState(plan=Plan(protocol, schedule, key, language, start, secret))
 
 

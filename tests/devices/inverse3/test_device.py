@@ -120,7 +120,7 @@ class TestOpening:
             EmulatedInverse3(service=service).open()
 
     def test_no_service_is_one_line_with_its_address_and_the_cure(self) -> None:
-        with pytest.raises(DeviceNotFound, match=r"Inverse Service does not answer.*start Haply Hub") as refused:
+        with pytest.raises(DeviceNotFound, match=r"Inverse Service does not respond.*start Haply Hub") as refused:
             open_device("inverse3:127.0.0.1:9")
         assert "127.0.0.1:9" in str(refused.value)
         assert "\n" not in str(refused.value)
@@ -131,7 +131,7 @@ class TestOpening:
 
     def test_an_address_names_host_port_and_device(self) -> None:
         for where, said in (("", "127.0.0.1:10001"), ("049D", "127.0.0.1:10001"), ("localhost:9:049D", "localhost:9")):
-            with pytest.raises(DeviceNotFound, match=rf"does not answer \({said}:"):
+            with pytest.raises(DeviceNotFound, match=rf"does not respond \({said}:"):
                 open_device(f"inverse3:{where}")
         for where in (":1", "a:b", "a:0", "a:65536", "a:1:b:c", "a:-1"):
             with pytest.raises(DeviceError, match="is not a valid address for the Inverse Service"):

@@ -36,7 +36,7 @@ def test_each_name_in_a_legend_is_that_of_the_curve_in_its_colour(place: Any, st
         values[name][2] = value if name.endswith("_mps") else (0, 0, -value)
     trace = Trace(**(values | {"t_s": np.array([-0.2, -0.1, 0.0])}))
     view = dataclasses.replace(still, trace=trace)
-    for felt, force_a, force_b in (("A", "A, felt now", "B, same motion"), ("B", "A, same motion", "B, felt now")):
+    for felt, force_a, force_b in (("A", "A (felt now)", "B (same motion)"), ("B", "A (same motion)", "B (felt now)")):
         place.show_view(dataclasses.replace(view, workbench=dataclasses.replace(view.workbench, presented=felt)))
         for card, names in (
             (place.speed, {"body": 1.0, "wake of A": 2.0, "wake of B": 3.0}),

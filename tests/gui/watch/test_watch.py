@@ -221,7 +221,7 @@ def test_while_the_study_is_blinded_nothing_tells_force_delay_or_condition(
         assert (window.seen.isVisible(), len(window.stage.shown.painted_s)) == (False, 0)
         assert " N" not in said(window)
         assert not [name for name in load("demo").conditions if name in f"{said(window)} {window.presented.word}"]
-        assert window.presented.word == "Blinded: shown by code"
+        assert window.presented.word == "Blinded: shown as a code"
 
 
 def test_a_video_shows_what_the_window_shows(opened, whole, qtbot, tmp_path):

@@ -59,7 +59,7 @@ def test_a_missed_criterion_goes_on_or_ends_the_session(missed: str, status: str
 
 
 def test_a_study_with_levels_needs_the_keys_secret() -> None:
-    with pytest.raises(SessionError, match="drawn from the sealed key"):
+    with pytest.raises(SessionError, match="generated from the sealed key"):
         pairs.opened(secret=b"")
 
 
