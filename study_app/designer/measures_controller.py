@@ -41,6 +41,7 @@ _REST_MS: Final = 800
 _LOOK_MS: Final = 100
 _NOT_WRITTEN: Final = "The preregistration was not written"
 _LATE: Final = "The study already has {count}; the text cannot preregister data that already exist."
+_REGISTER: Final = "Register this text before the first session."
 _FAILED: Final = "the simulation process could not be started"
 
 
@@ -139,12 +140,9 @@ class MeasuresController(QObject):
             return
         note = "" if power else self._without_power()
         why = [f"{file} differs from the text generated for this study. If you have registered the file, keep it."]
-        why = [
-            *(why if differs else ()),
-            *([_LATE.format(count=counted(sessions, "session"))] if sessions else ()),
-            note,
-        ]
-        write = partial(self._write_text, file, text, note)
+        late = _LATE.format(count=counted(sessions, "session")) if sessions else ""
+        why = [*(why if differs else ()), *([late] if late else ()), note]
+        write = partial(self._write_text, file, text, f"{note} {late or _REGISTER}".lstrip())
         if not differs and not sessions:
             write()
             return
@@ -165,7 +163,7 @@ class MeasuresController(QObject):
         except StudyError as error:
             self._place.message.emit(_NOT_WRITTEN, f"{error}.")
             return
-        said = f"{note} Register this text before the first session. The report will list deviations from it.".lstrip()
+        said = f"{note} The report will list deviations from this text."
         self._place.file_message.emit("Preregistration written", f"{file}\n\n{said}", file)
         self.show_measures()
 

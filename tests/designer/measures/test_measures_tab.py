@@ -124,7 +124,9 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     assert designer.messages.pop()[1] == "It describes the saved study. Save the study first."
     designer.saving.save()
     write.click()
-    assert "does not include a power analysis" in designer.messages.pop()[1]
+    written = designer.messages.pop()[1]
+    assert "does not include a power analysis" in written
+    assert "Register this text before the first session." in written
     file = designer.results / "thicker" / "preregistration.md"
     before = file.read_text(encoding="utf-8")
     assert before == preregistration_of(str(designer.editing.opened.file))
@@ -141,6 +143,10 @@ def test_the_preregistration_of_the_saved_study_is_written_with_its_power(
     said = " ".join(one.text() for one in designer.place.prompt.findChildren(QLabel))
     assert f"{file} differs from the text generated" in said
     assert "already has 1 session; the text cannot preregister data that already exist" in said
+    designer.place.prompt.go_on.click()
+    written = designer.messages.pop()[1]
+    assert "The study already has 1 session" in written
+    assert "before the first session" not in written
 
 
 def test_a_preregistration_can_be_opened_and_is_compared_with_the_saved_study(
