@@ -57,7 +57,7 @@ def export(
 ) -> None:
     """Write tidy tables for all participants, with a codebook.
 
-    The exit code is 3 if a section of the report added by --psych-ds could not be computed.
+    With --psych-ds, the exit code is 3 if a section of the report could not be computed.
     """
     if validator is not None and not psych_ds:
         raise click.UsageError("--validator checks the folder written by --psych-ds: add --psych-ds")
@@ -159,7 +159,7 @@ def unblind(results: Path, by: str, reason: str) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=click.IntRange(1), help="Exclude only this trial; default: the whole session.")
-@click.option("--rule", metavar="RULE", default="", help="The exclusion rule that the session meets.")
+@click.option("--rule", metavar="RULE", default="", help="The exclusion rule that applies to the session.")
 @BY
 @REASON
 def exclude(results: Path, participant: str, session: int, trial: int | None, rule: str, by: str, reason: str) -> None:
@@ -187,7 +187,7 @@ def _warn_if_opened(results: Path) -> None:
 @PARTICIPANT
 @SESSION
 @click.option("--trial", type=click.IntRange(1), help="Include only this trial, if it was excluded individually.")
-@click.option("--rule", metavar="RULE", help="Keep a session that meets this exclusion rule (e.g. below_chance).")
+@click.option("--rule", metavar="RULE", help="Keep a session to which this exclusion rule applies (e.g. below_chance).")
 @BY
 @REASON
 def include(
@@ -207,7 +207,7 @@ def include(
         taken = include_in(*where, session, trial=trial, by=by, reason=reason)
     else:
         taken = keep(*where, session, rule=rule, by=by, reason=reason)
-    done = "included again" if rule is None else f"kept, although it meets the rule {rule}"
+    done = "included again" if rule is None else f"kept, although the rule {rule} applies"
     click.echo(f"{done}: {describe_exclusion(replace(taken, participant=participant))}")
     _warn_if_opened(results)
 
@@ -217,7 +217,7 @@ def include(
 @PARTICIPANT
 @BY
 @click.option(
-    "--reason", required=True, metavar="TEXT", help="Reason, which is stored and so must not identify the participant."
+    "--reason", required=True, metavar="TEXT", help="Reason; it is stored, so it must not identify the participant."
 )
 @click.option(
     "--also",
@@ -236,7 +236,7 @@ def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[
 
     done = withdraw_from(*locate_participant(results, participant), by=by, reason=reason, also=also)
     for folder in done.folders:
-        click.echo(f"erased     participant {participant} from {folder}")
+        click.echo(f"erased     the data of participant {participant} in {folder}")
     for path in done.outputs:
         click.echo(f"deleted    {path}, which was produced from the results")
     click.echo(f"keep this line with the fingerprints:  {checked_line(*proof_of_withdrawal(done.tombstone))}")
@@ -328,8 +328,8 @@ def reproduce(session: Path) -> None:
     type=click.Path(path_type=Path),
     metavar="FILE",
     help=(
-        "Compare the study with fingerprints kept elsewhere (a copy, or the output of proof), and list what has been "
-        "changed or removed since."
+        "Compare the study with fingerprints kept elsewhere (a copy of fingerprints.txt, or the output of the proof "
+        "command), and list what has been changed or removed since."
     ),
 )
 @click.option(

@@ -91,7 +91,7 @@ def _unblind(study: Path) -> None:
 
     if is_unblinded(study):
         return
-    for opened in unblind_folder(study, by="demo", reason="every participant is simulated").values():
+    for opened in unblind_folder(study, by="demo", reason="all participants are simulated").values():
         for sentence in opened.left:
             click.echo(f"warning: {sentence}", err=True)
     click.echo("The key has been opened: the tables now contain the conditions")

@@ -163,7 +163,7 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
     Stay within reach of the power switch: the handle moves by itself, with a force of up to 4 N. To stop the force,
     press Enter, Ctrl+C or the handle's stop button, if it has one. You can share the report (bench.md, bench.json); the
     measurements are also copied into the receipt of each later session on this machine. If anyone touched the handle,
-    they are not copied, and the exit code is 3.
+    the measurements are not copied, and the exit code is 3.
     """
     from study_app.devices.registry import check_options, descriptor_of
 

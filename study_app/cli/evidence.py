@@ -287,7 +287,7 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
     "--delayed",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Measure only the proportion of a delayed force that is sent, and write it to FILE.",
+    help="Measure only the proportion of a delayed force that is not held back, and write it to FILE.",
 )
 @click.option(
     "--seed", help="Seed for the cases. Specify a seed to repeat a run; default: a new seed, which is printed."
@@ -624,11 +624,11 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     The report's own tests are applied to simulated rek2024 studies with 5, 12 and 24 participants. The answers come
     from the answer model used in rehearsals or from an ordinal probit model with random effects. The command prints
     each rate with its Wilson interval and says whether the rate meets its limit. A limit of 5 % is met if the interval
-    ends below 7.5 %, and exceeded if an interval corrected for the number of rates lies above 5 %. For the tests of
-    hypotheses and recognition, of equivalence when a minority of participants respond differently, and of trends with
-    skewed answers, values are drawn directly from distributions. If a rate is still undecided, more studies are
-    simulated for it, up to four times the initial number. Ctrl+C ends the command and prints the results so far. The
-    exit code is 3 if a rate exceeds its limit; otherwise it is 4 if there are too few studies to decide on every rate.
+    ends below 7.5 %, and exceeded if an interval corrected for the number of rates lies above 5 %. For some tests,
+    values are drawn directly from distributions: hypotheses, recognition, equivalence when a minority of participants
+    respond differently, and trends with skewed answers. If a rate is still undecided, more studies are simulated for
+    it, up to four times the initial number. Ctrl+C ends the command and prints the results so far. The exit code is 3
+    if a rate exceeds its limit; otherwise it is 4 if there are too few studies to decide on every rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
     from study_app.evidence.report_rates.simulation import Rate, evidence, validate
@@ -674,7 +674,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
-    """Recover simulated observers' known thresholds, first with the methods and analysis, then with the whole program.
+    """Recover simulated observers' known thresholds, first with the methods and analysis alone, then with sessions.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
     analyses many studies with 20 observers whose thresholds differ by a factor of 1.2. For magnitude estimation, the

@@ -76,7 +76,7 @@ def _parse_changes(changes: tuple[str, ...]) -> dict[str, str]:
     help="The device's delay, used to compute the expected error.",
 )
 def scene(scene: str, liquid: str | None, delay: int) -> None:
-    """Print which effects a scene needs and why, the measured cost of each, and the expected force error."""
+    """Print which effects a scene needs and why, the computation time of each, and the expected force error."""
     from study_app.evidence.cost import report
     from study_app.evidence.expected_error import acting_report, error_report
     from study_app.protocol.load import load_scene, load_scenes

@@ -76,8 +76,8 @@ def power(
     is printed for typical participants, or for the values in [simulated_participants], with the range across
     consistent, typical and noisy participants. For a study of thresholds, d′, ratings or magnitude estimation, the
     command prints three values for each number of participants and trials: the standard deviation of one participant's
-    estimate, the half-width of the group's 95 % interval, and the proportion of studies that reach analysis.precision.
-    Ctrl+C ends the command and prints the results so far.
+    estimate, the half-width of the group's 95 % interval, and the proportion of studies that achieve
+    analysis.precision. Ctrl+C ends the command and prints the results so far.
     """
     if engine == "processes":
         workers = Workers(workers.count)

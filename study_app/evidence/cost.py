@@ -56,9 +56,7 @@ def report(scene: Scene, *, batches: int = _BATCHES) -> str:
     cost = measure(scene, batches=batches)
     percent = 100 * cost.scene_ns * 1e-9 * scene.rate_hz
     whole = f"one tick: {cost.scene_ns:.0f} ns, {percent:.2f} % of the tick period"
-    return "\n".join(
-        (*describe_gate(scene, cost.effects_ns), "", f"{whole}; {cost.rest_ns:.0f} ns of it without liquids")
-    )
+    return "\n".join((*describe_gate(scene, cost.effects_ns), "", f"{whole}; without liquids, {cost.rest_ns:.0f} ns"))
 
 
 def hand_motion(ticks: int = _WARM_UP) -> Floats:

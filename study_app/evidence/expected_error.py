@@ -124,8 +124,9 @@ def _acting(scene: Scene, velocity: Velocity) -> dict[int, Acting]:
 
 def _acting_text(by_ticks: Mapping[int, Acting]) -> str:
     return "; ".join(
-        f"{ticks} ticks: {', '.join(f'{share:.0f} % of {part}' for part, share in acting.parts.items())} act, "
-        f"error {acting.error:.2g} %"
+        f"with {ticks} ticks of delay, the hand receives "
+        f"{' and '.join(f'{share:.0f} % of the {part}' for part, share in acting.parts.items())} "
+        f"(error {acting.error:.2g} %)"
         for ticks, acting in by_ticks.items()
     )
 
@@ -140,7 +141,7 @@ def _alone(scene: Scene, liquid: Liquid) -> Scene:
 
 def _errors(scene: Scene, delay_ticks: int) -> tuple[float, float, Causes, str]:
     if not scene.liquids:
-        return 0.0, 0.0, Causes(), "a scene without liquid"
+        return 0.0, 0.0, Causes(), "a scene without liquids"
     return max((_of_one(scene, index, delay_ticks) for index in range(len(scene.liquids))), key=lambda it: it[1])
 
 

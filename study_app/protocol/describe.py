@@ -241,7 +241,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         felt_n = [steady_force(level_scene, pace_mps).drag_n for level_scene in scenes]
         fast_n = max(steady_force(level_scene, FASTER * pace_mps).drag_n for level_scene in scenes[-len(compared) :])
         yield (
-            "Force at set pace",
+            "Force at the paced speed",
             f"{min(felt_n):.1f} to {max(felt_n):.1f} N at {pace_mps:.3g} m/s, and at most {fast_n:.1f} N at "
             f"{FASTER:g} times that speed",
         )

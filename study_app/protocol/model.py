@@ -295,7 +295,7 @@ class Limits(Table):
         "the trial [ms].",
     )
     withheld_percent: Annotated[
-        float, within(0.01, 100, "a proportion of the force; some force is nearly always held back")
+        float, within(0.01, 100, "a percentage of the force; some force is nearly always held back")
     ] = Field(
         default=5,
         description=(
@@ -304,7 +304,7 @@ class Limits(Table):
         ),
     )
     targets_percent: (
-        Annotated[float, within(0.01, 100, "a proportion of the targets; without this limit any number is enough")]
+        Annotated[float, within(0.01, 100, "a percentage of the targets; without this limit, any number is sufficient")]
         | None
     ) = later(default=None, description="Minimum proportion of a reaching task's targets that must be reached [%].")
     level_error_percent: (
@@ -322,7 +322,7 @@ class Limits(Table):
         default=None, description="Maximum number of attempts to deliver an interval trial; default: 3."
     )
     missing_percent: (
-        Annotated[float, within(0, 100, "a proportion of the trials; 0 means that all trials are required")] | None
+        Annotated[float, within(0, 100, "a percentage of the trials; 0 means that all trials are required")] | None
     ) = later(
         default=None,
         description=(
@@ -349,7 +349,7 @@ class Published(Table):
     )
     low: _Reported | None = Field(default=None, description="Lower end of the published interval or range.")
     high: _Reported | None = Field(default=None, description="Upper end of the published interval or range.")
-    percent: Annotated[float, within(0, 100, "a proportion of answers")] | None = Field(
+    percent: Annotated[float, within(0, 100, "a percentage of the answers")] | None = Field(
         default=None, description="Percentage of correct answers at this value; default: unknown."
     )
     n: Annotated[int, within(1, 1_000_000, "studies have fewer participants")] | None = Field(

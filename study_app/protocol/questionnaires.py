@@ -275,7 +275,7 @@ def _fill_in(
         elif set(known_labels.get("labels", ())) == set(languages):
             scales[own_name] = known_labels
         else:
-            ask(None, f"[scales.{own_name}], {labelled['points']} of them", known_labels, "labels")
+            ask(None, f"the {labelled['points']} points of [scales.{own_name}]", known_labels, "labels")
     faults += [
         _unpublished_fault((*place, "instrument"), of, language, lacks)
         for language, lacks in unwritten.items()

@@ -80,7 +80,7 @@ class ShowIf(Table):
     def _values_or_bounds(self) -> Self:
         bounded = self.at_least is not None or self.at_most is not None
         if (self.values is not None) == bounded:
-            raise invalid("needs either is, or at_least and/or at_most", "is")
+            raise invalid('needs the key "is", or one or both of "at_least" and "at_most"', "is")
         return self
 
 

@@ -218,7 +218,8 @@ _TRIALS: tuple[Column, ...] = (
     _count("loop_delay_changes", "Number of times the loop delay changed during the task."),
     _count(
         "device_delay_ticks",
-        "Least delay of the device in ticks, if an oscillation shows that it exceeds loop_delay_ticks by two or more.",
+        "Lower bound on the device's delay, in ticks, if an oscillation shows that the delay exceeds "
+        "loop_delay_ticks by two or more.",
         sealed=True,
         of_trial="max",
     ),

@@ -105,7 +105,10 @@ def exclude(
     """
     by, reason = check_name_and_reason(by, reason, "an exclusion requires a rule or name, and a reason")
     if by in RULES:
-        raise StoreError(f"{by} is an exclusion rule: specify it as the rule, and the name of the person who decides")
+        raise StoreError(
+            f"{by} is an exclusion rule, not a person: specify it as the rule, together with the name of the "
+            "person who decides"
+        )
     if rule:
         by, reason = _decided_by_person(rule, by, reason)
     study = StudyFolder(folder)
@@ -206,7 +209,7 @@ def keep(folder: Path, participant: str, session: int, *, rule: str, by: str, re
         if kept.what in {row.what for row in exclusions(folder)}:
             raise StoreError(f"{describe_exclusion(kept)} is excluded: include it without --rule")
         if any(row.what == kept.what and row.rule_or_person == rule for row in reversals(folder)):
-            raise StoreError(f"{describe_exclusion(kept)} has already been kept, although it meets the rule {rule}")
+            raise StoreError(f"{describe_exclusion(kept)} has already been kept, although the rule {rule} applies")
         key_open = bool(reveals(folder))
         record = {"at": at, "by": by, "reason": reason, "key_open": key_open, "exclusion": kept.fields()}
         append_line(study.reversed_exclusions, json.dumps(record, ensure_ascii=False).encode() + b"\n")

@@ -162,8 +162,8 @@ def write_output(
     except StoreError as error:
         if warn is not None:
             warn(
-                f"the output in {to} could not be added to the list of outputs ({error}), so withdraw will not list "
-                "it: keep a note of the folder"
+                f"the output in {to} could not be added to the list of outputs ({error}), so the withdraw command "
+                "will not list it: keep a note of the folder"
             )
     return written
 

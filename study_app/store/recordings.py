@@ -285,7 +285,7 @@ def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:
     for name in {"first_device_force_n", "first_command_n"} & facts.keys():
         first = facts[name]
         if len(first) not in (0, 3) or not all(number is None or isinstance(number, int | float) for number in first):
-            raise ValueError(f"{name} is not a force")
+            raise ValueError(f"{name} does not contain three force components")
 
 
 class SamplesFile:

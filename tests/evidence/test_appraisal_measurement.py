@@ -155,12 +155,15 @@ def test_non_newtonian_liquids_are_compared_with_their_law_added_mass_and_buoyan
 @pytest.mark.slow
 def test_scene_states_what_acts_of_each_part_at_two_and_three_ticks_and_offers_kalman():
     own, offered = acting_report(load_scene("rek2024", "water")).splitlines()
-    pattern = r"2 ticks: \d+ % of drag, (\d+) % of wake act, error [\d.]+ %; 3 ticks: .* % of wake act, error"
+    pattern = (
+        r"with 2 ticks of delay, the hand receives \d+ % of the drag and (\d+) % of the wake \(error [\d.]+ %\); "
+        r"with 3 ticks of delay, .* % of the wake \(error"
+    )
     assert own.startswith("water on the hand (medium grip, 0.2 kg, 1.6 Hz ±20 mm), ewma: ")
     assert offered.startswith('  with velocity = { kind = "kalman" }: ')
     assert int(re.search(pattern, own)[1]) < 20
     assert int(re.search(pattern, offered)[1]) > 70
-    assert "of inertia act" in acting_report(load_scene("physical2", "honey"))
+    assert "of the inertia (error" in acting_report(load_scene("physical2", "honey"))
     assert acting_report(Scene()) == ""
 
 
@@ -216,7 +219,7 @@ def test_a_report_has_the_gates_table_with_costs_and_the_whole(monkeypatch):
     lines = report(Scene(accuracy=STEADY, liquids=(RIVER,)), batches=1).splitlines()
     assert lines[0].startswith("river: effects named")
     assert [line.split()[3] for line in lines[2:4]] == ["2", "40"]
-    assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; 20 ns of it without liquids"
+    assert lines[-1] == "one tick: 62 ns, 0.01 % of the tick period; without liquids, 20 ns"
 
 
 @needs_servo

@@ -151,7 +151,7 @@ def test_a_title_in_any_script_is_a_title(text: str) -> None:
     [
         ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "1", 0, "Duration"),
         ("levels = [0.02, 0.6]", "levels = [0.02, 0.6]\nstandards = [16]", "2", 2,
-         "gives up to 25.6 N·s/m at the hand, but the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
+         "produces up to 25.6 N·s/m of damping at the hand, but the slope limit (1000 Hz, kalman, 2 ticks) is 20.6"),
         ("", "", "5", 2, "5 is not in the range"),
         ("levels = [0.02, 0.6]", "levels = [0.6, 0.02]", "1", 2, "stimuli.damping.levels"),
     ],

@@ -150,7 +150,7 @@ def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Pat
         (
             "velocity_x_mps",
             b"m/s",
-            b"Velocity in the scene from which the force was computed, to the right (resolution:",
+            b"Scene velocity from which the force was computed, to the right (resolution:",
         ),
         ("device_force_z_n", b"N", b"Force that the device applied to the hand, toward the participant (resolution:"),
     ):

@@ -165,7 +165,7 @@ def evidence(found: Refit) -> Evidence:
     headings = ("motion", "liquid", "Re", "fitted to all", "left out of the fit", "program, 1 kHz")
     text = (
         f"{Table(('constant', 'fitted', 'in the program'), constants, left=1).markdown()}\n\n"
-        "RMS error as a share of the RMS force (greatest error as a share of the greatest force)\n\n"
+        "RMS error as a proportion of the RMS force (largest error as a proportion of the largest force)\n\n"
         f"{Table(headings, motions, left=2).markdown()}\n"
     )
     rows = [[it.table.case.name, *(f"{value:.6g}" for value in it.others)] for it in found.errors if it.fitted]

@@ -157,9 +157,10 @@ def evidence(columns: dict[str, Floats]) -> Evidence:
         row += [f"{drag:.3f} ({100 * error:+.1f} %)" for drag, error in pairs]
     table = Table(("Bi", *(f"n {index:g}" for index in INDICES)), rows)
     text = (
-        "Creeping drag of a sphere in Herschel–Bulkley liquids, over 3πD² K (U/D)^n: solver (error of the law).\n\n"
+        "Drag on a sphere in creeping flow of Herschel–Bulkley liquids, computed by the solver and divided by "
+        "3πD² K (U/D)^n; the error of the law is in brackets.\n\n"
         f"{table.markdown()}\n\n"
-        f"The law errs by at most {np.abs(wrong).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long change "
-        f"the drag by at most {grid:.2%}, 3.3 times the ε by {smooth:.2%}.\n"
+        f"The error of the law is at most {np.abs(wrong).max():.1%} (permitted: {PERMITTED:.0%}). Edges twice as long "
+        f"change the drag by at most {grid:.2%}; an ε 3.3 times as large changes it by at most {smooth:.2%}.\n"
     )
     return Evidence(text, {_COMPARISON_FILE: text})

@@ -368,7 +368,10 @@ def _claims(result: BlockResult) -> bool:
 
 def _modelled(result: BlockResult) -> Iterator[tuple[Event, bool]]:
     """Yield, for each statement, whether the test of means finds a difference."""
-    yield ("found by the test of means", "at most 5 %"), any(test.verdict in FOUND for test in MeanTests.of(result))
+    yield (
+        ("difference found by the test of means", "at most 5 %"),
+        any(test.verdict in FOUND for test in MeanTests.of(result)),
+    )
 
 
 def _in_liquids(asked: BlockAnswers, result: BlockResult, cell: Cell, _truth: Array) -> Iterator[tuple[Event, bool]]:
@@ -418,12 +421,12 @@ def _in_delays(asked: BlockAnswers, result: BlockResult, cell: Cell, truth: Arra
         low = any(
             lowest.over_all_ms is not None and lowest.over_all_ms <= max(null) for lowest in LowestDelay.of(result)
         )
-        yield ("lowest delay stated too low", "at most 5 %"), low
+        yield ("stated shortest delay with a trend is too short", "at most 5 %"), low
     if cell.extent not in _NO_EFFECT:
         yield from _equivalence(asked, result, truth)
     if cell.extent == "full":
         yield (
-            ("lowest delay stated", "counted"),
+            ("shortest delay with a trend stated", "counted"),
             any(lowest.over_all_ms is not None for lowest in LowestDelay.of(result)),
         )
         yield ("detection threshold printed", "counted"), _printed(result)
@@ -451,10 +454,10 @@ def _equivalence(asked: BlockAnswers, result: BlockResult, truth: Array) -> Iter
     called = {
         (tested.item, tested.delay_ms): tested.verdict == "equivalent" for tested in ContrastsWithControl.of(result)
     }
-    yield ("nearest beyond the bound called equivalent", "at most 5 %"), called[nearest]
+    yield ("smallest difference beyond the bound called equivalent", "at most 5 %"), called[nearest]
     up_to = common_ms(result)
     too_far = up_to is not None and any(delay <= up_to for _, delay in beyond)
-    yield ("“unchanged up to” too long", "at most 5 %"), too_far
+    yield ("“unchanged up to” states too long a delay", "at most 5 %"), too_far
 
 
 _Case: TypeAlias = tuple[str, int]
@@ -464,7 +467,7 @@ Trial: TypeAlias = Callable[[np.random.Generator], float | None]
 """Simulates one study; returns 1 for a hit, 0 for none, of an interval the error over its half; None: it has none."""
 
 COVERS: Final = "interval covers the threshold, if one is printed"
-HALF: Final = "half the interval covers the threshold"
+HALF: Final = "interval of half the width covers the threshold"
 """Of a normal distribution 67 %; 51 % where intervals are 30 % narrower, 80 % where they are 30 % wider."""
 PRINTED: Final = "threshold printed, with its interval"
 

@@ -165,10 +165,11 @@ class SoakResult:
         return (
             "",
             "drift",
-            f"  clock against ticks   {self.counts.drift_ns} ns",
-            f"  wake and definition   {drift.worst:.1e} of Σ|e|/S at most in {drift.comparisons:,} comparisons; the "
-            f"longest wake lasted {drift.longest_s:,.0f} s",
-            f"  left after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; above "
+            f"  clock                 {self.counts.drift_ns} ns from the ticks at most",
+            f"  wake                  {drift.worst:.1e} of Σ|e|/S from its definition at most, in "
+            f"{drift.comparisons:,} "
+            f"comparisons; the longest wake lasted {drift.longest_s:,.0f} s",
+            f"  remains after {rests.count:,} rests   wake {rests.wake_mps:g} m/s, force {rests.force_n:.1e} N; above "
             f"{PERCEPTIBLE_N} N for at most {rests.pushed_s:.2f} s",
         )
 
@@ -179,8 +180,8 @@ class SoakResult:
             "forces",
             f"  largest written       {device.most_n:.6f} N (limit {counts.limit_n:g} N), {device.writes:,} writes",
             f"  largest step          {counts.steepest_n:.6f} N",
-            f"    let go              {counts.release_step_n:.6f} N at a stop or a fault",
-            f"    paid back           {counts.energy_step_n:.6f} N by the passivity controller",
+            f"    at a stop or fault  {counts.release_step_n:.6f} N",
+            f"    passivity control   {counts.energy_step_n:.6f} N",
             f"  non-finite forces     {counts.no_number + device.not_finite}",
         )
 

@@ -270,10 +270,12 @@ def evidence(found: Sequence[Delivered]) -> Evidence:
 def _lines(found: Sequence[Delivered]) -> Iterator[str]:
     yield "Force on the hand, including the delay, compared with the law for the handle's true motion; 1 kHz, 38 µm."
     yield (
-        "The hand follows a sine, and random motion with the power of ±20 mm. Columns: RMS error [% of the law], least"
+        "The hand follows a sine, then random motion with the power of a ±20 mm sine. Columns: RMS error [% of "
+        "the law],"
     )
-    yield "error of any linear estimator on the same random motion, parts of the law that act on the sine [%] (inertia"
-    yield "with history), and withheld force [%]. A limit follows its value after a slash; * marks a value beyond it."
+    yield "smallest possible error of a linear estimator in the random motion, proportion of each part of the law that"
+    yield "reaches the hand during the sine [%] (inertia includes history), and proportion of the force held back [%]."
+    yield "A limit follows its value after a slash; * marks a value beyond it."
     yield ""
     headings = ("liquid", "estimator", "hand", "kg", "Hz", "ticks", "sine", "random", "least", "drag", "wake")
     rows = []

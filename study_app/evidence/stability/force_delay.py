@@ -55,7 +55,7 @@ def evidence(entries: Sequence[Entry], file: str) -> Evidence:
     """
     delays_ms = sorted({it.delay_ms for it in entries})
     kept = {it[:4]: it.left_percent for it in entries}
-    lines = [f"{'force left [%], delayed by [ms]':40}" + "".join(f"{delay:6g}" for delay in delays_ms)]
+    lines = [f"{'remaining force [%], by delay [ms]':40}" + "".join(f"{delay:6g}" for delay in delays_ms)]
     for liquid, estimator, hand in dict.fromkeys(it[:3] for it in entries):
         shares = (kept.get((liquid, estimator, hand, delay), math.nan) for delay in delays_ms)
         lines.append(f"{f'{liquid}, {estimator}, {hand}':40}" + "".join(f"{share:6.0f}" for share in shares))

@@ -200,11 +200,11 @@ def parse(line: str) -> Case:
     for word in line.split():
         name, separator, value = word.partition("=")
         if not separator:
-            raise StudyError(f'a case consists of words such as "scale=10", not {word!r}')
+            raise StudyError(f'a case consists of settings such as "scale=10", not {word!r}')
         if name not in kinds:
             near = difflib.get_close_matches(name, kinds, n=1)
             meant = f"did you mean {near[0]!r}? " if near else ""
-            raise StudyError(f"a case has no {name!r}: {meant}it has {', '.join(kinds)}")
+            raise StudyError(f"a case does not have a setting {name!r}: {meant}its settings are {', '.join(kinds)}")
         try:
             values[name] = kinds[name](value)
         except ValueError as error:

@@ -320,7 +320,7 @@ def in_words(verdict: Verdict) -> str:
     reference = "with the scripted device" if verdict.case.plant == FALCON else "without feedback"
     said += (
         f"; the energy balance of hand and liquid falls to {1e3 * verdict.balance_j:.2f} mJ "
-        f"({1e3 * verdict.permitted_j:.2f} mJ permitted), the handle swings at {1e3 * verdict.swing_mps:.0f} mm/s, "
+        f"({1e3 * verdict.permitted_j:.2f} mJ permitted), the handle oscillates at {1e3 * verdict.swing_mps:.0f} mm/s, "
         f"the force above 40 Hz is {verdict.fast_n:.2f} N ({verdict.played_n:.2f} N {reference})"
     )
     acted = [f"{name} {share:.1%}" for name, share in zip(LIMITER_NAMES, verdict.acted, strict=True) if share]

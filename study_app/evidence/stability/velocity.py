@@ -312,7 +312,7 @@ def _lines(rows: Sequence[Row]) -> Iterator[str]:
         values = "".join(f"{value:9.4g}" if value >= 100 else f"{value:9.2f}" for value in row.values)
         goal = "" if row.goal is None else f"   {'≥' if row.least else '≤'} {row.goal:.3g}: "
         judged = "" if row.goal is None else "met" if row.met else "not met"
-        bound = "" if row.bound is None else f"   least of any linear estimator {row.bound:.3g}"
+        bound = "" if row.bound is None else f"   minimum for a linear estimator: {row.bound:.3g}"
         yield f"{row.name:{width}} {values}{goal}{judged}{bound}"
 
 
@@ -346,7 +346,7 @@ def _boundaries() -> Iterator[Row]:
             goal = values[1] if (delay, believed) == (1, 1) else None
             if (delay, believed, mass_kg) == (2, 2, 0.1):
                 goal = _LEAST_LATE_NSPM
-            mistaken = "" if believed == delay else f", believed {believed}"
+            mistaken = "" if believed == delay else f", estimated as {believed}"
             yield Row(f"stable damping, {mass_kg:g} kg, delay {delay}{mistaken} [N·s/m]", values, goal, least=True)
 
 
@@ -368,7 +368,7 @@ def _whole() -> Iterator[Row]:
 
 
 def _cost() -> Iterator[Row]:
-    yield Row("time above that of the plain difference [ns per tick]", _each(_cost_ns), _MOST_COST_NS)
+    yield Row("extra time compared with a plain difference [ns per tick]", _each(_cost_ns), _MOST_COST_NS)
 
 
 PARTS: Final[Mapping[str, Callable[[], Iterator[Row]]]] = {

@@ -126,11 +126,11 @@ def evidence(found: Sequence[Withheld]) -> Evidence:
 
 
 def _lines(found: Sequence[Withheld]) -> Iterator[str]:
-    yield "force withheld by the passivity controller and the slew limit [%]: Σ|F_a - F_b| / Σ|F_a|; strokes in mm"
+    yield "force held back by the passivity controller and the slew limit, Σ|F_a - F_b| / Σ|F_a| [%]; strokes in mm"
     for (estimator, mode), rows in itertools.groupby(found, key=lambda one: (one.estimator, one.mode)):
         yield ""
         strokes = "".join(f"{stroke!s:>11}" for stroke in STROKES)
-        after = f"   in second 1 to {SECONDS} after {SHOWN_SHAKE}, most after one second"
+        after = f"   in seconds 1 to {SECONDS} after {SHOWN_SHAKE}; maximum after the first second"
         yield f"{f'{estimator}, {mode}':21}{strokes}{after}"
         for row in rows:
             after = "".join(f"{100 * share:7.1f}" for share in row.after[QUICK.index(SHOWN_SHAKE)])
@@ -142,10 +142,11 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
     yield ""
     for most in sorted({withheld.most for withheld in counted}):
         quick = max(withheld.quick for withheld in counted if withheld.most == most)
-        which = "tar aside" if most == _MOST else " with ".join(_REVERSED)
-        yield f"at most {most:.0%} in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
+        which = "except in tar" if most == _MOST else f"in {' with '.join(_REVERSED)}"
+        yield f"at most {most:.0%} held back in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
     met = _goal(lasting < MOST_AFTER)
-    yield f"less than {MOST_AFTER:.1%} later than one second after a shake, except in tar: {met} ({lasting:.1%})"
+    yield f"less than {MOST_AFTER:.1%} held back from one second after a shake onwards, except in tar: {met} "
+    f"({lasting:.1%})"
 
 
 def _goal(met: bool) -> str:

@@ -317,7 +317,7 @@ class KnownThreshold(_KnownValue):
         near = np.abs(np.expm1(errors)) <= _NEAR
         yield Measure(
             study=self.name,
-            what=f"studies of {PEOPLE} within ±15 %",
+            what=f"studies with {PEOPLE} participants within ±15 %",
             value=float(near.mean()),
             interval=share_interval(near, 1),
             least=_NEAR_SHARE,
@@ -335,7 +335,7 @@ class KnownThreshold(_KnownValue):
         of_studies, true = np.mean(slopes, axis=1), 0.0 if self._of_delay else 1.0  # a constant JND, or Weber's law
         yield Measure(
             study=self.name,
-            what="exponent of JND over standard",
+            what="exponent of the JND against the standard",
             value=float(of_studies.mean()),
             interval=mean_interval(of_studies),
             least=true - _SLOPE_ERROR_MOST,
@@ -407,7 +407,7 @@ class KnownExponent(_KnownValue):
         of_studies = [study.group[0].value for study in studies]
         yield Measure(
             study=self.name,
-            what=f"exponent over {stimulus_of(self.protocol, self.block).vary}",
+            what=f"exponent against {stimulus_of(self.protocol, self.block).vary}",
             value=float(np.mean(of_studies)),
             interval=mean_interval(of_studies),
             least=EXPONENT - _EXPONENT_ERROR_MOST,
@@ -493,7 +493,7 @@ def rehearsed(known: Known, source: bytes, seed: int) -> Rehearsed:
         findings = len(verify_study(folder, None).errors)
         findings += sum(len(reproduce_session(session.path).differences) for session in sessions)
         findings += sum(not replay(session.path).proved for session in sessions)
-        unblind(folder, "validate", "to compare with what is known")
+        unblind(folder, "validate", "to compare the results with the known values")
         study = load_study(folder)
         intervals = study.intervals[study.intervals["block"] == known.block.id]
         block = next(block for block in study.levels if block.id == known.block.id)
@@ -601,7 +601,7 @@ def validate(
         progress(f"{one.name}: rehearsing {_REHEARSED} participants", None)
         measures += rehearsed_measures(one, rehearsal.result(), one.spread(found, _REHEARSED))
         say(f"{one.name}: {len(cases)} studies and {_REHEARSED} simulated participants")
-    measures += coverage("all of them", every)
+    measures += coverage("all studies", every)
     of_thresholds = [one for _, one in known if isinstance(one, KnownThreshold)]
     cases = cases[:: max(1, min(_KIND_SHARE, len(cases) // 2))]
     for kind in (*KINDS, MIXED) if of_thresholds else ():

@@ -125,5 +125,5 @@ def evidence(found: Sequence[DeviceLateness]) -> Evidence:
             else ""
         )
         lines.append(f"{lateness.name:<28}{lateness.ticks:>8}{lateness.p50_us:>9.0f}{lateness.p99_us:>9.0f}{ratio}")
-    text = "\n".join((*lines, f"limit: {_MOST_RATIO:g}; missed if the whole interval lies above it")) + "\n"
+    text = "\n".join((*lines, f"limit: {_MOST_RATIO:g}; exceeded if the whole interval lies above it")) + "\n"
     return Evidence(text, {"devices.txt": text}, missed=any(lateness.missed for lateness in found))

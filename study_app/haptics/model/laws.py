@@ -126,7 +126,12 @@ _FlowIndex: TypeAlias = Annotated[
     ),
 ]
 _TimeS: TypeAlias = Annotated[
-    float, within(1e-4, 1000, ("with a shorter time a liquid is Newtonian; with a longer time it is a solid"))
+    float,
+    within(
+        1e-4,
+        1000,
+        ("with a shorter time, a liquid behaves as if Newtonian; with a longer time, it behaves like a solid"),
+    ),
 ]
 _ShearRate: TypeAlias = Annotated[float, within(0.01, 1e5, "a hand shears a liquid at rates of 0.1 to 100 per second")]
 

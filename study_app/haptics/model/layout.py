@@ -199,7 +199,7 @@ SAMPLE_FIELDS: Final = (
     ),  # device, hand frame
     _SPEED(
         "velocity_mps",
-        "Velocity in the scene from which the force was computed, {component} (resolution: 1/4096 m/s).",
+        "Scene velocity from which the force was computed, {component} (resolution: 1/4096 m/s).",
         column="velocity_*_mps",
         stream="velocity_*",
     ),  # after estimator and compression

@@ -85,7 +85,7 @@ def _reason(place: tuple[int | str, ...], message: str) -> str:
     said = message.removeprefix("Value error, ").split(", unable to parse")[0].replace("Input should be", "must be")
     if "valid dictionary" in said:
         said = "is a table of parameters: set one parameter by its name, such as --set drag_coefficient=0.42"
-    return f"{name}: {said}" if name else said
+    return f"{name}{' ' if said.startswith(('must ', 'is ')) else ': '}{said}" if name else said
 
 
 def _tree(scene: Scene) -> dict[str, Any]:

@@ -30,7 +30,9 @@ def within(least: float, most: float, why: str, usual: float | None = None, what
 
 
 Coordinate: TypeAlias = Annotated[float, within(-1000, 1000, "a scene is at most 1 km wide")]
-Extent: TypeAlias = Annotated[float, within(1e-3, 1000, "from 1 mm, which a hand cannot resolve, to 1 km")]
+Extent: TypeAlias = Annotated[
+    float, within(1e-3, 1000, "a hand cannot resolve smaller lengths, and a scene is at most 1 km wide")
+]
 Metres: TypeAlias = tuple[Coordinate, Coordinate, Coordinate]
 Vector: TypeAlias = tuple[float, float, float]
 """x, y and z."""
@@ -67,7 +69,7 @@ Decay: TypeAlias = Annotated[
     within(
         0.5,
         1,
-        "the proportion left after 1 ms; at 0.5 the wake has vanished after 10 ms",
+        "the proportion that remains after 1 ms; with 0.5, the wake is gone after 10 ms",
         what="Factor λ by which a stored velocity decays in 1 ms.",
     ),
 ]
@@ -92,7 +94,7 @@ TailScaling: TypeAlias = Annotated[
     within(
         1,
         1e9,
-        "at least as many elements as the length",
+        "the divisor is at least the number of stored velocities",
         what=("Divisor S for the sum of the stored velocities, at least N."),
     ),
 ]

@@ -175,7 +175,9 @@ __all__ = [
 RateHz: TypeAlias = Annotated[
     float, within(50, 5000, ("a slower servo is never stable; a faster servo cannot finish its ticks in time"))
 ]
-SceneScale: TypeAlias = Annotated[float, within(0.01, 100, "a 60 mm stroke then covers 0.6 mm to 6 m in the scene")]
+SceneScale: TypeAlias = Annotated[
+    float, within(0.01, 100, "within these limits, a 60 mm stroke covers 0.6 mm to 6 m in the scene")
+]
 FADE_S = 0.05
 _HAND_SPEED_MPS = 0.3
 _HAND_ACCELERATION_MPS2 = 3.0  # 0.3 m/s at 1.6 Hz
@@ -199,9 +201,11 @@ class ForceLink(Frozen):
         Of jitter and loss, below 2³².
     """
 
-    delay_s: Annotated[float, within(0, MOST_DELAY_MS / 1000, "beyond this a liquid pushes instead of resisting")] = 0.0
-    jitter_s: Annotated[float, within(0, MOST_JITTER_MS / 1000, "networks have smaller deviations")] = 0.0
-    loss: Annotated[float, within(0, MOST_LOSS, "beyond this most forces are held values")] = 0.0
+    delay_s: Annotated[
+        float, within(0, MOST_DELAY_MS / 1000, "with a longer delay, a liquid pushes instead of resisting")
+    ] = 0.0
+    jitter_s: Annotated[float, within(0, MOST_JITTER_MS / 1000, "jitter in networks is smaller")] = 0.0
+    loss: Annotated[float, within(0, MOST_LOSS, "with higher losses, most forces would repeat the previous one")] = 0.0
     seed: Annotated[int, within(0, 2**32 - 1, "32 bits")] = 0
 
     @property
@@ -259,7 +263,7 @@ class Knee(Frozen):
         within(
             0.01,
             1000,
-            "a hand moves at 0.01 to 2 m/s, times the scale",
+            "a hand moves at 0.01 to 2 m/s, multiplied by the scale",
             what="Speed in the scene above which speeds are lowered [m/s].",
         ),
     ] = 5.0
@@ -284,11 +288,11 @@ class MotionBox(Frozen):
     The defaults assume a hand that moves 40 mm in every direction at up to 0.3 m/s and 3 m/s².
     """
 
-    speed_mps: Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, times the scale")] | None = Field(
-        default=None, description="Maximum speed [m/s]."
-    )
+    speed_mps: (
+        Annotated[float, within(0.001, 1000, "a hand moves at 0.01 to 2 m/s, multiplied by the scale")] | None
+    ) = Field(default=None, description="Maximum speed [m/s].")
     acceleration_mps2: (
-        Annotated[float, within(0.001, 1e5, "a hand accelerates at 0.01 to 100 m/s², times the scale")] | None
+        Annotated[float, within(0.001, 1e5, "a hand accelerates at 0.01 to 100 m/s², multiplied by the scale")] | None
     ) = Field(default=None, description="Maximum acceleration [m/s²].")
     depth_m: tuple[Coordinate, Coordinate] | None = Field(
         default=None,

@@ -112,7 +112,7 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     Blocks and forms occur once in a sequence. `check_groups` checks that no block is omitted in a study with groups.
     """
     pages, blocks, forms = (names(document, section) for section in ("pages", "blocks", "questionnaires"))
-    apart = "rename one of them: sequence needs a different name for each"
+    apart = "rename one of them: every entry of sequence needs its own name"
     for name in pages:
         if name in blocks:
             yield Fault(("blocks", name), "a page has the same name", apart)

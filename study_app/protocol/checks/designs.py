@@ -297,7 +297,7 @@ def _standard_fault(
     """Return a fault if a standard cannot be presented or equals the comparison at the smallest level."""
     place = ("stimuli", str(block.stimulus))
     if stimulus.vary in OF_CONDITION and not 0 <= standard <= OF_CONDITION[stimulus.vary]:
-        permitted = f"from 0 to {OF_CONDITION[stimulus.vary]:g}"
+        permitted = f"choose a standard from 0 to {OF_CONDITION[stimulus.vary]:g}"
         return Fault((*place, "standards"), f"{standard:g} is not permitted for {stimulus.vary}", permitted)
     if (why := _presentation_problem(protocol, stimulus, standard)) is not None:
         return Fault((*place, "standards"), f"{standard:g}: {why}")
@@ -316,12 +316,14 @@ def _out_of_range_fault(block: Block, stimulus: Stimulus, standard: float | None
     permitted = f"at most {limit:g}" if value > 0 else "at least 0"
     if standard is None or stimulus.level_kind != "difference":
         return Fault(
-            place, f"level {level:g} gives {value:g}{unit}, but {name} must be {permitted}", f"{permitted}{unit}"
+            place,
+            f"level {level:g} gives {value:g}{unit}, but {name} must be {permitted}",
+            f"choose levels that give {permitted}{unit}",
         )
     above = "above" if stimulus.direction == "up" else "below"
     most = limit - standard if stimulus.direction == "up" else standard
     message = f"{level:g}{unit} {above} a standard of {standard:g} is {value:g}, but {name} must be {permitted}"
-    return Fault(place, message, f"at most {most:g}")
+    return Fault(place, message, f"choose levels up to {most:g}")
 
 
 def _presentation_problem(protocol: Protocol, stimulus: Stimulus, value: float) -> str | None:

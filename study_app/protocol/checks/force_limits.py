@@ -46,8 +46,7 @@ LIMIT_J: Final = 0.5e-3
 _MOST_NAMED: Final = 4
 """Of more clipped levels the first and the last of each row are named."""
 PACED: Final = 'choose a task of type "follow"'
-_GIVES: Final = ("gives", "give")
-_REACHES: Final = ("reaches", "reach")
+_PRODUCES: Final = ("produces", "produce")
 
 
 def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterator[Fault]:
@@ -66,7 +65,7 @@ def check_paced(protocol: Protocol, delay_ticks: int = ASSUMED_TICKS) -> Iterato
     for block in protocol.blocks.values():
         for index, name in enumerate(block.conditions if block.stimulus is None else ()):
             place = ("blocks", block.id, "conditions", index)
-            yield from _check_clipping_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" reaches', place)
+            yield from _check_clipping_at_pace(protocol, block, protocol.scene_for(name), f'"{name}" produces', place)
 
 
 def _check_estimator_lag(protocol: Protocol) -> Iterator[Fault]:
@@ -110,13 +109,13 @@ def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: 
     if highest_nspm <= limit_nspm:
         return None
     if stimulus.vary in OF_LINK:
-        gives = f'"{condition_of(protocol, stimulus)}" gives'
+        subject = f'"{condition_of(protocol, stimulus)}" produces'
         hint = f"damping_nspm = {_rounded_down(limit_nspm, 1):g}"
     else:
         every = list(_levels_at_strongest_force(protocol, blocks))
-        gives = _levels_with_verb(every, [level for level in every if level.damping_nspm > limit_nspm], _GIVES)
+        subject = _levels_with_verb(every, [level for level in every if level.damping_nspm > limit_nspm])
         hint = _remedy(stimulus, standard, level, limit_nspm)
-    message = f"{gives} {highest_nspm:g} N·s/m at the hand, but {loop} is {limit_nspm:g}"
+    message = f"{subject} {highest_nspm:g} N·s/m of damping at the hand, but {loop} is {limit_nspm:g}"
     return Fault(("stimuli", str(blocks[0].stimulus), "levels"), message, hint)
 
 
@@ -139,7 +138,7 @@ def _check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: in
     condition = condition_of(protocol, stimulus)
     if stimulus.vary in OF_LINK:
         block, scene = max(felt, key=lambda pair: hand_mps_of(protocol, pair[0]))
-        yield from _check_clipping_at_pace(protocol, block, scene, f'"{condition}" reaches', place)
+        yield from _check_clipping_at_pace(protocol, block, scene, f'"{condition}" produces', place)
         return
     every, scene = _levels_at_strongest_force(protocol, blocks), protocol.scene_for(condition)
     limit_nspm, loop = _slope_limit(scene, delay_ticks)
@@ -147,7 +146,7 @@ def _check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: in
     if by_loop and beyond is None:
         most = max(by_loop, key=lambda level: level.asked_n or 0.0)
         message = (
-            f"{_levels_with_verb(list(every), by_loop, _REACHES)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
+            f"{_levels_with_verb(list(every), by_loop)} {most.asked_n:.1f} N at {FASTER:g} times the paced "
             f"speed of {hand_mps_of(protocol, every[most]) / FASTER:.3g} m/s, but {loop} allows only "
             f"{most.sent_n:.1f} N"
         )
@@ -156,7 +155,7 @@ def _check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: in
     if by_force:
         most = max(by_force, key=lambda level: level.asked_n or 0.0)
         strongest = override_value(scene, stimulus.vary, most.comparison)
-        named = _levels_with_verb(list(every), by_force, _REACHES)
+        named = _levels_with_verb(list(every), by_force)
         yield from _check_clipping_at_pace(protocol, every[most], strongest, named, place)
 
 
@@ -194,7 +193,7 @@ def unpaced_clipping_warning(protocol: Protocol, blocks: Sequence[Block]) -> str
 def _check_clipping_at_pace(protocol: Protocol, block: Block, scene: Scene, what: str, place: Path) -> Iterator[Fault]:
     """Yield a fault if the force limit clips a scene at a block's pace, with the share and the remedy.
 
-    ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 reaches".
+    ``what`` is the subject of the sentence with its verb: "standard 32 at level 0.6 produces".
     """
     task = protocol.tasks[block.task]
     if not isinstance(task, Follow):
@@ -252,11 +251,11 @@ def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float |
     return f"choose levels up to {_rounded_down(highest, 3):g}" if highest >= stimulus.levels[0] else ""
 
 
-def _levels_with_verb(every: Sequence[Level], some: Sequence[Level], verbs: tuple[str, str]) -> str:
-    """Return levels as the subject of a sentence with its verb: "levels 40 and 60 give up to"."""
+def _levels_with_verb(every: Sequence[Level], some: Sequence[Level]) -> str:
+    """Return levels as the subject of a sentence with its verb: "levels 40 and 60 produce up to"."""
     subject = _level_ranges(every, some)
     several = subject.startswith("levels") or len({level.standard for level in some}) > 1
-    return f"{subject} {verbs[several]}{' up to' * (len(some) > 1)}"
+    return f"{subject} {_PRODUCES[several]}{' up to' * (len(some) > 1)}"
 
 
 def _level_ranges(every: Sequence[Level], some: Sequence[Level]) -> str:

@@ -115,7 +115,7 @@ def shown_value(value: Any) -> str:
 
 def rule_of(pattern: str) -> str:
     """Return the rule of a pattern as text."""
-    return _PATTERNS.get(pattern, "text of another form")
+    return _PATTERNS.get(pattern, "text in a different format")
 
 
 def did_you_mean(word: str, permitted: Iterable[str]) -> str:
@@ -181,7 +181,7 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         return unknown_name(path, f"{shown_value(tag)} {details['msg']}", tag, context["permitted"].split(", "))
     if kind == "literal_error":
         expected = str(context["expected"]).replace("'", '"')
-        return _unknown_value(path, value, f"{shown_value(value)} is not {expected}", expected)
+        return _unknown_value(path, value, f"must be {expected}, not {shown_value(value)}", expected)
     if kind in _BOUNDS:
         (key, expected), hints = _BOUNDS[kind], (node.get(REASON, "") for node in _nodes_at(document, path, schema))
         bound = int(context[key]) if float(context[key]).is_integer() else context[key]
@@ -194,7 +194,7 @@ def _fault(details: ErrorDetails, document: Mapping[str, Any], schema: Schema) -
         number: _FaultKind = "not a number" if "number" in _KINDS[kind] else ""
         return Fault(path, f"must be {_KINDS[kind]}, not {shown_value(value)}", kind=number)
     if kind == "string_pattern_mismatch":
-        return Fault(path, f"{shown_value(value)} is not permitted: {rule_of(str(context['pattern']))}")
+        return Fault(path, f"{shown_value(value)} is not permitted: use {rule_of(str(context['pattern']))}")
     if kind in _LENGTHS:
         about = {**context, "shown": shown_value(value)}
         return Fault(path, _LENGTHS[kind].format(**about), counts_entries=kind == "too_short")

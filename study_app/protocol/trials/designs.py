@@ -46,7 +46,7 @@ class Modulus(Table):
     """The level of a block's first trial and the number that the participant is given for it; it is not analysed."""
 
     level: float = Field(description="The level presented.")
-    number: Annotated[float, within(1e-6, 1e9, "numbers that people use")] = Field(
+    number: Annotated[float, within(1e-6, 1e9, "participants use numbers in this range")] = Field(
         description="The number assigned to this level."
     )
 
@@ -78,7 +78,7 @@ class Design(Table):
         description="When participants see whether an answer was correct. practice: only in practice (the default); "
         "always: after every answer; never: not at all (the default if answers cannot be correct).",
     )
-    feedback_s: Annotated[float, within(0.2, 10, "people need 0.2 s to see a sign")] = Field(
+    feedback_s: Annotated[float, within(0.2, 10, "people need 0.2 s to notice feedback")] = Field(
         default=0.6, description="How long feedback is shown [s]."
     )
 

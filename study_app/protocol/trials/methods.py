@@ -210,7 +210,7 @@ class _Adaptive(Method):
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         if self.trials % self.tracks:
             message = f"{self.trials} trials cannot be divided among {self.tracks} tracks"
-            yield "trials", message, f"a multiple of {self.tracks}"
+            yield "trials", message, f"choose a multiple of {self.tracks}"
         least, most = stimulus.levels
         begin = self.begin if isinstance(self.begin, tuple) else () if self.begin is None else (self.begin,)
         hint = f"specify one level per track, from {least:g} to {most:g}"
@@ -279,11 +279,11 @@ class Adjustment(Method):
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         low, high = stimulus.domain
         if stimulus.spacing == "log" and self.step_size is not None and self.step_size <= 1:
-            yield "step_size", f"is {self.step_size:g}, but {_LOG_STEP}", "such as 1.05"
+            yield "step_size", f"is {self.step_size:g}, but {_LOG_STEP}", "choose one such as 1.05"
         elif self.step(stimulus) > (high - low) / 2:
             most = stimulus.level_of((high - low) / 4)
             message = f"is {self.step_size:g}, which is more than half the range of levels"
-            yield "step_size", message, f"such as {most:.3g}"
+            yield "step_size", message, f"choose a smaller step, such as {most:.3g}"
 
     def warnings(self) -> Iterator[tuple[str, str]]:
         if self.repetitions % 2:
@@ -409,7 +409,7 @@ class QuestPlus(_Adaptive):
         default=None, description="Median and spread factor of the width's log-normal prior."
     )
     lapses: Annotated[tuple[_Lapse, ...], Field(min_length=1, max_length=10)] = Field(
-        default=LAPSES, description="Lapse rates to be considered."
+        default=LAPSES, description="Candidate values of the lapse rate."
     )
     stop: Precision | None = Field(default=None, description="When a track ends early; default: never.")
 

@@ -60,14 +60,14 @@ class Condition(Table):
         description="shown: the ball is always drawn; hidden: it is drawn only during the task's lead-in.",
     )
     force_delay_ms: Annotated[
-        float, within(0, scene.MOST_DELAY_MS, "after a longer delay the force pushes the hand")
+        float, within(0, scene.MOST_DELAY_MS, "with a longer delay, the force pushes the hand")
     ] = later(default=0, description="Force delay [ms]; the picture is not delayed.")
-    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "delays in networks vary less")] = later(
+    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "jitter in networks is smaller")] = later(
         default=0, description="Maximum additional force delay, drawn at random at every tick [ms]."
     )
-    force_loss: Annotated[float, within(0, scene.MOST_LOSS, "with more losses, most forces would be held values")] = (
-        later(default=0, description="Proportion of ticks at which the force is lost and the previous force is held.")
-    )
+    force_loss: Annotated[
+        float, within(0, scene.MOST_LOSS, "with higher losses, most forces would repeat the previous one")
+    ] = later(default=0, description="Proportion of ticks at which the force is lost and the previous force is held.")
     view: str = later(
         default="tank",
         pattern=r"^(tank|camera|[^\x00]+\.[0-9A-Za-z]+)$",

@@ -479,8 +479,8 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
         *([] if wanted is None else [f"{wanted} participants"]),
     ]
     yield (
-        f"{place}.{key}: {plan.trials} trials{plan.per} and {people} planned participants give ±{100 * reached:.0f} "
-        f"% instead of ±{100 * precision:g} %; "
+        f"{place}.{key}: {plan.trials} trials{plan.per} and {people} planned participants yield "
+        f"±{math.ceil(1000 * reached) / 10:.3g} % instead of ±{100 * precision:g} %; "
         f"{' or '.join(ways) + ' would suffice on average' if ways else 'choose a larger analysis.precision'}"
     )
 

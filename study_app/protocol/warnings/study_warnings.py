@@ -97,7 +97,7 @@ def _clipped_liquids(protocol: Protocol, felt: dict[str, Steady]) -> Iterator[st
             scale = _unclipped_scale(protocol.scene_of(name))
             most_percent = protocol.limits.withheld_percent
             is_valid = 100 * (1 - it.force_n / it.drag_n) <= most_percent
-            beyond = "" if is_valid else ", a reduction beyond limits.withheld_percent"
+            beyond = "" if is_valid else ", which is more than limits.withheld_percent permits"
             advice = "" if scale is None else f"; with scene.scale = {scale} it is not clipped"
             yield (
                 f"{name} is clipped: at a hand speed of {HAND_MPS:g} m/s {limit} reduces its force of "
@@ -180,8 +180,8 @@ def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Itera
     if block.catch is not None and not track.catch:
         share = math.ceil(100 / track.slots) / 100
         yield (
-            f"blocks.{block.id}.catch.share: with a share of {block.catch.share:g}, {track.slots} trials do not "
-            f"include a catch trial; choose {share:g}"
+            f"blocks.{block.id}.catch.share: with a share of {block.catch.share:g}, a track of {track.slots} trials "
+            f"does not contain any catch trials; choose {share:g}"
         )
     if design.feedback == "always" and protocol.study.blinding == "double":
         yield (
@@ -286,7 +286,7 @@ def _repeated_pages(protocol: Protocol) -> Iterator[str]:
     for steps in (variant.protocol.steps for variant in variants(protocol)):
         for name, page in protocol.pages.items():
             if page.kind != "break" and (times := steps.count(name)) > 1:
-                yield f"pages.{name}: this page of kind {page.kind} occurs {times} times in a session"
+                yield f"pages.{name}: this {page.kind} page occurs {times} times in a session"
 
 
 def _block_order_warnings(protocol: Protocol) -> Iterator[str]:
@@ -332,7 +332,9 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     for name in sorted(
         {*block.conditions, *(liquid for condition in conditions for liquid in condition.liquid_ids)} & title_words
     ):
-        yield f"blocks.{block.id}.setting_label: names the condition “{name}”, which reveals it to participants"
+        yield (
+            f"blocks.{block.id}.setting_label: the label names the condition “{name}” and so reveals it to participants"
+        )
 
 
 def _mixed_differences(protocol: Protocol, block: Block, standard: str) -> Iterator[str]:
@@ -416,8 +418,8 @@ def _untitled_forms(protocol: Protocol) -> Iterator[str]:
     for name in protocol.forms if others else ():
         if protocol.questionnaires[name].title is None:
             yield (
-                f"questionnaires.{name}.title: is missing, so participants see the ID as the heading; add a title "
-                f"in {others[0]}"
+                f"questionnaires.{name}.title: there is no title, so participants see the ID as the heading; add a "
+                f"title in {others[0]}"
             )
 
 

@@ -173,7 +173,7 @@ def _clock_drift(stream: Mapping[str, Any]) -> str:
     """Return a text about the drift of a stream's clock against the recorder's, from offsets between two resets."""
     times_s, values_s = (np.asarray(stream.get(name, ()), float) for name in ("clock_times", "clock_values"))
     if len(times_s) < 2:
-        return f"{counted(len(times_s), 'offset')} measured, which is too few to estimate the drift"
+        return f"{counted(len(times_s), 'offset')} measured, too few to estimate the drift"
     resets = np.flatnonzero((np.diff(times_s) < 0) | (np.abs(np.diff(values_s)) > _RESET_S)) + 1
     parts = zip(np.split(times_s, resets), np.split(values_s, resets), strict=True)
     said = []

@@ -107,7 +107,8 @@ def checked_stamp(path: Path, lines: str, token: str) -> str:
     client = optional_library("rfc3161_client")
     if workstation.load_or_default()[0].stamp_root is None:
         raise StoreError(
-            f"{path} is stamped: specify the server's root certificate with liquid-study proof --root FILE"
+            f"{path} has a time stamp: to verify it, specify the server's root certificate with liquid-study "
+            "proof --root FILE"
         )
     try:
         answer = _verify_stamp(base64.b64decode(token), lines)

@@ -209,7 +209,8 @@ def _check_journal(folder: SessionFolder, findings: Findings, *, running: bool) 
             if not running:
                 findings.warning(
                     folder.path,
-                    "was created, but the program ended before it wrote a journal: start it again or delete it",
+                    "was created, but the program ended before it wrote a journal: start the session again, or "
+                    "delete the folder",
                 )
         else:
             findings.error(folder.journal, f"is missing, {_BEGUN}")

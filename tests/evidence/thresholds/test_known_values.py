@@ -181,7 +181,7 @@ def test_another_estimator_and_another_interval_are_noticed(
     monkeypatch.setattr(known_values, "PEOPLE", 20)  # of 300 people in all the mean error is known to 2 % alone
     long = replace(threshold, protocol=parse(SMALL.replace("trials = 20", "trials = 60").encode(), "small.toml"))
     studies = [long.simulate(number, seed=1) for number in range(30)]
-    few = {"studies of 20 within ±15 %"}  # 60 trials are few
+    few = {"studies with 20 participants within ±15 %"}  # 60 trials are few
     assert {row.what for row in verdicts(long, studies) if not row.holds} <= few
     for factor, reach in ((1.1, 1.0), (0.9, 1.0), (1.0, 0.7), (1.0, 1.3)):
         other = [changed(one, factor, reach) for one in studies]
@@ -275,7 +275,7 @@ def test_studies_recover_the_exponent_and_a_wrong_one_is_found(
     exponent: KnownExponent, exponents: list[StudyFound]
 ) -> None:
     judged = verdicts(exponent, exponents)
-    assert judged[0].what == "exponent over viscosity_pa_s"
+    assert judged[0].what == "exponent against viscosity_pa_s"
     assert all(row.holds for row in judged), judged
     assert exponent.simulate(0, seed=1).group == exponents[0].group != exponent.simulate(0, seed=2).group
     means = [found.group[0].value for found in exponents]

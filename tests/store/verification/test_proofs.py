@@ -223,7 +223,7 @@ def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
         verify_study(study, kept)
     workstation.save_settings(workstation.load_settings().model_copy(update={"stamp_root": None}))
     kept.write_text(whole, encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError, match=r"is stamped: specify the server's root certificate"):
+    with pytest.raises(StoreError, match=r"has a time stamp: to verify it, specify the server's root certificate"):
         verify_study(study, kept)
 
 

@@ -39,7 +39,7 @@ class History(Frozen):
         within(
             0.005,
             0.5,
-            "the window holds 5 to 500 accelerations at 1 kHz",
+            "the window contains 5 to 500 accelerations at 1 kHz",
             what="Age up to which accelerations are summed one by one [s].",
         ),
     ] = 0.05

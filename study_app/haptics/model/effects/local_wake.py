@@ -33,7 +33,10 @@ class LocalWake(Frozen):
     spreading_m2ps: Annotated[
         float,
         within(
-            0, 10, "beyond, a wake is gone within a tick", what="How fast a place spreads and weakens with time [m²/s]."
+            0,
+            10,
+            "with faster spreading, a wake vanishes within a tick",
+            what="How fast a wake point spreads and weakens with time [m²/s].",
         ),
     ] = 1e-3
 

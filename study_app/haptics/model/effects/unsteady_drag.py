@@ -40,7 +40,7 @@ def _bars(extremes: Extremes) -> tuple[tuple[str, ...], str]:
     if extremes.reynolds <= _HIGHEST_REYNOLDS:
         return tuple(
             it.name for it in _IN_PLACE_OF
-        ), f"replaced by unsteady drag: {reynolds}, which does not exceed {_HIGHEST_REYNOLDS:g}"
+        ), f"replaced by unsteady drag, because {reynolds} (limit: {_HIGHEST_REYNOLDS:g})"
     return ("unsteady_drag", "history"), (
         f"{reynolds}; unsteady drag has not been checked against flow solutions above {_HIGHEST_REYNOLDS:g}"
     )

@@ -59,7 +59,7 @@ class Wake(Frozen):
         within(
             0,
             100,
-            "a hand turns within its reach",
+            "a hand changes direction within its reach",
             what="Path length over which directions are compared [m]; 0: neighbouring elements.",
         ),
     ] = 0.068
@@ -69,7 +69,7 @@ class Wake(Frozen):
         within(
             0,
             10,
-            "a tail of coarser elements would never move",
+            "with a coarser resolution, no element would be stored",
             what="Smallest motion between two stored elements [m]; 0: every tick is stored.",
         ),
     ] = 0.0
