@@ -147,11 +147,7 @@ def test_any_reader_of_parquet_finds_columns_with_unit_and_meaning(tmp_path: Pat
     schema = parquet.read_schema(written.path)
     for name, unit, description in (
         ("position_y_m", b"m", b"Exact position of the hand, up."),
-        (
-            "velocity_x_mps",
-            b"m/s",
-            b"Scene velocity from which the force was computed, to the right (resolution:",
-        ),
+        ("velocity_x_mps", b"m/s", b"Scene velocity from which the force was computed, to the right (resolution:"),
         ("device_force_z_n", b"N", b"Force that the device applied to the hand, toward the participant (resolution:"),
     ):
         told = schema.field(name).metadata

@@ -172,9 +172,8 @@ def test_shipped_liquids_are_found_and_added_with_all_their_numbers(study: Study
     assert "slime_2 is clipped" not in warned(added)
     clipped = warned(after(added, SetValue(("scene", "scale"), 10)))
     assert (
-        "force of 17.36 N to 5.30 N, which is more than limits.withheld_percent permits; with scene.scale = 3 it is not "
-        "clipped"
-        in clipped
+        "force of 17.36 N to 5.30 N, which is more than limits.withheld_percent permits; with scene.scale = 3 it is "
+        "not clipped" in clipped
     )
     table = added.document["liquids"]["slime_2"]
     assert dict(table) == dict(shipped_liquids()["slime", "slime"])
