@@ -604,8 +604,8 @@ def open_force(
     first = next(iter(scenes.values()))
     if force_limit_n is not None and not 0 < force_limit_n <= first.force_limit_n:
         raise StudyError(
-            f"force_limit_n = {force_limit_n:g} is not possible: specify more than 0 and at most that of the file, "
-            f"{first.force_limit_n:g} N"
+            f"force_limit_n = {force_limit_n:g} is not possible: specify more than 0 and at most "
+            f"{first.force_limit_n:g} N, the limit in the file"
         )
     settings = RigSettings(
         workspace_m=WORKSPACE_M,

@@ -132,7 +132,7 @@ def naming_the_extra() -> Iterator[None]:
             raise
         raise MissingExtra(
             f"this needs {library}, which is not installed on this computer: run pip install 'liquid-study[analysis]', "
-            "or copy the results folder to a computer that has it"
+            "or copy the results folder to a computer on which it is installed"
         ) from error
 
 

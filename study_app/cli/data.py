@@ -39,7 +39,7 @@ from study_app.number_text import counted
 @click.option(
     "--sav",
     is_flag=True,
-    help="Also write the answers, in long and wide format, for SPSS, jamovi and JASP; requires pyreadstat.",
+    help="Also write the answers, in long and wide formats, for SPSS, jamovi and JASP; requires pyreadstat.",
 )
 @click.option(
     "--psych-ds",
@@ -60,7 +60,7 @@ def export(
     With --psych-ds, the exit code is 3 if a section of the report could not be computed.
     """
     if validator is not None and not psych_ds:
-        raise click.UsageError("--validator checks the folder written by --psych-ds: add --psych-ds")
+        raise click.UsageError("--validator checks the folder written by --psych-ds, so add --psych-ds")
     from study_app.analysis.export.table_files import Extra
     from study_app.analysis.export_study import export as export_study
 
@@ -274,7 +274,7 @@ def _parse_sites(_context: click.Context, _parameter: click.Parameter, texts: tu
 def merge(sites: dict[str, Path], to: Path) -> None:
     """Merge the study folders of several sites that ran the same protocol; the folders are copied unchanged.
 
-    Each site's name is added in front of its participant IDs (A-P001), and each site keeps its own sealed key. Use the
+    Participant IDs are prefixed with the site's name (A-P001), and each site keeps its own sealed key. Use the
     merged folder as RESULTS in report, export, plot, verify, unblind, exclude and withdraw.
     """
     from study_app.store.sites.merge import merge_sites

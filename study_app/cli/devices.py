@@ -116,7 +116,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
 @click.option("--scale", is_flag=True, help="Use a luggage scale instead.")
 @click.option("--geometry", metavar="NAME", help="Arm geometry: libnifalcon (default), zm-redux or martin-hillier.")
 def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: bool, geometry: str | None) -> None:
-    """Calibrate a Falcon's force with a known weight or a luggage scale; the result is stored for its serial number.
+    """Calibrate a Falcon's force with a known weight or a luggage scale; the result is stored under its serial number.
 
     The Falcon holds its grip in five positions, first without a load and then with the weight. If the measurements are
     inconsistent, nothing is saved and the exit code is 3.
@@ -158,7 +158,7 @@ def calibrate(name: str, firmware: Path | None, grams: float | None, *, scale: b
     help="Folder for the report; default: bench-NAME in the current folder.",
 )
 def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> None:
-    """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, and stable damping.
+    """Measure a device in ten minutes: timing, noise, mass, friction, force on a scale, and maximum stable damping.
 
     Stay within reach of the power switch: the handle moves by itself, with a force of up to 4 N. To stop the force,
     press Enter, Ctrl+C or the handle's stop button, if it has one. You can share the report (bench.md, bench.json); the

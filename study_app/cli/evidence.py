@@ -311,7 +311,7 @@ def stability(
 ) -> None:
     """Simulate thousands of closed loops with the safety layer off and on, and print the unstable and noisy ones.
 
-    Each case combines a liquid, a scale, a rate, a delay, an estimator, a device and a hand. Further groups test a
+    Each case combines a liquid, a scale, a rate, a delay, an estimator, a device and a hand. Additional groups test a
     second model of the hand and the device, a wrong delay estimate, lost samples, releases mid-stroke, and the Falcon's
     driver with an emulated Falcon. The exit code is 3 if a case is unstable with the safety layer on, or if more than 1
     in 10,000 cases are noisy.
@@ -324,7 +324,7 @@ def stability(
     parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
     exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
     if whole and not delivered:
-        raise click.UsageError("--whole extends the table printed by --delivered: add --delivered")
+        raise click.UsageError("--whole extends the table printed by --delivered, so add --delivered")
     make_output_folder(to)
     if line is not None:
         case = parse(line)
@@ -674,13 +674,13 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @takes_workers
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for thresholds.md and thresholds.csv.")
 def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], workers: Workers, to: Path | None) -> None:
-    """Recover simulated observers' known thresholds, first with the methods and analysis alone, then with sessions.
+    """Recover simulated observers' known thresholds, first with methods and analysis alone, then in complete sessions.
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
     analyses many studies with 20 observers whose thresholds differ by a factor of 1.2. For magnitude estimation, the
-    exponent is specified instead. The command then runs complete sessions with three simulated participants, including
-    the servo, files, unblinding and analysis. Every value is printed with its limit; the interval in brackets is
-    corrected for the number of values. The exit code is 3 if an interval lies beyond its limit.
+    exponent is known instead of a threshold. The command then runs complete sessions with three simulated
+    participants, including the servo, files, unblinding and analysis. Every value is printed with its limit; the
+    interval in brackets is corrected for the number of values. The exit code is 3 if an interval lies beyond its limit.
     """
     from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
     from study_app.evidence.thresholds.known_values import validate as validate_values

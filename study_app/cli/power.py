@@ -152,7 +152,7 @@ def _write_estimate(estimate: PowerEstimate, to: Path | None) -> None:
     "computed",
     type=Target(),
     metavar="DIR",
-    help="Folder written by power --to, whose tables are added to the preregistration.",
+    help="Folder written by power --to; its tables are added to the preregistration.",
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for preregistration.md; default: print it.")
 def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:

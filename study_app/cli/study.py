@@ -215,7 +215,7 @@ def run(protocol: str, *, no_recordings: bool, results: Path | None, **chosen: A
     help=(
         "Simulate thousands of participants in seconds, to try out an analysis. Four complete sessions are simulated "
         "but not stored; each answer is then generated from the forces and delays in one of them. Measurement columns "
-        "contain n/a. Files are written without waiting for the disk to confirm."
+        "contain n/a. Files are written without waiting for confirmation from the disk."
     ),
 )
 @click.option(

@@ -20,7 +20,7 @@ from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
 _LIQUID_FILE = (
-    "Path of a file that contains one liquid, relative to this file; the liquid replaces the keys of this table."
+    "Path, relative to this file, of a file that contains one liquid; that liquid replaces the keys of this table."
 )
 
 

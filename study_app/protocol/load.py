@@ -52,7 +52,7 @@ __all__ = [
 
 _M = TypeVar("_M", bound=BaseModel)
 
-_RENAME: Final = "rename the file, because studies are shared between systems"
+_RENAME: Final = "rename the file, because its name must also be valid on Windows"
 _SHOWN = 200  # characters of a bad value that a message repeats
 _LONG = re.compile(rf'(?<=")[^"]{{{_SHOWN + 1},}}(?=")|\S{{{_SHOWN + 1},}}')
 

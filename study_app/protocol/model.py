@@ -86,7 +86,9 @@ class Credits(Table):
     )
     citation: Printable | None = Field(default=None, description="How to cite the data or the paper.")
     funder: Printable | None = Field(default=None, description="Funder of the study.")
-    url: Printable | None = Field(default=None, description="Web address of the study, such as its preregistration.")
+    url: Printable | None = Field(
+        default=None, description="Web address for the study, such as a link to its preregistration."
+    )
 
 
 class StudyHead(Table):
@@ -145,9 +147,7 @@ class StudyHead(Table):
     @model_validator(mode="after")
     def _name_can_be_a_file(self) -> Self:
         if fault := file_name_fault(self.name):
-            raise invalid(
-                f'"{self.name}" {fault}: studies are shared between systems, so choose a different name', "name"
-            )
+            raise invalid(f'"{self.name}" {fault}: choose a name that is also valid on Windows', "name")
         return self
 
 
@@ -162,8 +162,8 @@ class DeviceNeeds(Table):
     ] = Field(default=1000, description="Servo rate [Hz].")
     force_limit_n: HandForceN = Field(default=MAX_FORCE_N, description="Maximum force on the hand [N].")
     workspace_mm: tuple[float, float, float] = Field(
-        description="Dimensions of the drawn tank along x, y and z in the hand frame, centred on the middle of the "
-        "device's workspace [mm]."
+        description="Dimensions of the drawn tank along x, y and z in the hand frame [mm]; the tank is centred on the "
+        "middle of the device's workspace."
     )
 
     @property

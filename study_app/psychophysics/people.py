@@ -68,12 +68,12 @@ class Person(NamedTuple):
 ASSUMED: Final = Person()
 KINDS: Final = {
     "as assumed": ASSUMED,
-    "function half as wide": Person(width=0.5),
-    "function 1.5 times as wide": Person(width=1.5),
-    "function 2.5 times as wide": Person(width=2.5),
-    "5 % at random": Person(lapse=0.05),
+    "psychometric function half as wide": Person(width=0.5),
+    "psychometric function 1.5 times as wide": Person(width=1.5),
+    "psychometric function 2.5 times as wide": Person(width=2.5),
+    "5 % random answers": Person(lapse=0.05),
     "criterion of 0.5": Person(criterion=0.5),
-    "repeats of the last answer": Person(repeats=0.5),
+    "often repeating the last answer": Person(repeats=0.5),
     "learning": Person(change=1 / 1.5),
     "fatigue": Person(change=1.5),
 }

@@ -34,7 +34,7 @@ from study_app.store.journals.journal_events import plain_json
 
 FRAMES: tuple[Column, ...] = (
     Column("painted_ns", "integer", "Time at which the frame was shown, on the servo's clock.", unit="ns"),
-    Column("sample_ns", "integer", "Time at which the hand position shown was measured.", unit="ns"),
+    Column("sample_ns", "integer", "Time at which the displayed hand position was measured.", unit="ns"),
     Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", unit="ns"),
     Column(
         "video_frame",

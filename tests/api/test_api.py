@@ -113,7 +113,7 @@ def opened(**options: Any) -> None:
         ),
         (lambda: opened(force_limit_n=-50.0), "= -50 is not possible"),
         (lambda: opened(force_limit_n=math.nan), "is not possible"),
-        (lambda: opened(force_limit_n=9.0), "at most that of the file, 8 N"),
+        (lambda: opened(force_limit_n=9.0), "at most 8 N, the limit in the file"),
         (lambda: api.fit(TRIALS.drop(columns="success"), levels=(0.02, 1.0)), "trials do not contain success"),
         (lambda: api.fit(TRIALS, levels=(1.0, 0.02)), "levels"),
         (lambda: api.fit(TRIALS, levels=(0.02, 1.0), design="magnitude"), "no threshold .* specify one of abx, 2ifc"),

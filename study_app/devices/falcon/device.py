@@ -199,7 +199,7 @@ class FalconDevice(FramedDevice):
         except OSError as error:
             raise FAILURES.failure("firmware-file", f"{self._firmware} cannot be read: {error.strerror}") from error
         image = boot.check_firmware(data)
-        unknown = f"SHA-256 {image.sha256[:16]}…, which is not known to work"
+        unknown = f"an unrecognised version (SHA-256 {image.sha256[:16]}…)"
         self._progress(f"Loading the Falcon's firmware, {image.name or unknown}.")
         return boot.boot_falcon(transport, data, progress=self._progress).sha256
 

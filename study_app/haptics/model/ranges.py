@@ -57,7 +57,7 @@ Alpha: TypeAlias = Annotated[
         0.001,
         1,
         "at 0.001 the velocity lags 1 s behind the hand; at 1 it is not smoothed",
-        what="Weight of the newest difference at 1 kHz.",
+        what="Weight of the newest position difference at 1 kHz.",
     ),
 ]
 ForceLimitN: TypeAlias = Annotated[float, within(0.1, 20, "a hand feels little below 0.1 N and may be hurt above 20 N")]
@@ -85,7 +85,7 @@ TailLength: TypeAlias = Annotated[
     within(
         1,
         100_000,
-        "one element per millisecond, so at most 100 s",
+        "one element is stored per millisecond, so this is at most 100 s",
         what="Number N of velocities that the wake stores, one per millisecond.",
     ),
 ]

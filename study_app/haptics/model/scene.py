@@ -264,7 +264,7 @@ class Knee(Frozen):
             0.01,
             1000,
             "a hand moves at 0.01 to 2 m/s, multiplied by the scale",
-            what="Speed in the scene above which speeds are lowered [m/s].",
+            what="Speed in the scene above which speeds are reduced [m/s].",
         ),
     ] = 5.0
 
@@ -274,10 +274,21 @@ class Accuracy(Frozen):
 
     relative: Annotated[
         float,
-        within(0, 1, "a proportion of the force", what="Largest omitted share of the force, or of the force limit."),
+        within(
+            0,
+            1,
+            "a proportion of the force",
+            what="Largest proportion of the force, or of the force limit, that may be omitted.",
+        ),
     ] = 0.05
     absolute_n: Annotated[
-        float, within(0, 20, "the force limit is at most 20 N", what="Largest omitted force, if that is greater [N].")
+        float,
+        within(
+            0,
+            20,
+            "the force limit is at most 20 N",
+            what="Largest force that may be omitted, if greater than that proportion [N].",
+        ),
     ] = 0.05
     without: tuple[Effect, ...] = later(default=(), description='Effects that "auto" never selects.')
 

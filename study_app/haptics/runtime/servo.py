@@ -128,7 +128,8 @@ class Servo:
         """
         if not self.may_adjust(scene):
             raise StudyError(
-                "the scene differs from the current one in more than its numerical values: load it instead"
+                "the scene differs from the current one in more than its numerical values: load the scene instead "
+                "of updating it"
             )
         return self._present(scene, goes_on=True)
 

@@ -210,7 +210,8 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
         return f"{text}; balanced for any multiple of {rows} participants{of}"
     counts = [count for line in order_evenness.positions for count in line]
     even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
-    more = "" if order_evenness.balanced else f"; the order would be balanced with {planned + -planned % rows}"
+    more = "" if order_evenness.balanced else f"; the order would be balanced with {planned + -planned % rows} "
+    f"participants{of}"
     return f"{text}; with {planned} participants{of}, each block occurs in each position {even}{more}"
 
 
@@ -284,7 +285,7 @@ def _advice(block: _BlockBalance) -> Iterator[str]:
             )
             if repetitions == 1:
                 rows = row_count("williams", codes)
-                yield f'order = "williams" would be exactly balanced for every {rows} participants.'
+                yield f'order = "williams" would be exactly balanced with any multiple of {rows} participants.'
         case "williams" | "latin" as square:
             yield from _round_lines(block, row_count(square, codes))
             if square == "williams" and not has_even_borders(codes, repetitions):

@@ -279,7 +279,7 @@ class Adjustment(Method):
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         low, high = stimulus.domain
         if stimulus.spacing == "log" and self.step_size is not None and self.step_size <= 1:
-            yield "step_size", f"is {self.step_size:g}, but {_LOG_STEP}", "choose one such as 1.05"
+            yield "step_size", f"is {self.step_size:g}, but {_LOG_STEP}", "choose a factor such as 1.05"
         elif self.step(stimulus) > (high - low) / 2:
             most = stimulus.level_of((high - low) / 4)
             message = f"is {self.step_size:g}, which is more than half the range of levels"
@@ -528,7 +528,7 @@ class UpDown(_Adaptive):
     def faults(self, stimulus: Stimulus) -> Iterator[tuple[str, str, str]]:
         yield from super().faults(stimulus)
         if stimulus.spacing == "log" and self.step_up is not None and self.step_up <= 1:
-            yield "step_up", f"is {self.step_up:g}, but {_LOG_STEP}", "such as 1.4"
+            yield "step_up", f"is {self.step_up:g}, but {_LOG_STEP}", "choose a factor such as 1.4"
 
     def warnings(self) -> Iterator[tuple[str, str]]:
         successes = int(self.rule[0])

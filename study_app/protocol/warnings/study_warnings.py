@@ -323,7 +323,7 @@ def _condition_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
             if other - delay_ms < _FRAME_MS:
                 yield (
                     f"blocks.{block.id}.conditions: delays of {delay_ms:g} and {other:g} ms differ by less than "
-                    f"a frame of {_FRAME_MS:g} ms, which the screen cannot show"
+                    f"one frame ({_FRAME_MS:g} ms), so the screen cannot show the difference"
                 )
     if block.design is not None and block.standard is not None:
         yield from _mixed_differences(protocol, block, block.standard)

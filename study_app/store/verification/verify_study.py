@@ -504,7 +504,9 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
     """Compare a site's folder with its entry in the list of sites; only withdrawn sessions may be missing."""
     study = StudyFolder(merged.folder(site.name))
     if (name := described_study(study)) not in (None, merged.study):
-        findings.error(study.path, f"contains study {name}, but {merged.manifest.name} lists sites for {merged.study}")
+        findings.error(
+            study.path, f"contains study {name}, but {merged.manifest.name} lists the sites of {merged.study}"
+        )
     with contextlib.suppress(StoreError):  # reported when the site is checked
         withdrawn, merged_at = list(tombstones(study).values()), datetime.fromisoformat(site.merged_at)
         before = site.withdrawals  # clocks of sites may differ, so times decide only for format 1

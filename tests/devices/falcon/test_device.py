@@ -87,7 +87,7 @@ class TestOpening:
             assert "secret" not in described
         loading = [line for line in told if line.startswith("Loading")]
         assert len(loading) == 2
-        assert f"SHA-256 {digest[:16]}…, which is not known to work" in loading[0]
+        assert f"an unrecognised version (SHA-256 {digest[:16]}…)" in loading[0]
         assert loading[1] == "Loading the Falcon's firmware, nvent_firmware.bin."
 
     def test_a_workspace_beyond_its_reach_is_refused(self):

@@ -89,7 +89,7 @@ def test_a_number_is_felt_by_the_next_tick_and_the_wake_goes_on(name: str) -> No
 @pytest.mark.parametrize("name", OTHERWISE)
 def test_what_a_state_was_made_with_cannot_be_adjusted(name: str) -> None:
     servo, device = going_round(WATER)
-    with pytest.raises(StudyError, match="load it instead"):
+    with pytest.raises(StudyError, match="load the scene instead"):
         servo.adjust(override_all(WATER, {name: OTHERWISE[name]}))
     servo.advance(1)
     assert newest(servo, 1)[0].scene == 1

@@ -30,7 +30,10 @@ class _AddedMass(Frozen):
     coefficient: Annotated[
         float,
         within(
-            0, 10, "a sphere has a coefficient of 0.5", what="Added mass over the mass of the displaced liquid, C_a."
+            0,
+            10,
+            "a sphere has a coefficient of 0.5",
+            what="Added mass divided by the mass of the displaced liquid, C_a.",
         ),
     ] = 0.5
     filter_s: Smoothing | None = Field(

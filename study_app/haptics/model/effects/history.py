@@ -40,7 +40,7 @@ class History(Frozen):
             0.005,
             0.5,
             "the window contains 5 to 500 accelerations at 1 kHz",
-            what="Age up to which accelerations are summed one by one [s].",
+            what="Age up to which accelerations are summed individually [s].",
         ),
     ] = 0.05
     smoothing_s: Smoothing | None = Field(
