@@ -148,7 +148,7 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
 
     solution = least_squares(residuals, np.log(begin), diff_step=1e-4, xtol=1e-6, ftol=1e-9)
     if not solution.success:
-        raise StudyError(f"no constants were found: {solution.message}")
+        raise StudyError(f"the fit of the constants failed: {solution.message}")
     return Constants._make(np.exp(solution.x).tolist())
 
 

@@ -122,12 +122,12 @@ LIQUIDS: Final = ("water", "honey", "oil")
 def _recognition() -> Iterator[DrawnStudies]:
     for n in (12, 24, 60):
         for share in (0.5, 0.8):
-            name = f"honey known, water and oil both called water in {100 * share:.0f} %"
+            name = f"honey recognised; water and oil named “water” in {100 * share:.0f} %, otherwise “oil”"
             yield DrawnStudies(
                 name=name, participants=n, claim="water or oil recognised", trial=_recognises(n, share, known=(1,))
             )
         yield DrawnStudies(
-            name="all three liquids guessed",
+            name="all three liquids named at random",
             participants=n,
             claim="a liquid recognised",
             trial=_recognises(n, 0.5, known=()),
@@ -152,13 +152,13 @@ def _equivalence() -> Iterator[DrawnStudies]:
     for bound in (0.5, 1.0):
         share = bound / STEPS
         for words, others in (("0", (0.0,)), ("−1, 0 or 1", (-1.0, 0.0, 0.0, 1.0))):
-            name = f"one in {1 / share:.0f} differs by 6 points, the others by {words}, bound {bound:g}"
+            name = f"one participant in {1 / share:.0f} differs by 6 points, the others by {words}, bound {bound:g}"
             for n in (14, 20, 30, 40):
                 yield DrawnStudies(name=name, participants=n, claim=_EQUIVALENT, trial=_misses(n, share, others, bound))
     for members in (1, 4, 6):
         words = "one hypothesis" if members == 1 else f"{members} hypotheses"
         yield DrawnStudies(
-            name=f"{words} at the bound, normal",
+            name=f"{words} with the true difference at the bound, normal",
             participants=20,
             claim=f"any {_EQUIVALENT}",
             trial=_calls_equivalent(20, members),
@@ -191,7 +191,7 @@ def _contrasts() -> Iterator[DrawnStudies]:
             )
     for n in (8, 12, 20, 30):
         yield DrawnStudies(
-            name="paired, one in six 5 points higher, the others 1 lower",
+            name="paired, one participant in six 5 points higher, the others 1 lower",
             participants=n,
             claim=_SHOWN,
             trial=_compares_pairs(n, _one_in_six),
@@ -226,7 +226,7 @@ def _trends() -> Iterator[DrawnStudies]:
     """Yield skewed individual trends with mean 0, so that ranks fall, and with rank correlation 0."""
     for n in (12, 30):
         yield DrawnStudies(
-            name="individual trends, skewed, mean 0: ranks fall",
+            name="individual trends, skewed with mean 0, so that ranks decrease",
             participants=n,
             claim="an increase shown",
             trial=_follows(n, 0.0, "rise"),

@@ -484,17 +484,17 @@ def _single_tests() -> Mapping[_Case, tuple[_Limit, str, Trial]]:
     tests: dict[_Case, tuple[_Limit, str, Trial]] = {}
     for n in (5, 12, 24):
         for words, most in (("-1, 0, 1", (-1.0, 0.0, 1.0)), ("0", (0.0,))):
-            tests[f"one in five differs by 5 points, the others by {words}", n] = (
+            tests[f"one participant in five differs by 5 points, the others by {words}", n] = (
                 "at most 5 %",
                 "called equivalent",
                 _leaning(n, most),
             )
     for n, spread_ms, never, words in (
-        (5, 0.0, 0.0, "one threshold for all"),
-        (12, 0.0, 0.0, "one threshold for all"),
+        (5, 0.0, 0.0, "the same threshold for all"),
+        (12, 0.0, 0.0, "the same threshold for all"),
         (12, 35.0, 0.0, "participants' thresholds, SD 35 ms"),
         (12, 60.0, 0.0, "participants' thresholds, SD 60 ms"),
-        (12, 15.0, 1 / 6, "one in six never agrees"),
+        (12, 15.0, 1 / 6, "one participant in six never agrees"),
     ):
         tests[words, n] = ("at least 93 %", COVERS, _covered(n, spread_ms, never))
     for claim in false_claims():

@@ -123,15 +123,15 @@ def test_another_estimator_of_noticed_delays_and_other_intervals_are_noticed(
         return replace(found, interval=Interval(low=low, high=high, level=0.95, method="other"))
 
     monkeypatch.setattr(studies, "noticed", other)
-    rates = count_single(("one threshold for all", 12), 1, 0, 150 if reach == 1 else 800)
+    rates = count_single(("the same threshold for all", 12), 1, 0, 150 if reach == 1 else 800)
     assert [one.holds for one in rates if one.what == what] == ["no"] * bool(what)
     assert what or "no" not in [one.holds for one in rates]
 
 
 @pytest.mark.slow
 def test_single_tests_are_counted() -> None:
-    (leaning,) = count_single(("one in five differs by 5 points, the others by 0", 24), 1, 0, 4)
+    (leaning,) = count_single(("one participant in five differs by 5 points, the others by 0", 24), 1, 0, 4)
     assert (leaning.studies, leaning.limit) == (4, "at most 5 %")
-    printed, covered, _ = count_single(("one threshold for all", 12), 1, 0, 4)
+    printed, covered, _ = count_single(("the same threshold for all", 12), 1, 0, 4)
     assert (printed.what, printed.hits, printed.studies, printed.limit) == (PRINTED, 4, 4, "at least 93 %")
     assert covered.hits >= 2
