@@ -25,7 +25,7 @@ _ROUNDING: Final = 1e-9
 
 
 class Criterion(Table):
-    """A block ends as soon as ``right`` of its last ``of`` answers were correct."""
+    """The block ends as soon as ``right`` of the last ``of`` answers are correct."""
 
     right: int = Field(ge=1, le=100, description="How many of the most recent answers must be correct.")
     of: int = Field(ge=1, le=100, description="How many of the most recent answers are considered.")
@@ -42,7 +42,7 @@ class Criterion(Table):
 
 
 class Catch(Table):
-    """Easy trials among the others: a participant who answers many of them incorrectly does not attend to the task."""
+    """Easy trials among the others: participants who answer many of them incorrectly are not attending to the task."""
 
     share: Annotated[float, within(0.01, 0.5, "from one catch trial per 100 other trials to one per 2")] = Field(
         default=0.1,
@@ -67,8 +67,8 @@ class Catch(Table):
 class Block(Table):
     """Trials that share a task and a questionnaire.
 
-    Tables name a condition of a main block by a code, such as L1 with ``code_prefix`` L; which condition a code stands
-    for is drawn at random. Practice and baseline blocks have one condition and are announced as such.
+    In tables, each condition of a main block has a code, such as L1 if ``code_prefix`` is L; which condition a code
+    stands for is random. Practice and baseline blocks have one condition and are announced as such.
     """
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("conditions", "stimulus"),)

@@ -25,7 +25,7 @@ Sequences: TypeAlias = tuple[Annotated[Steps, Field(min_length=1)], ...]
 
 
 class Group(Table):
-    """A group of participants; a group without a sequence has that of the study."""
+    """A group of participants; a group without its own sequence uses the study's sequence."""
 
     share: Annotated[int, within(1, _MOST_SHARE, "shares are small whole numbers")] = Field(
         default=1,

@@ -76,7 +76,7 @@ Format: TypeAlias = Annotated[Literal[2], BeforeValidator(_check_format_number)]
 
 
 class Credits(Table):
-    """Names, licence and citation that an export to share states."""
+    """Authors, licence and citation that are included in an export for sharing."""
 
     authors: tuple[Printable, ...] = Field(
         default=(), max_length=200, description="Authors' names, in the order in which they are cited."
@@ -180,7 +180,7 @@ class DeviceNeeds(Table):
 
 
 class SceneDefaults(Table):
-    """The part of the scene that all conditions share: everything but the liquids."""
+    """The part of the scene shared by all conditions: everything except the liquids."""
 
     scale: SceneScale = Field(default=10, description="Metres in the scene per metre of hand movement.")
     origin_m: Metres = Field(
@@ -232,7 +232,7 @@ class PageText(Table):
 
 
 class OwnBody(Table):
-    """The ball in one liquid; keys that are left out are those of scene.body."""
+    """The ball in one liquid; omitted keys have the values in scene.body."""
 
     diameter_m: DiameterM | None = None
     drag_coefficient: DragCoefficient | None = None
@@ -240,7 +240,7 @@ class OwnBody(Table):
 
 
 class StudyLiquid(Liquid):
-    """A liquid of a study, if needed with a ball of its own."""
+    """A liquid of a study, with its own ball if necessary."""
 
     model_config = ConfigDict(title="Liquid")
 
@@ -336,7 +336,7 @@ _Reported = Annotated[float, within(-1e9, 1e9, "published values are smaller tha
 
 
 class Published(Table):
-    """A value of another study, which figures show next to the study's own."""
+    """A value from another study, which figures show next to this study's results."""
 
     block: Id = Field(description="The block whose results are compared with the published value.")
     measure: Literal["weber", "threshold", "exponent", "pse"] = Field(
@@ -375,7 +375,8 @@ OF_LEVELS: Final = ("threshold", "exponent", "d_prime", "pse")
 class Contrast(Table):
     """A hypothesis: two blocks, conditions or groups differ in a measure; it is tested, planned and reported first.
 
-    With groups and two blocks or conditions it is an interaction: the groups differ in the difference between the two.
+    With groups and two blocks or conditions, it is an interaction: the difference between the two differs between
+    groups.
     """
 
     measure: Id = Field(
@@ -520,7 +521,7 @@ RULE_LIMITS: Final[Mapping[str, RuleLimit]] = {
 
 
 class ExclusionRule(Table):
-    """A rule by which a session is proposed for exclusion; a person decides."""
+    """A rule for proposing a session for exclusion; a person decides."""
 
     rule: _Rule = Field(
         description="Reason for exclusion. "
@@ -549,7 +550,7 @@ class ExclusionRule(Table):
 
 
 class Analysis(Table):
-    """Decisions about the analysis; without this table the report calls all its results exploratory."""
+    """Decisions about the analysis; without this table, the report labels all results as exploratory."""
 
     alpha: Annotated[float, within(0.0001, 0.2, "common significance levels are 0.001 to 0.1")] = Field(
         default=0.05, description="Largest p value that is considered significant."

@@ -23,9 +23,9 @@ _Weight = Annotated[float, within(-1e6, 1e6, "weights in questionnaires are smal
 class Score(Table):
     """One score: ``offset`` + ``factor`` × the sum or mean of the items' answers, some of them reversed or weighted.
 
-    A reversed answer a of an item from l to h counts as l + h − a, times −1 where the item has no bounds. With
-    ``weights_from`` an item's weight is how often its id was chosen in these items (Hart & Staveland 1988, paired
-    comparisons), and a ``mean`` is divided by the sum of the weights.
+    A reversed answer a to an item from l to h counts as l + h − a, or as −a if the item has no bounds. With
+    ``weights_from``, an item's weight is how often its id was chosen in the paired comparisons (Hart & Staveland 1988),
+    and a ``mean`` is divided by the sum of the weights.
     """
 
     items: Annotated[tuple[Id, ...], Field(min_length=1)] = Field(description="The items to combine.")
@@ -101,7 +101,7 @@ def score_range(rule: Score, bounds: Mapping[str, tuple[float, float] | None]) -
 
 
 class Questionnaire(Table):
-    """Questions that are answered after a trial, or on their own where ``sequence`` names the questionnaire."""
+    """Questions asked after a trial, or separately if ``sequence`` lists the questionnaire."""
 
     title: Localised | None = Field(default=None, description="Heading; default: the trial's name.")
     intro: Localised = Field(description="The question shown above the statements.")

@@ -338,7 +338,7 @@ class ChoiceView(ItemView):
 
 
 class Option(Table):
-    """One answer that can be chosen."""
+    """One of the answers to choose from."""
 
     id: Id = Field(description="Name of the option in every table.")
     text: Localised = Field(description="The option shown to the participant.")
@@ -492,7 +492,7 @@ class SliderView(ItemView):
 
 
 class Slider(Question):
-    """A number on a line between two words."""
+    """A number on a line between two labels."""
 
     model_config = ConfigDict(serialize_by_alias=True, validate_by_name=True)
 

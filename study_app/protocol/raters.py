@@ -24,7 +24,7 @@ LAPSE_POINTS: Final = 3.0
 
 
 class SimulatedParticipants(Table):
-    """How simulated participants answer statements; without this table `power` takes published values."""
+    """How simulated participants answer statements; without this table, `power` uses published values."""
 
     noise_sd: Annotated[float, within(0, 3, "half of the scale of seven points")] = Field(
         default=1.10,

@@ -26,12 +26,13 @@ _ROUNDING_TICKS: Final = 1e-6
 
 
 class Ewma(Frozen):
-    """Exponentially weighted average of the differences of positions, the filter of the thesis.
+    """Exponentially weighted moving average of position differences, the filter used in the thesis.
 
     A least-squares line through 15 positions has less lag and less noise while the hand leads (7.0 ms and 0.64 mm/s
-    against 9.5 ms and 1.37 mm/s), but at 1 kHz with one tick of delay a free handle of 0.1 kg is stable only to
-    23 N·s/m with it, and to 71 with EWMA: the lag of a line is all delay, that of a filter mostly a lower gain where a
-    loop would oscillate. Honey needs 31, light oil 55 at 8 N. [choice]
+    instead of 9.5 ms and 1.37 mm/s). At 1 kHz with one tick of delay, however, a free 0.1 kg handle is stable only up
+    to 23 N·s/m with the line, and up to 71 N·s/m with EWMA: the lag of the line is pure delay, whereas the lag of the
+    filter is mostly a lower gain at frequencies where a loop would oscillate. Honey needs 31, light oil 55 at 8 N.
+    [choice]
     """
 
     kind: Literal["ewma"] = "ewma"
@@ -41,15 +42,15 @@ class Ewma(Frozen):
 class Kalman(Frozen):
     """A Kalman filter whose input includes the force just sent; it estimates the mass that this force moves.
 
-    Encoder count, delay and least mass come from the device. If the device does not measure its delay, and while the
-    innovations are too large, the velocity is that of ``ewma`` with its default.
+    The encoder resolution, the delay and the minimum mass are taken from the device. If the device does not measure its
+    delay, or while the innovations are too large, the velocity is that of ``ewma`` with its default weight.
     """
 
     kind: Literal["kalman"] = "kalman"
 
 
 class Raw(Frozen):
-    """The newest difference of positions over its time, without smoothing."""
+    """The latest change of position divided by its duration, without smoothing."""
 
     kind: Literal["raw"] = "raw"
 

@@ -146,7 +146,7 @@ class HerschelBulkley(Frozen):
 
 
 class Carreau(Frozen):
-    """Flow curve τ = η₀ γ̇ [1 + (λγ̇)²]^((n−1)/2): thin at high shear rates, no yield stress."""
+    """Flow curve τ = η₀ γ̇ [1 + (λγ̇)²]^((n−1)/2): shear thinning, without a yield stress."""
 
     kind: Literal["carreau"] = "carreau"
     zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η₀ at low shear rates [Pa·s].")
@@ -155,7 +155,7 @@ class Carreau(Frozen):
 
 
 class Maxwell(Frozen):
-    """Stress by τ + λ dτ/dt = η γ̇: viscoelastic, with the relaxation time λ and the shear modulus η/λ."""
+    """Stress given by τ + λ dτ/dt = η γ̇: viscoelastic, with relaxation time λ and shear modulus η/λ."""
 
     kind: Literal["maxwell"] = "maxwell"
     zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η in steady flow [Pa·s].")
@@ -163,7 +163,7 @@ class Maxwell(Frozen):
 
 
 class ShearThickening(Frozen):
-    """Viscosity η₀ up to a shear rate, the thickened one from twice that rate on; between them τ is linear in γ̇."""
+    """Viscosity η₀ up to the onset shear rate, thickened from twice that rate; in between, τ is linear in γ̇."""
 
     kind: Literal["shear-thickening"] = "shear-thickening"
     zero_shear_viscosity_pa_s: ViscosityPaS = Field(description="Viscosity η₀ at low shear rates [Pa·s].")

@@ -45,7 +45,7 @@ MAX_LIQUIDS = 8
 
 
 class Everywhere(Frozen):
-    """The liquid has no border."""
+    """The liquid fills the whole scene."""
 
     kind: Literal["everywhere"] = "everywhere"
 

@@ -43,7 +43,7 @@ class Attention(Protocol):
 
 
 class Modulus(Table):
-    """The level of a block's first trial and the number that the participant is given for it; it is not analysed."""
+    """The level of a block's first trial and the number assigned to it; this trial is not analysed."""
 
     level: float = Field(description="The level presented.")
     number: Annotated[float, within(1e-6, 1e9, "participants use numbers in this range")] = Field(
@@ -174,7 +174,7 @@ def _one_differs(count: int, *, among: bool) -> tuple[_Arrangement, ...]:
 
 
 class ForcedChoice(Design):
-    """The answer is the interval that held the comparison.
+    """The answer is the interval that contained the comparison.
 
     Green & Swets 1966, Signal Detection Theory and Psychophysics: an observer at chance is correct in 1/m.
     """
@@ -302,7 +302,7 @@ class _JudgementDesign(Design):
 
 
 class Rated(_JudgementDesign):
-    """How much was it? One point of a scale for each level."""
+    """How much was it? Each level is rated on a scale."""
 
     kind: Literal["rating"] = "rating"
     scale: Id = Field(description="The scale for the answer.")

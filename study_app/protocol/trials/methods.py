@@ -241,7 +241,7 @@ _ROUNDING: Final = 1e-9
 
 
 class Adjustment(Method):
-    """Settings start alternately near the smallest and near the largest level; which is first is drawn."""
+    """Settings start alternately near the smallest and the largest level; which comes first is random."""
 
     kind: Literal["adjustment"] = "adjustment"
     adaptive: ClassVar[bool] = False
@@ -342,7 +342,7 @@ _Listed = Annotated[tuple[float, ...], Field(min_length=1, max_length=LEVELS_MOS
 
 
 class Constant(Method):
-    """Every round presents every level once, in a random order of its own."""
+    """Every round presents every level once, in a new random order."""
 
     kind: Literal["constant"] = "constant"
     paper_name: ClassVar = "the method of constant stimuli"
@@ -388,7 +388,7 @@ class Precision(Table):
 
 
 class QuestPlus(_Adaptive):
-    """The level after whose answer the least uncertainty about the threshold is expected."""
+    """The level whose answer is expected to reduce the uncertainty about the threshold most."""
 
     kind: Literal["questplus"] = "questplus"
     learn: Literal["threshold", "all"] = Field(
@@ -493,14 +493,14 @@ def _nearest(coordinates: Sequence[float], u: float) -> int:
 
 
 class Reversals(Table):
-    """When a track ends early: after so many changes of direction."""
+    """When a track ends early: after a number of reversals."""
 
     reversals: Trials = Field(description="Minimum number of reversals.")
     after: Trials = Field(default=1, description="Minimum number of answers.")
 
 
 class UpDown(_Adaptive):
-    """A step down after successes in a row, a step up after each failure."""
+    """One step down after consecutive successes, one step up after each failure."""
 
     kind: Literal["updown"] = "updown"
     rule: Literal["1down1up", "2down1up", "3down1up", "4down1up"] = Field(

@@ -114,10 +114,10 @@ def _spaced(low: float, high: float, log: bool, count: int) -> tuple[float, ...]
 
 
 class Stimulus(Table):
-    """A number that is varied, its standards, and the range of levels L.
+    """A parameter to vary, its standards, and the range of its levels L.
 
-    A comparison with the standard s is s(1 ± L) where the level is ``weber``, s ± L where it is a ``difference``, and L
-    itself where it is a ``value``. Levels are evenly spaced in u = log10 L or in u = L.
+    The comparison with a standard s is s(1 ± L) if the level kind is ``weber``, s ± L if it is ``difference``, and L
+    itself if it is ``value``. Levels are evenly spaced in u = log10 L or in u = L.
     """
 
     condition: Id | None = Field(

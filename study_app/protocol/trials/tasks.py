@@ -109,7 +109,7 @@ class Task(Table):
 
 
 class Explore(Task):
-    """Free motion in the tank, for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue."""
+    """Free exploration of the tank for ``min_s`` to ``max_s``; after ``min_s`` the participant may continue."""
 
     kind: Literal["explore"]
     min_s: float = Field(ge=0, le=3600, description="Minimum time before the participant may continue [s].")
@@ -144,7 +144,7 @@ class Explore(Task):
 class Follow(Task):
     """A target that moves as A r(t) sin 2πft along an axis, with a raised-cosine ramp r over lead_s.
 
-    The task ends after the lead and ``cycles`` whole periods; only the periods after the lead are judged.
+    The task ends after the lead-in and ``cycles`` whole periods; only the periods after the lead-in are evaluated.
     """
 
     kind: Literal["follow"]
@@ -215,10 +215,10 @@ _SHORTEST_MOVE_S: Final = 1.0
 
 
 class Reach(Task):
-    """Targets light up one after the other, repeatedly; the ball must stay in the lit target for ``dwell_s``.
+    """Targets are highlighted in turn, repeatedly; the ball must stay in the highlighted target for ``dwell_s``.
 
-    The task is complete after ``count`` targets or after ``duration_s``, whichever of the two the protocol gives; it
-    ends without being complete at ``timeout_s``. Points are in the hand frame.
+    The task is complete after ``count`` targets or after ``duration_s``, whichever the protocol specifies; at
+    ``timeout_s`` it ends incomplete. Points are in the hand frame.
     """
 
     ONE_OF: ClassVar[tuple[tuple[str, str], ...]] = (("count", "duration_s"),)

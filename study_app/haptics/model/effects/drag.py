@@ -43,10 +43,10 @@ _DampingNspm: TypeAlias = Annotated[
 
 
 class Drag(Frozen):
-    """The law of drag: a constant coefficient, or that of a sphere at its Reynolds number.
+    """The drag law: a constant coefficient, or the coefficient of a sphere at its Reynolds number.
 
-    The law "linear" is a damper, F = −b v with ``damping_nspm`` b [N·s/m] and the velocity v of the hand, whatever the
-    scale, the ball and the knee.
+    The law "linear" is a damper, F = −b v, where b is ``damping_nspm`` [N·s/m] and v is the velocity of the hand; the
+    scale, the ball and the knee have no effect.
     """
 
     law: Law = Field(

@@ -15,7 +15,7 @@ CELLS = 64  # most cells of a local wake
 
 
 class LocalWake(Frozen):
-    """A position tail that stays at the places of the path that left it."""
+    """A position tail that stays where the body left it."""
 
     length: TailLength
     scaling: TailScaling

@@ -42,9 +42,9 @@ _W = TypeVar("_W", bound=Tail)
 
 
 class Wake(Frozen):
-    """The position tail: the velocity of the liquid that the body's recent path leaves behind (Rek 2024, §4.3).
+    """The position tail: the velocity that the body's recent path leaves in the liquid (Rek 2024, §4.3).
 
-    N ≤ S, so that the liquid is never faster than the body.
+    N ≤ S, so the liquid is never faster than the body.
     """
 
     length: TailLength
