@@ -123,7 +123,7 @@ def test_parameters_that_belong_together_are_judged_together():
         ("liquids", "1", "the parameter 'liquids'"),
         ("decay", 1.5, "cannot set decay = 1.5.*less than or equal to 1"),
         ("decay", "fast", "cannot set decay = fast.*valid number"),
-        ("drag", "1", "cannot set drag = 1: drag: is a table of parameters: set one parameter by its name"),
+        ("drag", "1", "cannot set drag = 1: drag is a table of parameters: set one parameter by its name"),
     ],
 )
 def test_an_override_that_fails_says_why(name, value, message):
