@@ -569,7 +569,7 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     key, named = distinguishing_key(siblings)
     if key and key == path[-1]:
         options = tuple(
-            Choice(tag, (" ".join(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0].split())))
+            Choice(tag, _help_of(str(node.get(OWN, node.get("description", ""))).split("\n\n")[0]))
             for tag, node in named.items()
         )
         return Row(
@@ -596,7 +596,7 @@ def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...],
     common: dict[str, Any] = {
         "label": label_at(path),
         "unit": unit_of(next((step for step in reversed(path) if isinstance(step, str)), "")),
-        "help": first.get("description", ""),
+        "help": _help_of(first.get("description", "")),
         "value": value,
         "default": first.get("default", first.get("const")),
         "required": required,
@@ -611,7 +611,7 @@ def _make_row(document: Mapping[str, Any], path: Path, nodes: tuple[_Node, ...],
     kind = _kind(first, isinstance(references, tuple))
     choices = first.get("items", first) if kind == "choices" else first
     names = references if kind in {"reference", "references"} and references is not None else _permitted_values(choices)
-    sentences = _value_sentences(first.get("description", ""))
+    sentences = _value_sentences(common["help"])
     options = tuple(Choice(name, sentences.get(name, "")) for name in names)
     limits = _numbers_in(first) if kind in {"vector", "numbers", "points"} else first
     common["sections"] = sections_at(named) if kind in {"reference", "references"} else ()
@@ -713,6 +713,11 @@ def unit_of(key: str) -> str:
 
 def _unit_suffix(key: str) -> str:
     return max((suffix for suffix in _UNITS if key.endswith(f"_{suffix}")), key=len, default="")
+
+
+def _help_of(description: str) -> str:
+    """Return a description as one line of plain text: that of a table is a docstring with line breaks and markup."""
+    return " ".join(description.replace("`", "").split())
 
 
 def _value_sentences(description: str) -> dict[str, str]:

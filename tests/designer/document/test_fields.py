@@ -72,7 +72,10 @@ def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> 
         bounds = [*row.bounds, *(text for one in row.either for text in one.bounds)]
         found[row.path[-1], row.help] = " ".join(bounds)
         assert row.label
-    for key, words, bounds in described(schema()):
+        texts = [row.help, *(choice.sentence for choice in row.choices)]
+        assert not [text for text in texts if "\n" in text or "`" in text], row.path
+    for key, description, bounds in described(schema()):
+        words = " ".join(description.replace("`", "").split())
         assert (key, words) in found
         assert all(bound in found[key, words] for bound in bounds), key
 
