@@ -493,7 +493,7 @@ def answer(contrast: ContrastResult) -> str:
         people = (
             "of people show a difference larger than the bound"
             if contrast.contrast.groups is None
-            else "of a group belong to a minority that is not represented in the sample"
+            else "of a group belong to a minority that the sample does not include"
         )
         sentences.append(
             f"The mean {kind} lies within the equivalence bounds (equivalent). However, the data do not rule out the "
@@ -610,8 +610,8 @@ def contrast_methods(results: Results) -> Iterator[str]:
         adjusted = f", Holm-adjusted across {number_text.counted(len(bounds), 'bound')}" if len(bounds) > 1 else ""
         yield (
             f"Equivalence was tested with two one-sided t tests and the same bootstrap{adjusted}; both had to show "
-            "equivalence. In addition, the sample had to be large enough to be likely to include a member of any "
-            "minority that could shift the mean by as much as the bound."
+            "equivalence. In addition, the sample had to be large enough that it would probably include a member of "
+            "any minority that could shift the mean by as much as the bound."
         )
     if gone := {
         f"{question(contrast)}: {_left_out_words(contrast)}": None for contrast in contrasts if contrast.left_out

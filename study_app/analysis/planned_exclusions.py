@@ -130,8 +130,8 @@ def rule_sentences(study: Study, results: Results | None) -> tuple[str, ...]:
 
 def _met_words(sessions: int, *, is_known: bool) -> str:
     if not is_known:
-        return "It is applied after unblinding."
-    return f"{capitalised(counted(sessions, 'session')) if sessions else 'No session'} met it."
+        return "The rule is applied after unblinding."
+    return f"{capitalised(counted(sessions, 'session')) if sessions else 'No session'} met this rule."
 
 
 _Rows = Iterator[tuple[Any, str]]

@@ -122,7 +122,7 @@ def test_methods_name_all_compared_conditions_with_their_delays(tmp_path: Path) 
     unblind(folder, "AB", "to analyse")
     made = load_study(folder)
     words = methods(made, evaluate(made))
-    assert "damper and damper with a visual delay of 60 ms were compared using two-interval forced choice" in words
+    assert "(two-interval forced choice), damper and damper with a visual delay of 60 ms were compared." in words
 
 
 def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_block(tmp_path: Path) -> None:
@@ -209,7 +209,7 @@ def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
         assert f"Hypothesis {place} ({words}) was tested with a {sides}-sided paired t test." in told
     assert "The reported p value is the largest of the three, Holm-adjusted across 2 hypotheses." in told
     assert "Equivalence was tested with two one-sided t tests" in told
-    assert "Means were tested in the hypotheses" in told
+    assert "Means were used for the hypotheses" in told
     assert "never means" not in told
     rows = write_report.tests_csv(evaluate(statements(contrast))).decode().splitlines()
     assert "hypotheses" in rows[1]
@@ -559,11 +559,11 @@ def test_power_says_whether_the_planned_participants_suffice() -> None:
         "## Contrast: the difference in sensitivity (d′) between “Green part” and prompt differs between a and" in few
     )
     assert f"**The planned 16 participants are too few to find a difference in d′ smaller than ±{least:.2f} with" in few
-    assert "would find even a fall of d′ from 1.3 to 0 in one block of one group (a difference of 1.3)." in few
+    assert "would detect even a decrease in d′ from 1.3 to 0 in one block of one group (a difference of 1.3)." in few
     assert f"| 20 | 16 (planned) | 90% | ±{half:.2f} | ±{least:.2f} |" in few
     assert "| 20 | 5 | 90% | too few | too few |" in few  # a t test of groups of 2 has one degree of freedom
-    assert "“Too few” means that fewer studies would detect even a difference of 3 SD." in few
-    assert "even a fall" not in told(16, 1.7)
+    assert "“Too few” means that fewer than 80% of studies would detect even a difference of 3 SD." in few
+    assert "even a decrease" not in told(16, 1.7)
     points = smallest_differences(
         contrast, (16,), 0.06, 2, [("20", "90%", 0.9)], "trials", "SD.", "±{:.2f}".format, (0.5, 0.5), planned=16,
         unit=" points", titles={},

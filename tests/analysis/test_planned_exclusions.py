@@ -64,14 +64,14 @@ def test_each_rule_of_answers_counts_what_a_person_can_count() -> None:
     lenient, chance = {"rule": "fast_answers", "limit": 0.2}, {"rule": "below_chance"}
     sealed = replace(with_rules(study, constant, lenient, chance), settings={})
     assert rule_sentences(sealed, results) == (
-        "Planned rule: more than 95 % of the answers to statements are identical. 1 session met it.",
-        "Planned rule: the median response time is below 0.2 s. No session met it.",
-        "Planned rule: a block has fewer correct answers than expected by chance (binomial p below 0.001). It is "
-        "applied after unblinding.",
+        "Planned rule: more than 95 % of the answers to statements are identical. 1 session met this rule.",
+        "Planned rule: the median response time is below 0.2 s. No session met this rule.",
+        "Planned rule: a block has fewer correct answers than expected by chance (binomial p below 0.001). The "
+        "rule is applied after unblinding.",
     )
     page = "".join(conduct(with_rules(study, lenient), results))
     assert "There are no exclusions." in page
-    assert "the median response time is below 0.2 s. No session met it." in page
+    assert "the median response time is below 0.2 s. No session met this rule." in page
     assert found[0].why == f"100 % of the {int((own & responses['counted']).sum())} answers to statements are identical"
     assert found[1].why == f"half of the {int((hurried & answered['counted']).sum())} answers were given within 0.30 s"
 

@@ -164,7 +164,7 @@ TRIAL_DEFINITIONS: Final = {
     "path_m": "length of the hand's path during the trial",
     "force_mean_n": "mean force on the hand during the trial",
     "force_peak_n": "largest force on the hand during the trial",
-    "at_limit_percent": "proportion of the trial's servo ticks at which the force was reduced to the force limit",
+    "at_limit_percent": "proportion of the trial's servo ticks in which the force was clipped at the force limit",
 }
 
 

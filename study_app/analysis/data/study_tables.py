@@ -270,7 +270,7 @@ class Study:
         if warn is None:
             return
         for doubt in self.doubts:
-            warn(f"warning: {doubt}; it was used as it is")
+            warn(f"warning: {doubt}; the file is used nevertheless")
 
     def blocks_of(self, kind: Kind) -> tuple[Block, ...]:
         """Return the blocks that compare liquids, delays or views."""

@@ -46,7 +46,7 @@ def materials(study: Study) -> Materials:
     footage = _footage(study)
     found = _study_file(study.name, set(study.participants["protocol_hash"]), footage)
     if found is None:
-        return Materials({}, ("the study's file", *(f"{name} (SHA-256 {footage[name]})" for name in footage)))
+        return Materials({}, ("the study file", *(f"{name} (SHA-256 {footage[name]})" for name in footage)))
     file, content, liquids = found
     shown = {name: file.parent / name for name in footage if _is_inside(name)}
     there = {name: path for name, path in shown.items() if file_hash(path) == footage[name]}
@@ -111,12 +111,12 @@ def _is_of(study: str, file: Path) -> bool:
 def _why_missing(path: Path | None) -> str:
     """Return why footage is not shared; ``path`` is None if it lies outside the study's folder."""
     if path is None:
-        return "it is outside the study's folder"
+        return "the file is outside the study's folder"
     try:
         with open_regular(path, largest_bytes=math.inf) as file:
             file.read(1)
     except (OSError, ValueError) as error:
-        return f"it cannot be read: {system_message(error) if isinstance(error, OSError) else error}"
+        return f"the file cannot be read: {system_message(error) if isinstance(error, OSError) else error}"
     return "the file with this name has a different SHA-256"
 
 

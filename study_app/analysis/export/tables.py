@@ -125,7 +125,8 @@ _MEASURED: Final = (
     Column(
         "presented_excluded",
         "integer",
-        "Number of additional presentations that exclusions.csv excludes individually; their answers are excluded too.",
+        "Number of presentations that exclusions.csv excludes individually; the other columns include neither them nor "
+        "their answers.",
         minimum=0,
     ),
     Column("n", "integer", "Number of valid answers.", minimum=0),

@@ -157,7 +157,7 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
     band = " Band: equivalence bounds." if bound is not None else ""
     is_weighted = contrast.contrast.measure == "threshold" and not (within and study.split)
     weighted = " Means are weighted as in the test." if is_weighted else ""
-    lines = "Each line joins a participant's two values. " if within or contrast.cells else ""
+    lines = "Each line connects a participant's two values. " if within or contrast.cells else ""
     if contrast.cells:
         lines = f"Left: each group under each condition. {lines}Middle: each participant's {kind}. "
     caption = (

@@ -76,8 +76,8 @@ class _CumulativeModels(StatementTests):
             f"A cumulative logit mixed model was fitted to {self._answers()} to each primary statement, including the "
             f"answers of incomplete participants. Effects are log odds ratios {unit}".rstrip()
             + f" with 95 % Wald intervals; they are positive if {sign}. The SDs describe the participants' intercepts"
-            f"{' and delay effects' if delays else ''}. Effects were tested with likelihood ratios (LR; {methods}), "
-            f"and p values were adjusted ({fitted[0].correction}) across "
+            f"{' and delay effects' if delays else ''}. Effects were tested with likelihood-ratio tests (LR; "
+            f"{methods}), and p values were adjusted ({fitted[0].correction}) across "
             f"{number_text.counted(fitted[0].members, 'test')}.",
             "soft",
         )
@@ -104,6 +104,6 @@ class _CumulativeModels(StatementTests):
             yield (
                 f"In an exploratory analysis, a cumulative logit mixed model with random intercepts{slopes} was fitted "
                 f"to {self._answers()} to {counted(fitted, 'primary statement')}, including the answers of "
-                "incomplete participants; effects were tested with likelihood ratios, and the false discovery rate was "
-                "controlled (Benjamini–Hochberg)."
+                "incomplete participants; effects were tested with likelihood-ratio tests, and the false discovery "
+                "rate was controlled (Benjamini–Hochberg)."
             )

@@ -137,11 +137,11 @@ class Settings(LevelStatistic[SettingEstimate]):
         )
 
     def explained(self) -> str:
-        in_u = "logarithm of the level" if self.found.spacing == "log" else "level"
+        values = "logarithms of the set levels" if self.found.spacing == "log" else "set levels"
         error = " constant error: PSE − standard;" if self._are_compared else ""
         return (
             f"Settings are expressed as levels ({level_words(self.found)}). PSE (point of subjective equality): mean "
-            f"of the {in_u}, with a 95 % confidence interval (Student’s t); JND (just-noticeable difference): their "
+            f"of the {values}, with a 95 % confidence interval (Student’s t); JND (just-noticeable difference): their "
             f"standard deviation;{error} hysteresis: mean of the settings that started high minus mean of those that "
             "started low. Group values are means across participants; the group PSE has a 95 % confidence interval."
         )
@@ -410,11 +410,11 @@ class Answers(LevelStatistic[LevelAnswers]):
         if stimulus is None:
             known = [] if block.reference is None else [block.reference, *block.settings]
             conditions = listed([*map(_condition_words, known)]) or "conditions"
-            yield f"In “{title}”, {conditions} were compared using {design}."
+            yield f"In “{title}” ({design}), {conditions} were compared."
             return
         kind, (low, high) = KINDS[stimulus.level_kind], stimulus.levels
         chosen = "" if block.method is None else f"; levels were chosen by {block.method.paper_name}"
         yield (
-            f"In “{title}”, {self.found.quantity} was judged using {design}, at {kind} from {low:g} to {high:g}"
+            f"In “{title}” ({design}), {self.found.quantity} was judged at {kind} from {low:g} to {high:g}"
             f"{standards_of(self.found, self.rows)}{chosen}."
         )

@@ -90,7 +90,7 @@ def level_section(result: LevelsResult, pictures: Sequence[Picture], estimator: 
 
     ``estimator`` is the name of the servo's velocity estimator, None if the receipt has none.
     """
-    yield heading(3, "Time to answer")
+    yield heading(3, "Response times")
     yield table_of(
         result.times,
         ("Setting" if result.revealed else "Code", lambda answers: answers.name),

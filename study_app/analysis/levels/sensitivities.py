@@ -261,7 +261,7 @@ class Sensitivities(LevelStatistic[SensitivityEstimate]):
                 [f"{row.participant} ({_where(row)})" if several else str(row.participant) for row in perfect]
             )
             yield (
-                f"{self.found.title}: all answers of {people} were correct, so these values of d′ are lower limits "
+                f"{self.found.title}: {people} answered all trials correctly, so these values of d′ are lower limits "
                 "that depend on the number of trials."
             )
         if self.found.design != "2ifc" or self.found.vary is None:

@@ -26,7 +26,7 @@ _R = TypeVar("_R")
 Shown: TypeAlias = tuple[str, Callable[[Any], str]] | None
 """A column of a table of the report: its heading and what makes a cell of a row; None is one that is left out."""
 
-MOTORS: Final = "the motors are audible and were not masked, so participants may have relied on their sound."
+MOTORS: Final = "the sound of the motors was not masked, so participants may have relied on it."
 
 
 class LevelStatistic(Generic[_R]):

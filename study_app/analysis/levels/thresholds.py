@@ -591,17 +591,21 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         kinds: tuple[tuple[Callable[[ThresholdEstimate], bool], str], ...] = (
             (
                 shifted,
-                f"with so few answers, the prior on the width shifts a threshold by more than {100 * _SHIFT:.0f} %",
+                f"because there are few answers, the prior on the width shifts the threshold by more than "
+                f"{100 * _SHIFT:.0f} %",
             ),
             (
                 lambda estimate: estimate.beyond == "above",
-                "a threshold lies an unknown amount above the highest level of the stimulus",
+                "the threshold lies above the highest level of the stimulus by an unknown amount",
             ),
             (
                 lambda estimate: estimate.beyond == "below",
-                "a threshold lies an unknown amount below the lowest level of the stimulus",
+                "the threshold lies below the lowest level of the stimulus by an unknown amount",
             ),
-            (lambda estimate: not estimate.fits, "the function does not fit the answers, so a threshold may be biased"),
+            (
+                lambda estimate: not estimate.fits,
+                "the function does not fit the answers, so the threshold may be biased",
+            ),
             (
                 lambda estimate: estimate.n < _FEW_ANSWERS,
                 f"intervals are wide because there are fewer than {_FEW_ANSWERS} answers",
@@ -653,8 +657,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         ]:
             yield (
                 f"{self.found.title}: errors are more clustered than the fitted functions predict, by "
-                f"{listed(clusters)}, as if participants had answered at random for several trials. The group's "
-                "threshold may therefore be too high."
+                f"{listed(clusters)}. Participants may have answered at random for several trials in a row, so the "
+                "group's threshold may be too high."
             )
         if thresholds := [
             f"{group.if_many_lapses:.3g} instead of {group.threshold:.3g}{where}"

@@ -342,7 +342,7 @@ COLUMNS: Final = (
 _HEADS: Final[dict[Question, tuple[str, str]]] = {
     "settings differ": ("Do the conditions differ?", "statement"),
     "trend": ("Do answers change with the delay?", "statement"),
-    "lowest delay": ("Can a trend be shown up to this delay, or up to a shorter one?", "statement, delay"),
+    "lowest delay": ("Can a trend be shown over delays up to this one, or over fewer delays?", "statement, delay"),
     "equivalence": ("Can any delay be shown to be equivalent to the shortest one?", "statement, delay"),
     "contrast": ("Can the hypothesis be shown?", "hypothesis"),
 }
@@ -450,7 +450,7 @@ def _preface(power: Powers) -> list[str]:
 
 
 _SOURCES: Final = (
-    "The values for consistent, typical and noisy people come from published ratings, in points on a seven-point "
+    "The values for consistent, typical and noisy participants come from published ratings, in points on a seven-point "
     "scale. Consistent: a trained panel (data set TVbo, R package lmerTest, Kuznetsova, Brockhoff and Christensen "
     "2017; medians across 15 attributes). Typical: panellists who rated chocolates (data set sensochoc, R package "
     "SensoMineR, Lê and Husson 2008; medians across 14 descriptors). Noisy: the largest of these 14 values. The noise "
@@ -463,7 +463,7 @@ BEYOND: Final = "beyond"
 
 def _people(kind: str) -> str:
     """Return a kind of people in words."""
-    return f"people {kind}" if kind == STATED else f"{kind} people"
+    return f"participants {kind}" if kind == STATED else f"{kind} participants"
 
 
 def _summary(power: Powers) -> Iterator[str]:
@@ -484,8 +484,8 @@ def _summary(power: Powers) -> Iterator[str]:
             about = "" if curve.question == "contrast" else f" ({HEADS[curve.question]})"
             lines.append(
                 f"- {_name(curve, power).strip('*')}{about}: {shares[CONSISTENT]:.0%} of studies detect the effect if "
-                f"people are {CONSISTENT}, {shares[main]:.0%} if they are {main}, and {shares[NOISY]:.0%} if they are "
-                f"{NOISY}."
+                f"participants are {CONSISTENT}, {shares[main]:.0%} if they are {main}, and {shares[NOISY]:.0%} if "
+                f"they are {NOISY}."
             )
     if lines:
         yield from ("", f"## Power with {planned}{sizes[place]} participants", "", *lines)
@@ -627,7 +627,10 @@ def smallest_differences(
         f"participants{' in each group' if shares else ''}, at α = {alpha / bounds:.2g}. "
     )
     has_too_few = any(differences(n, spread) is None for n in sizes for *_, spread in rows)
-    unusable = f"“Too few” means that fewer studies would detect even a difference of {MOST_SD:g} SD. " * has_too_few
+    unusable = (
+        f"“Too few” means that fewer than {WANTED:.0%} of studies would detect even a difference of {MOST_SD:g} SD. "
+        * has_too_few
+    )
     yield (
         f"{said}{both} The “smallest difference” is the difference that {WANTED:.0%} of studies detect ({at}). "
         f"{unusable}{within}{inclusion_words([contrast])}"
@@ -671,7 +674,7 @@ def _verdict(
     measure, mean = assumed
     where = "one group" if contrast.within is None else "one block of one group" if contrast.groups else "one block"
     return (
-        f"{verdict} Fewer than {WANTED:.0%} of studies would find even a fall of {measure} from {mean:g} to 0 in "
+        f"{verdict} Fewer than {WANTED:.0%} of studies would detect even a decrease in {measure} from {mean:g} to 0 in "
         f"{where} (a difference of {mean:g})."
     )
 

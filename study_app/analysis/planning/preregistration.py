@@ -247,8 +247,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
         yield (
             f"We describe the answers to the questions in {listed(list(protocol.forms))} and do not test "
             f"them{hypotheses}. We report the mean score of each form across participants with its 95 % confidence "
-            "interval (Student's t). If a form is not scored, we report the means of its ratings and numbers. Chosen "
-            "options are counted."
+            "interval (Student's t). If a form is not scored, we report the means of its ratings and numbers. We "
+            "count how often each option is chosen."
         )
     if not asked:
         return
@@ -542,8 +542,8 @@ def deviations_section(study: Study) -> Iterator[str]:
     yield heading(2, "Preregistration")
     if (committed := compared.commitment) is None:
         missing = (
-            f"The study's folder does not contain {FILE}. “Write preregistration” in the designer or liquid-study "
-            "preregister --to writes this file. If you already have it, copy it to the folder. "
+            f"The study's folder does not contain {FILE}. To create this file, use “Write preregistration” in the "
+            "designer or liquid-study preregister --to. If you already have the file, copy it to the folder. "
         )
         where = "" if study.simulated else missing
         yield paragraph(f"{where}Only the number of participants is compared with the plan in the protocol.")

@@ -358,8 +358,8 @@ def threshold_markdown(precisions: Precisions) -> str:
 
 
 _NO_INTERVAL: Final = (
-    "“–” means that at least half of the simulated studies have no interval: there are fewer than three participants "
-    "or all estimates are equal, or limits clip the levels."
+    "“–” means that at least half of the simulated studies do not have an interval, because there are fewer than "
+    "three participants, because all estimates are equal or because limits clip the levels."
 )
 
 

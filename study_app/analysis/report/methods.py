@@ -359,7 +359,7 @@ def _means(results: Results, blocks: list[BlockResult]) -> Iterator[str]:
         ("the exploratory tests of means", any(MeanTests.tested(block) for block in blocks)),
     ]
     where = [what for what, applies in tested if applies]
-    yield f"Means were tested in {listed(where)}." if where else "Means were not tested."
+    yield f"Means were used for {listed(where)}." if where else "Means were not tested."
 
 
 def _common(results: Results, blocks: list[BlockResult]) -> Iterator[str]:

@@ -181,7 +181,7 @@ def _late_devices(study: Study) -> Iterator[str]:
     if len(late):
         assumed = " or ".join(f"{ticks:g}" for ticks in sorted(set(late["loop_delay_ticks"])))
         yield (
-            f"In {len(late)} of {counted(len(rows), 'trial')} in the main blocks, the device answered later than the "
+            f"In {len(late)} of {counted(len(rows), 'trial')} in the main blocks, the device responded later than the "
             f"servo assumed: after at least {late['device_delay_ticks'].max():g} ticks in one of them, instead of "
             f"{assumed}. In these trials, the force acted too late, and the passivity controller reduced it."
         )
@@ -663,7 +663,7 @@ def _delivered(study: Study, results: Results) -> Iterator[str]:
         "Delay error is the age of the drawn position minus the requested delay. The table shows the mean across "
         "trials and the trial with the largest mean error. Times are from the program's clock and do not include "
         "display latency. "
-        + (f"Timing limits: {'; '.join(_limit(what, limit) for what, limit in limits.items())}. " if limits else "")
+        + (f"Limits: {'; '.join(_limit(what, limit) for what, limit in limits.items())}. " if limits else "")
         + f"{_violated_limits(study, limits)}Trials that exceed a limit are included, unless they are excluded above."
         + (
             ""
@@ -693,7 +693,8 @@ def _limit(what: str, limit: float) -> str:
     """Return a limit as text: "frame gap at most 250 ms"."""
     words, _, unit = what.rpartition("_")
     most = f"at most {limit:g} {'%' if words and unit == 'percent' else unit}"
-    return f"{words.replace('_', ' ')} {most}" if words else most
+    named = words.replace("_", " ").replace("withheld", "force held back")
+    return f"{named} {most}" if words else most
 
 
 def _within(delivered: Delivered) -> str:

@@ -98,7 +98,10 @@ def cumulative_model(
         incomplete=int((given[takes_part].any(axis=2).sum(axis=1) < conditions).sum()),
     )
     if n < _FEWEST or len(np.unique(answered[~np.isnan(answered)])) < 2:
-        few = f"there are fewer than {_FEWEST} participants; the error rate of the test was not measured for so few"
+        few = (
+            f"there are fewer than {_FEWEST} participants, and the error rate of the test has not been evaluated "
+            "for such small samples"
+        )
         note = few if n < _FEWEST else "all participants gave the same answer in all conditions"
         return replace(model, no_interval=note, note=note)
     return _fitted(model, _Likelihood(answered, design, slopes=columns is not None and several == 1), direction)

@@ -134,11 +134,11 @@ def test_a_d_prime_from_correct_answers_alone_is_called_a_lower_limit() -> None:
     assert nearly.low < nearly.d_prime < nearly.high
     of_block = SimpleNamespace(title="Pairs", design="abx", vary="damping", statistics={Sensitivities.key: people})
     (limit,) = Sensitivities(cast("Any", of_block)).limits()
-    assert limit.startswith("Pairs: all answers of P001 were correct")
+    assert limit.startswith("Pairs: P001 answered all trials correctly")
     others = [replace(estimate, standard=20.0) for estimate in (perfect, nearly)]
     of_block.statistics[Sensitivities.key] = [*people, *others]
     (limit,) = Sensitivities(cast("Any", of_block)).limits()
-    assert "all answers of P001 (8) and P001 (20) were correct" in limit
+    assert "P001 (8) and P001 (20) answered all trials correctly" in limit
 
 
 def test_what_is_said_of_abx_names_its_assumption_and_where_the_other_model_is() -> None:

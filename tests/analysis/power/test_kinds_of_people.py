@@ -110,7 +110,7 @@ def test_the_people_of_the_study_file_come_first_and_the_range_encloses_them() -
     assert first == consistent  # equal values, equal people
     assert [one.power for one in noisy] != [one.power for one in first]
     told = power_markdown(found)
-    assert "% of studies detect the effect if people are consistent, " in told
+    assert "% of studies detect the effect if participants are consistent, " in told
     assert power_csv(found).count(b",noisy,") == len(noisy)
 
 
@@ -168,7 +168,7 @@ def test_the_command_adds_the_planned_number_of_participants_and_quotes_it(
     (line,) = (line for line in registered.splitlines() if line.startswith("- Smooth (conditions differ): "))
     assert "## Power with the planned 7 participants" in registered
     assert re.fullmatch(
-        r"- Smooth \(conditions differ\): \d+% of studies detect the effect if people are consistent, \d+% if they are "
-        r"typical, and \d+% if they are noisy\.",
+        r"- Smooth \(conditions differ\): \d+% of studies detect the effect if participants are consistent, \d+% if "
+        r"they are typical, and \d+% if they are noisy\.",
         line,
     )

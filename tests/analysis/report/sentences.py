@@ -811,7 +811,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Within participants, it is the proportion of .*\.", when(lambda told: bool(told.contrasts))),
     (r"The mean difference lies within the equivalence bounds \(equivalent\)\.", bound_of_a_contrast("within")),
     (r"However, the data do not rule out the possibility that up to (\d+) % of (people show a difference larger than "
-     r"the bound|a group belong to a minority that is not represented in the sample)\.",
+     r"the bound|a group belong to a minority that the sample does not include)\.",
      bound_of_a_contrast("within")),
     (r"(The whole confidence interval lies|All differences lie) outside the equivalence bounds \(not equivalent\)\.",
      bound_of_a_contrast("beyond")),
@@ -921,7 +921,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"Fan type 7\)\.", always),
     (r"Mean differences from the first condition are shown with 95 % confidence intervals \(Student's t\)\.",
      when(lambda told: bool(told.block["effects"]))),
-    (r"Means were tested in (.*)\.", tested_means),
+    (r"Means were used for (.*)\.", tested_means),
     (r"Means were not tested\.", no_tested_means),
     (r"First, the (?:liquids|delays) were compared across both statements with a within-participant permutation test; "
      r"the statistic was the sum of the statements' Friedman statistics\.",
@@ -978,7 +978,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"In an exploratory analysis, a cumulative logit mixed model with random intercepts( and delay effects)? was "
      rf"fitted to (?:all individual|the participants' median) answers to {N} primary statements?, including the "
      r"answers of incomplete participants; "
-     r"effects were tested with likelihood ratios, and "
+     r"effects were tested with likelihood-ratio tests, and "
      r"the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
      cumulative_models),
     (r"Missing answers were not imputed; (\d+) participants? with a missing answer to a statement (?:was|were) "

@@ -65,13 +65,13 @@ def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
 def test_limits_count_the_trials_in_which_the_device_answered_late() -> None:
     study = load_study(SAMPLE.path)
     results, trials = evaluate(study), study.trials.assign(loop_delay_ticks=1.0, device_delay_ticks=np.nan)
-    assert not [line for line in limits(replace(study, trials=trials), results) if "device answered" in line]
+    assert not [line for line in limits(replace(study, trials=trials), results) if "device responded" in line]
     main = trials.index[trials["counted"] & (trials["phase"] == "main")]
     trials.loc[trials.index[trials["phase"] != "main"], "device_delay_ticks"] = 7.0
     trials.loc[main[:3], "device_delay_ticks"] = 3.0, 4.0, 3.0
-    (told,) = [line for line in limits(replace(study, trials=trials), results) if "device answered" in line]
+    (told,) = [line for line in limits(replace(study, trials=trials), results) if "device responded" in line]
     assert told.startswith(
-        f"In 3 of {len(main)} trials in the main blocks, the device answered later than the servo assumed: after at "
+        f"In 3 of {len(main)} trials in the main blocks, the device responded later than the servo assumed: after at "
         "least 4 ticks in one of them, instead of 1. "
     )
 

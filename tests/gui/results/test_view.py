@@ -190,7 +190,7 @@ def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
 
 def test_what_a_rule_proposes_is_excluded_or_kept_by_a_person(place, qtbot):
     proposed = replace(LEFT_OUT, trial=None, rule_or_person="below_chance", reason="0 of 40", excluded_at="")
-    rule = "Planned rule: a block has fewer correct answers than expected by chance. 1 session met it."
+    rule = "Planned rule: a block has fewer correct answers than expected by chance. 1 session met this rule."
     place.show_view(replace(view(left_out=()), rules=(rule.replace("1", "No"),)))
     assert place.exclusions.summary.text().split("\n") == [
         "Nothing is excluded from the analysis.",
