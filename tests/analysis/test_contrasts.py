@@ -518,7 +518,7 @@ def test_power_tells_the_smallest_difference_between_groups() -> None:
     text = "\n".join(line for line in DELAYED.splitlines() if not line.startswith("contrasts"))
     error = math.log(1.3) / math.sqrt(2)  # the SD of the two errors is ln 1.3
     found = {("late", 20): PrecisionResult([np.array([[error], [-error]])], [np.full(2, 0.2)])}
-    for share, sizes in (1, "Each group has 50%"), (2, "The two groups have 67% and 33%"):
+    for share, sizes in (1, "Each group contains 50%"), (2, "The two groups contain 67% and 33%"):
         protocol = grouped(text, "threshold", "late", '["late", "prompt"]', share)
         precisions = Precisions(protocol=protocol, sizes=(3, 18), studies=10, asked=10, seed=1, found=found)
         told = threshold_markdown(precisions)

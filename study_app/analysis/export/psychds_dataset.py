@@ -224,7 +224,7 @@ def _json(content: Any) -> bytes:
 def _readme(study: Study, tables: Mapping[str, bytes], report: Mapping[str, bytes], missing: Sequence[str]) -> bytes:
     simulated = "**All participants are simulated.** " if study.simulated else ""
     blinded = (
-        "Conditions appear under their names."
+        "Conditions are identified by their names."
         if study.revealed
         else ("Conditions appear as codes, because the study is blinded.")
     )

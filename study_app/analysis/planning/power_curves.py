@@ -560,8 +560,8 @@ def _bounds(plan: Plan) -> int:
 def _group_sizes(first: float, second: float) -> str:
     """Return the sentence on the shares of participants in two groups."""
     if f"{first:.0%}" == f"{second:.0%}":
-        return f"Each group has {first:.0%} of the participants."
-    return f"The two groups have {first:.0%} and {second:.0%} of the participants."
+        return f"Each group contains {first:.0%} of the participants."
+    return f"The two groups contain {first:.0%} and {second:.0%} of the participants."
 
 
 def smallest_differences(

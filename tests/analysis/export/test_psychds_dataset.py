@@ -113,7 +113,7 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
 @pytest.mark.parametrize(
     ("is_revealed", "sentence"),
     [
-        (True, "Conditions appear under their names."),
+        (True, "Conditions are identified by their names."),
         (False, "Conditions appear as codes, because the study is blinded."),
     ],
 )

@@ -270,7 +270,7 @@ def test_a_report_marks_open_ends_and_says_so() -> None:
     sentences = " ".join(shown.limits())
     assert "do not determine one or both ends of the 95 % interval" in sentences
     assert "thresholds fell by 3.1 standard errors after the first trials" in sentences
-    assert "errors are more clustered than the fitted functions predict, by 1.5 standard errors," in sentences
+    assert "errors are more clustered than the fitted functions predict, by 1.5 standard errors." in sentences
     assert "a mean lapse rate of 9 %, at which the group's threshold would be 0.444 instead of 0.5" in sentences
 
 

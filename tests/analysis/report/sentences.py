@@ -906,8 +906,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"bounds)?; both had to show equivalence\.",
      lambda match, told: int(match[1] or 1)
      == sum(one["contrast"]["bound"] is not None for one in told.contrasts)),
-    (r"In addition, the sample had to be large enough to be likely to include a member of any minority that could "
-     r"shift the mean by as much as the bound\.",
+    (r"In addition, the sample had to be large enough that it would probably include a member of any minority that "
+     r"could shift the mean by as much as the bound\.",
      when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
     (rf"Hypothesis(?: (\d+))?: (?:with )?{N} participants (?:and the observed variation between them, a mean "
      rf"difference must be at least {R} to be detected with 80 % power; a smaller one cannot be ruled out|are "
