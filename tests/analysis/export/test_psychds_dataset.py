@@ -99,7 +99,7 @@ def test_missing_footage_is_named_with_its_hash(kitchen: Path, tmp_path: Path) -
     footage = tmp_path / "protocols" / "waves.mp4"
     for change, why in (
         (lambda: footage.write_bytes(b"other waves"), "the file with this name has a different SHA-256"),
-        (footage.unlink, "it cannot be read: No such file or directory"),
+        (footage.unlink, "the file cannot be read: No such file or directory"),
     ):
         change()
         export(kitchen, tmp_path / "out", extras=["psych-ds"])
