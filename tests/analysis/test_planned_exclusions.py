@@ -148,7 +148,7 @@ def test_keys_that_were_exchanged_are_proposed_and_decided_by_a_person(pairs: Pa
     report(pairs, tmp_path / "kept")
     assert "no decision has been made yet" not in (tmp_path / "kept" / "report.html").read_text("utf-8")
 
-    with pytest.raises(StoreError, match="specify it as the rule, and the name of the person who decides"):
+    with pytest.raises(StoreError, match="specify it as the rule, together with the name of the person who decides"):
         exclude(pairs, "P002", 1, by="below_chance", reason="keys exchanged")
     exclude(pairs, "P002", 1, rule="below_chance", by="CD", reason="keys exchanged")
     with pytest.raises(StoreError, match="is excluded: include it without --rule"):
