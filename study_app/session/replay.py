@@ -207,7 +207,7 @@ def replay(session_folder: Path) -> Replayed:
     kept = receipt.read(session.receipt)
     key = blinding.read_key(study.path)
     if key.hash != kept["key_hash"]:
-        raise StoreError(f"{study.key} is not the key for session {session.path}: restore it from a back-up")
+        raise StoreError(f"{study.key} is not the key for session {session.path}: restore it from a backup")
     lines = open_events(journal.read(session.journal), key)
     protocol, devices, (drawn_from, participant) = _recorded_setup(session.receipt, kept, key, lines)
     _recompute_forces(records(SAMPLE, 0), Scene(), devices[None], None)  # loads the compiled code before the timing
@@ -220,7 +220,7 @@ def replay(session_folder: Path) -> Replayed:
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(
-                f"{session.receipt} does not contain the device used since {resumed}: restore it from a back-up"
+                f"{session.receipt} does not contain the device used since {resumed}: restore it from a backup"
             )
         name = attempt_name(*which)
         if not isinstance(line, events.Recorded):

@@ -326,7 +326,7 @@ def refuse_special_files(path: Path) -> None:
 def cannot_read(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
     return StoreError(
-        f"{path} cannot be read ({system_message(error)}): correct its permissions, or restore it from a back-up"
+        f"{path} cannot be read ({system_message(error)}): correct its permissions, or restore it from a backup"
     )
 
 

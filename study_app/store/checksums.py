@@ -122,10 +122,10 @@ def read_checksums(session: SessionFolder) -> dict[str, str]:
     for line in text.splitlines():
         match = _LINE.fullmatch(line)
         if match is None:
-            raise StoreError(f"{session.checksums} has a line that is not a checksum: restore it from a back-up")
+            raise StoreError(f"{session.checksums} has a line that is not a checksum: restore it from a backup")
         checksums[match[2]] = match[1]
     if not checksums:
-        raise StoreError(f"{session.checksums} is empty: restore it from a back-up")
+        raise StoreError(f"{session.checksums} is empty: restore it from a backup")
     return checksums
 
 

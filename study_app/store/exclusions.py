@@ -277,7 +277,7 @@ def _parse_reversal(path: Path, number: int, line: bytes) -> Reversal:
             key_open = record.get("key_open")
             about = {name: str(record.get(name, "")) for name in ("at", "by", "reason")}
             return Reversal(exclusion=taken, key_open=key_open if isinstance(key_open, bool) else None, **about)
-    raise StoreError(f"{path}, line {number} is not a reversed exclusion: remove it, or restore it from a back-up")
+    raise StoreError(f"{path}, line {number} is not a reversed exclusion: remove it, or restore it from a backup")
 
 
 def exclusion_bytes(rows: tuple[Exclusion, ...]) -> bytes:

@@ -107,7 +107,7 @@ def read_merged(folder: Path) -> Merged | None:
         raise cannot_read(path, error) from error
     except (ValueError, KeyError, TypeError):
         pass
-    raise StoreError(f"{path} does not list the sites of a merged study: restore it from a back-up")
+    raise StoreError(f"{path} does not list the sites of a merged study: restore it from a backup")
 
 
 def _is_site(site: Site) -> bool:

@@ -119,7 +119,7 @@ def _file_parts(copied: FileCopy) -> Iterator[bytes]:
     except OSError as error:
         raise AnalysisError(
             f"{copied.source} cannot be read ({system_message(error)}): nothing was written; correct its permissions, "
-            "or restore it from a back-up"
+            "or restore it from a backup"
         ) from error
     if digest.hexdigest() != copied.sha256:
         raise AnalysisError(

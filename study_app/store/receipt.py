@@ -141,12 +141,12 @@ def read(path: Path) -> dict[str, Any]:
     try:
         receipt = parse_json(read_own(path, study_root(path)))
     except ValueError as error:
-        raise StoreError(f"{path} is not a receipt ({error}): restore it from a back-up") from error
+        raise StoreError(f"{path} is not a receipt ({error}): restore it from a backup") from error
     if not isinstance(receipt, dict) or "key_hash" not in receipt:
-        raise StoreError(f"{path} is not a receipt (no key_hash): restore it from a back-up")
+        raise StoreError(f"{path} is not a receipt (no key_hash): restore it from a backup")
     for name, value in receipt.items():
         if not _is_valid_field(name, value):
-            raise StoreError(f"{path} is not a receipt ({name} is {shorten_value(value)}): restore it from a back-up")
+            raise StoreError(f"{path} is not a receipt ({name} is {shorten_value(value)}): restore it from a backup")
     return receipt
 
 

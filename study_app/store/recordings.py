@@ -202,7 +202,7 @@ def opened_content(path: Path, content: bytes, secret: bytes | None) -> bytes:
         )
     if (opened := open_file(content, secret)) is None:
         raise StoreError(
-            f"{path} cannot be decrypted with the study's key: it has been changed; restore it from a back-up"
+            f"{path} cannot be decrypted with the study's key: it has been changed; restore it from a backup"
         )
     return opened
 
@@ -217,7 +217,7 @@ def _opened(path: Path, secret: bytes | None) -> Iterator[Any]:
         raise cannot_read(path, error) from error
     except (pa.ArrowException, UnicodeDecodeError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise StoreError(f"{path} is damaged ({reason}): restore it from a back-up") from error
+        raise StoreError(f"{path} is damaged ({reason}): restore it from a backup") from error
 
 
 def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
@@ -232,7 +232,7 @@ def _read_columns(path: Path, kind: str, secret: bytes | None) -> tuple[dict[str
     else:
         columns = [name for field in _RECORDED if field.since <= held for name in field.named()]
     if not _has_columns(table, columns, facts["rows"]):
-        raise StoreError(f"{path} is damaged (it does not have the columns of {kind}): restore it from a back-up")
+        raise StoreError(f"{path} is damaged (it does not have the columns of {kind}): restore it from a backup")
     return {name: _numbers(table.column(name), facts["rows"]) for name in table.column_names}, facts
 
 
@@ -271,7 +271,7 @@ def _facts(path: Path, metadata: Any) -> dict[str, Any]:
             _check_facts_of_samples(facts, metadata.num_rows)
         return {**facts, "kind": facts["kind"], "rows": metadata.num_rows}
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise StoreError(f"{path} is not a recording made by this program: restore it from a back-up") from error
+        raise StoreError(f"{path} is not a recording made by this program: restore it from a backup") from error
 
 
 def _check_facts_of_samples(facts: Mapping[str, Any], rows: int) -> None:

@@ -312,6 +312,6 @@ def _open_recording(path: Path, hashes: tuple[str, str], key: Key) -> None:
     content = read_own(path, study_root(path.parent))
     content_hash = hashlib.sha256(content).hexdigest()
     if content_hash not in hashes:
-        raise StoreError(f"{path} has changed since it was recorded, so it was not opened: restore it from a back-up")
+        raise StoreError(f"{path} has changed since it was recorded, so it was not opened: restore it from a backup")
     if content_hash == hashes[0]:
         write_file(path, opened_content(path, content, key.nonce))

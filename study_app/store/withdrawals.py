@@ -2,7 +2,7 @@
 
 Of each participant a tombstone remains, a line of ``withdrawals.jsonl`` with nothing that this person gave. It is
 written first. A program that ends before all is erased leaves a folder that `verify` reports; the same command then
-finishes it. Erased files are unlinked: disks and back-ups may still hold their blocks.
+finishes it. Erased files are unlinked: disks and backups may still hold their blocks.
 """
 
 import hashlib
@@ -252,7 +252,7 @@ def _parse_tombstone(path: Path, number: int, line: bytes) -> Tombstone:
     except (ValueError, KeyError, TypeError, AttributeError):
         pass
     raise StoreError(
-        f"{path}, line {number} is not a withdrawal: restore it from a back-up; if it is an incomplete last line, "
+        f"{path}, line {number} is not a withdrawal: restore it from a backup; if it is an incomplete last line, "
         "remove it and withdraw again"
     )
 

@@ -507,7 +507,7 @@ def read_decided(tables: Sequence[Mapping[str, Any] | None]) -> Decided:
     except (KeyError, TypeError, ValueError) as error:
         raise AnalysisError(
             f"a receipt does not contain the decisions about the analysis ({type(error).__name__}, {error}): it has "
-            "been changed, or was written by a different version of the program; restore it from a back-up"
+            "been changed, or was written by a different version of the program; restore it from a backup"
         ) from error
 
 

@@ -103,13 +103,13 @@ def document(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise _unreadable_error(path, error) from error
     except ValueError as error:
-        raise AnalysisError(f"{path} is damaged ({error}): restore it from a back-up") from error
+        raise AnalysisError(f"{path} is damaged ({error}): restore it from a backup") from error
     if not isinstance(parsed, dict):
-        raise AnalysisError(f"{path} is damaged (it does not contain a JSON object): restore it from a back-up")
+        raise AnalysisError(f"{path} is damaged (it does not contain a JSON object): restore it from a backup")
     return parsed
 
 
-def _unreadable_error(path: Path, error: OSError, remedy: str = "restore it from a back-up") -> AnalysisError:
+def _unreadable_error(path: Path, error: OSError, remedy: str = "restore it from a backup") -> AnalysisError:
     """Return the error for a file that cannot be read."""
     return AnalysisError(
         f"{path} cannot be read ({error.strerror or type(error).__name__}): {remedy}, or correct its permissions"
@@ -190,7 +190,7 @@ def read_session(folder: SessionFolder, key: Key | None, like: Session | None = 
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise AnalysisError(
             f"{folder.receipt} does not describe the session ({type(error).__name__}, {error}): it has been changed, "
-            "or was written by a different version of the program; restore it from a back-up"
+            "or was written by a different version of the program; restore it from a backup"
         ) from error
     return Session(
         folder=folder,
@@ -281,7 +281,7 @@ def _check_own(sessions: Sequence[Session], paths: Sequence[Path], table: pd.Dat
             raise AnalysisError(
                 f"{paths[which]}, row {row}, column {column}: {str(found[foreign[0]])!r} instead of "
                 f"{str(values[which])!r}; the file belongs to a different session. Restore this session's file from a "
-                "back-up"
+                "backup"
             )
 
 

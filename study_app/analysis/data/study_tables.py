@@ -347,7 +347,7 @@ def load_study(folder: Path, *, planned: bool = True) -> Study:
 def _load_sites(merged: Merged, *, planned: bool) -> Study:
     places = {name: StudyFolder(merged.folder(name)) for name in merged.names}
     if missing := [place.path for place in places.values() if not place.path.is_dir()]:
-        raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a back-up")
+        raise StoreError(f"{missing[0]} is missing, but {merged.manifest.name} lists it: restore it from a backup")
     opened = has_opened_keys(merged.path)
     read = partial(_load, sealed=not opened, planned=planned)
     sites = {name: read(place.path) for name, place in places.items() if place.sessions()}

@@ -91,13 +91,13 @@ def read_commitment(folder: Path) -> Commitment | None:
     except FileNotFoundError:
         return None
     except (OSError, UnicodeDecodeError) as error:
-        raise AnalysisError(f"{path} cannot be read ({error}): restore it from a back-up") from error
+        raise AnalysisError(f"{path} cannot be read ({error}): restore it from a backup") from error
     try:
         return TypeAdapter(Commitment).validate_json(blocks[-1], strict=True)
     except (IndexError, ValueError) as error:
         raise AnalysisError(
             f"{path} does not end with the block that `liquid-study preregister` writes ({type(error).__name__}): "
-            "restore the file from a back-up, or remove it"
+            "restore the file from a backup, or remove it"
         ) from error
 
 

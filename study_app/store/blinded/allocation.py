@@ -170,7 +170,7 @@ def allocate(
                 write_new_file(path, json.dumps(_claim_content(claim)).encode() + b"\n", waits=waits)
             except FileExistsError:  # another program claimed this entry first
                 if replaced is not None:
-                    raise StoreError(f"{path} has been changed: restore it from a back-up") from None
+                    raise StoreError(f"{path} has been changed: restore it from a backup") from None
                 continue
             if waits:
                 sync_folder(study.allocated)
@@ -185,12 +185,12 @@ def allocation_of(study: StudyFolder, key: Key, participant: str, entries: Entri
     entries = Entries(study) if entries is None else entries
     if (claim := entries.claim_of(participant)) is not None:
         if not is_unchanged(claim, key):
-            raise StoreError(f"{claim.path} has been changed: restore it from a back-up")
+            raise StoreError(f"{claim.path} has been changed: restore it from a backup")
         return _allocation(claim, key)
     if (begun := entries.begun.get(participant)) is not None:
         path = study.allocation(begun.entry, begun.group, None if begun.replaces is None else participant)
         raise StoreError(
-            f"{path} is missing, although participant {participant} has entry {begun.entry}: restore it from a back-up"
+            f"{path} is missing, although participant {participant} has entry {begun.entry}: restore it from a backup"
         )
     return None
 
@@ -309,7 +309,7 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
     allocation = allocation_of(study, read_key(study.path), participant)
     if allocation is None:
         raise StoreError(
-            f"participant {participant} does not have an entry in {study.allocated}: restore it from a back-up"
+            f"participant {participant} does not have an entry in {study.allocated}: restore it from a backup"
         )
     return own_protocol(protocol, allocation.group, session)
 

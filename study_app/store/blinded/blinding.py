@@ -279,7 +279,7 @@ def verified_key(study: StudyFolder) -> Key:
         if _published_hash(session) not in {None, key.hash}:
             raise StoreError(
                 f"{study.key} is not the key for session {session.path} (its SHA-256 differs from the published one): "
-                "restore it from a back-up"
+                "restore it from a backup"
             )
     return key
 
@@ -327,7 +327,7 @@ def read_key(folder: Path) -> Key:
             groups=content.get("groups", {}),
         )
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise StoreError(f"{path} is no longer a sealed key: restore it from a back-up") from error
+        raise StoreError(f"{path} is no longer a sealed key: restore it from a backup") from error
 
 
 def _check_content(content: dict[str, Any]) -> None:
@@ -352,7 +352,7 @@ def _refuse_if_lost(study: StudyFolder) -> None:
     under = [session for session in study.sessions() if is_there(session.receipt)]
     if under and not is_there(study.key):  # checked again: another program may have drawn the key in the meantime
         raise StoreError(
-            f"{study.key} is missing, although {counted(len(under), 'session')} used it: restore it from a back-up; "
+            f"{study.key} is missing, although {counted(len(under), 'session')} used it: restore it from a backup; "
             "without it, codes cannot be assigned to conditions"
         )
 
@@ -459,7 +459,7 @@ def _open_event(start: events.SessionStarted, line: events.Event, key: Key) -> e
         if (measured := open_text([*_line_owner(start, line), *more], text, key.nonce, names)) is None:
             raise StoreError(
                 f"line {line.n} of the journal cannot be decrypted with the study's key: it has been changed; restore "
-                "the journal from a back-up"
+                "the journal from a backup"
             )
         opened |= {**measured, name: None}
     return events.read_event({**line.line(), **opened}) if opened else line
@@ -496,7 +496,7 @@ def recorded_protocol(protocol: Protocol, receipt: Mapping[str, Any], key: Key) 
         if not opened:
             raise StoreError(
                 f"the field “resolved” in the receipt of {receipt['participant']} cannot be decrypted with the study's "
-                "key: the receipt has been changed; restore it from a back-up"
+                "key: the receipt has been changed; restore it from a backup"
             )
         recorded = opened["liquids"]
     liquids = {
@@ -514,11 +514,11 @@ def protocol_errors(receipt: Path) -> Iterator[None]:
     try:
         yield
     except KeyError as lacking:
-        raise StoreError(f"{receipt} does not contain {lacking}: restore it from a back-up") from lacking
+        raise StoreError(f"{receipt} does not contain {lacking}: restore it from a backup") from lacking
     except (AttributeError, TypeError, ValueError):  # the reason is omitted, since it could reveal conditions
         raise StoreError(
             f"{receipt} and the study's key cannot be combined into a protocol that this version can run: restore both "
-            "from a back-up"
+            "from a backup"
         ) from None
 
 

@@ -43,11 +43,11 @@ from study_app.store.journals.journal_events import EVENTS, Event, line_problem,
 
 FORMAT = 2
 _OTHER_LINE_ENDINGS = (
-    "its line endings have been changed to CR LF, as git does with core.autocrlf: restore it from a back-up, with the "
+    "its line endings have been changed to CR LF, as git does with core.autocrlf: restore it from a backup, with the "
     "line “* -text” in the repository's .gitattributes"
 )
 """Of the journal and the receipt; since 2 the lines have ``previous``."""
-_BYTE_ORDER_MARK = "begins with a byte order mark, which an editor added: restore it from a back-up"
+_BYTE_ORDER_MARK = "begins with a byte order mark, which an editor added: restore it from a backup"
 RETRY_S = 1.0
 """Time after which the background thread repeats a failed flush [s]."""
 
@@ -157,17 +157,17 @@ def scan(path: Path) -> Contents:
         except ValueError:
             line = None
         if not isinstance(line, dict):
-            return Contents(lines, whole_bytes, damage=f"{path}, line {number} is damaged: restore it from a back-up")
+            return Contents(lines, whole_bytes, damage=f"{path}, line {number} is damaged: restore it from a backup")
         if line.get("n") != number:
             shown = shorten_value(line.get("n"))
-            damage = f"{path}, line {number} has n {shown}; lines are missing or duplicated: restore it from a back-up"
+            damage = f"{path}, line {number} has n {shown}; lines are missing or duplicated: restore it from a backup"
             return Contents(lines, whole_bytes, damage=damage)
         version = line.get("version", version)
         wrong = line_problem(line)
         if wrong is None and version == study_app.__version__ and line["event"] not in EVENTS:
             wrong = f"contains the event {shorten_value(line['event'])}, which version {version} does not write"
         if wrong is not None:
-            damage = f"{path}, line {number} {wrong}: it has been changed; restore the journal from a back-up"
+            damage = f"{path}, line {number} {wrong}: it has been changed; restore the journal from a backup"
             return Contents(lines, whole_bytes, damage=damage)
         if (wrong := _chain_error(line, hashed.hexdigest(), chained=chained)) is not None:
             first = pieces[0] + b"\n"
@@ -191,18 +191,18 @@ def _chain_error(line: Mapping[str, Any], before: str, *, chained: bool) -> str 
     if first and line.get("format", 1) > FORMAT:
         return f"has format {line['format']}, but this version reads formats up to {FORMAT}: install a newer version"
     if first and "format" not in line and "measures_sealed" in line:  # not of a version with format 1
-        return "does not contain the key “format”: it has been changed; restore the journal from a back-up"
+        return "does not contain the key “format”: it has been changed; restore the journal from a backup"
     if hash_before is None:
         needed = chained or (first and line.get("format", 1) > 1)
         return (
-            "does not contain the key “previous”: it has been changed; restore the journal from a back-up"
+            "does not contain the key “previous”: it has been changed; restore the journal from a backup"
             if needed
             else None
         )
     if hash_before != before:
-        return "does not match the previous line, which has been changed: restore the journal from a back-up"
+        return "does not match the previous line, which has been changed: restore the journal from a backup"
     if not (chained or first or line["event"] == "session_resumed"):
-        return "has the key “previous” but earlier lines do not: they were changed; restore the journal from a back-up"
+        return "has the key “previous” but earlier lines do not: they were changed; restore the journal from a backup"
     return None
 
 

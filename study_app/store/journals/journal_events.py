@@ -742,6 +742,6 @@ def start_of(lines: Sequence[Event]) -> SessionStarted:
     """
     if not lines or not isinstance(start := lines[0], SessionStarted):
         raise StoreError(
-            "the journal does not begin with session_started: restore it from a back-up, or use a new session number"
+            "the journal does not begin with session_started: restore it from a backup, or use a new session number"
         )
     return start

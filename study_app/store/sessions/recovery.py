@@ -59,7 +59,7 @@ from study_app.store.tables.study_files import (
     write_participants,
 )
 
-RESTORE = "restore the journal from a back-up"
+RESTORE = "restore the journal from a backup"
 _SHOWN_DIFFERENCES = 6
 _MOST_GAP_S = 366 * 86400.0
 """Longest plausible gap [s]: beyond it the wall clock was or is wrong."""
@@ -311,7 +311,7 @@ def _read_interrupted(study_folder: StudyFolder, folder: SessionFolder, protocol
     place = Place(study_folder, folder, start.study)
     first = receipt.read(folder.receipt)
     if receipt.has_other_format(first, start):
-        raise StoreError(f"{folder.journal} and its receipt have different formats: restore them from a back-up")
+        raise StoreError(f"{folder.journal} and its receipt have different formats: restore them from a backup")
     _refuse_truncated_journal(place, contents.lines)
     refuse_earlier_columns(study_folder)
     _same_protocol(place, first, start, protocol, source)

@@ -123,7 +123,7 @@ class SessionRows:
         if trial.get("intervals") is None:
             raise StoreError(
                 f"line {line.n} of the journal records an interval of trial {line.trial}, which does not have "
-                "intervals: restore it from a back-up"
+                "intervals: restore it from a backup"
             )
         trial["intervals"] += 1
         self.intervals.append(_interval_row(trial, self._started[which], line, earlier))
@@ -203,7 +203,7 @@ def _interval_row(trial: Row, started: events.TrialStarted, line: events.Interva
     arrangement = started.arrangement
     if arrangement is not None and not (0 < number <= len(arrangement) and set(arrangement) <= set(_PRESENTED)):
         raise StoreError(
-            f"line {line.n} of the journal records an interval that its trial does not have: restore it from a back-up"
+            f"line {line.n} of the journal records an interval that its trial does not have: restore it from a backup"
         )
     return row | {
         "interval": number,
@@ -262,7 +262,7 @@ def _trial_row(session: Row, group: str | None, line: events.TrialStarted) -> Ro
 
 def _never_started(line: events.OfAttempt) -> StoreError:
     return StoreError(
-        f"line {line.n} of the journal refers to trial {line.trial}, which never started: restore it from a back-up"
+        f"line {line.n} of the journal refers to trial {line.trial}, which never started: restore it from a backup"
     )
 
 

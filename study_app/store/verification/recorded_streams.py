@@ -63,7 +63,7 @@ def check_recording(file: Path, folder: Path, findings: Findings) -> list[str]:
             said += [*of, f"clock of '{name}': {_clock_drift(stream)}"]
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
             why = f"{type(error).__name__}: {error}"
-            raise StoreError(f"{file} contains a damaged stream '{name}' ({why}): restore it from a back-up") from error
+            raise StoreError(f"{file} contains a damaged stream '{name}' ({why}): restore it from a backup") from error
     markers = [text for name, stream in ours if name == MARKERS for text in _texts(stream)]
     sent = {text for texts in expected.values() for text in texts}
     if any(name == MARKERS for name, _ in ours) and sent.isdisjoint(markers):

@@ -46,9 +46,9 @@ def reproduce_session(session_folder: Path) -> Reproduced:
     study, folder = locate_session(session_folder)
     ran, lines, key = receipt.read(folder.receipt), journal.read(folder.journal), read_key(study.path)
     if key.hash != ran["key_hash"]:
-        raise StoreError(f"{study.key} is not the key for session {folder.path}: restore it from a back-up")
+        raise StoreError(f"{study.key} is not the key for session {folder.path}: restore it from a backup")
     if lacking := [name for name in receipt.FIELDS if name not in ran]:
-        raise StoreError(f"{folder.receipt} does not contain {', '.join(lacking)}: restore it from a back-up")
+        raise StoreError(f"{folder.receipt} does not contain {', '.join(lacking)}: restore it from a backup")
     seed, participant = ran["seed"], ran["participant"]
     complete = ran["status"] in events.REACHED_END
     try:

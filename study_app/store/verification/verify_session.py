@@ -40,7 +40,7 @@ from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
 from study_app.store.tables.session_tables import table_columns
 from study_app.store.tables.study_files import opened_or_none, row_from
 
-_BEGUN = "but the receipt, tables, recordings or checksums show that the session began: restore it from a back-up"
+_BEGUN = "but the receipt, tables, recordings or checksums show that the session began: restore it from a backup"
 _ROUNDED_S = 1.1e-6
 _CHANGED = "has changed since the session ended (its checksum differs)"
 _REBUILT_AFTER = "states that the checksums or the fingerprint were rewritten after the session ended"
@@ -286,11 +286,11 @@ def _check_receipt(folder: SessionFolder, lines: list[events.Event], key: Key | 
             ),
         )
     if key is not None and not _is_protocol(held, start, key):
-        findings.error(path, "its protocol has been changed: restore it from a back-up")
+        findings.error(path, "its protocol has been changed: restore it from a backup")
     if receipt.has_other_format(held, start):
         findings.error(
             folder.journal,
-            f"has a different format from {path.name}: it has been changed; restore the journal from a back-up",
+            f"has a different format from {path.name}: it has been changed; restore the journal from a backup",
         )
     last = lines[-1]
     if isinstance(last, events.SessionEnded) and held.get("status") != last.status:

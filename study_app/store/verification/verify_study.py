@@ -199,12 +199,12 @@ def _check_allocation(study: StudyFolder, key: Key | None, withdrawn: Collection
     for claim in claims(study):
         if not claim.participant:
             if claim.path.lstat().st_size:
-                findings.error(claim.path, "has been changed: restore it from a back-up")
+                findings.error(claim.path, "has been changed: restore it from a backup")
             else:
                 findings.warning(claim.path, "was reserved by a program that ended early; it will remain unused")
             continue
         if not is_unchanged(claim, key):
-            findings.error(claim.path, "has been changed: restore it from a back-up")
+            findings.error(claim.path, "has been changed: restore it from a backup")
         elif claim.participant in holders:
             first = holders[claim.participant].path.stem
             findings.error(
@@ -292,7 +292,7 @@ def _check_fingerprints(
     """
     path = study.fingerprints
     for number in unreadable_lines(path):
-        findings.error(path, f"line {number} is not a fingerprint: restore it from a back-up")
+        findings.error(path, f"line {number} is not a fingerprint: restore it from a backup")
     erased = tuple(f"data/sub-{participant}/" for participant in withdrawn)  # reported as an interrupted withdrawal
     listed = [proof for proof in early if not proof[1].startswith(erased)]
     _compare_proofs(study, sessions, listed, path.name, findings)
@@ -448,7 +448,7 @@ def _check_reveals(study: StudyFolder, key: Key | None, findings: Findings) -> N
                 findings.error(
                     study.reveals,
                     f"line {number} is not a record of an unblinding: it has been changed; restore the file from a "
-                    "back-up",
+                    "backup",
                 )
         for number, record in enumerate(blinding.reveals(study.path), start=1):
             if key is not None and record["key_hash"] != key.hash:
@@ -478,11 +478,11 @@ def _check_sites(merged: Merged, findings: Findings) -> None:
         folder = merged.folder(site.name)
         if not folder.is_dir():
             lists = f"{merged.manifest.name} lists site {site.name}"
-            findings.error(folder, f"is missing, although {lists}: restore it from a back-up")
+            findings.error(folder, f"is missing, although {lists}: restore it from a backup")
             continue
         if sealed_hash(folder) != site.key_hash:
             key = StudyFolder(folder).key
-            findings.error(key, f"is not the key that site {site.name} was merged with: restore it from a back-up")
+            findings.error(key, f"is not the key that site {site.name} was merged with: restore it from a backup")
         _check_site(merged, site, findings)
         for session in StudyFolder(folder).sessions():
             with contextlib.suppress(StoreError):  # reported when the site is checked
@@ -515,4 +515,4 @@ def _check_site(merged: Merged, site: Site, findings: Findings) -> None:
         erased = sum(len(tombstone.sessions) for tombstone in withdrawn[before:])
         if (present := len(study.sessions())) + erased < site.sessions:
             which = f"{present} of the {site.sessions} sessions that {merged.manifest.name} lists"
-            findings.error(study.path, f"contains only {which}: restore the others from a back-up")
+            findings.error(study.path, f"contains only {which}: restore the others from a backup")

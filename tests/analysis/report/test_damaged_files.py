@@ -70,7 +70,7 @@ def test_a_changed_journal_is_not_to_be_rebuilt_from(copy: StudyFolder) -> None:
     change(session.journal, b'"operator":"', b'"operator":"X')
     (line,) = told(copy)
     assert line.startswith(f"{session.journal} line ")
-    assert "restore the journal from a back-up" in line
+    assert "restore the journal from a backup" in line
     assert "rebuild" not in line
 
 

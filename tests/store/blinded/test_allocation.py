@@ -173,11 +173,11 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     second.write_text(held[1], encoding="utf-8", newline="\n")
     third.write_text(held[2].replace("P003", "P004"), encoding="utf-8", newline="\n")
     assert "has been changed" in errors()
-    with pytest.raises(StoreError, match="restore it from a back-up"):
+    with pytest.raises(StoreError, match="restore it from a backup"):
         begun(study.path, "P003", 2)
     third.write_text(held[2], encoding="utf-8", newline="\n")
     first.write_text(re.sub(r'(..)"}', '00"}', held[0]), encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError, match="has been changed: restore it from a back-up"):
+    with pytest.raises(StoreError, match="has been changed: restore it from a backup"):
         begun(study.path, "P001", 2)
     first.write_text(held[0], encoding="utf-8", newline="\n")
     key = open_or_draw_key(study.path, grouped())
@@ -190,7 +190,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert "it will remain unused" in "\n".join(map(str, verify_study(study.path).warnings))
     (study.allocated / "\u00b2.json").write_text("{}", encoding="utf-8", newline="\n")  # a digit that int() refuses
     (loop := study.allocated / "006.json").symlink_to(loop)
-    assert errors() == "blinding/allocated/006.json: has been changed: restore it from a back-up"
+    assert errors() == "blinding/allocated/006.json: has been changed: restore it from a backup"
 
 
 def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_claimed(tmp_path: Path) -> None:

@@ -142,7 +142,7 @@ def test_an_unfinished_session_that_was_deleted_at_a_site_is_missed(labs: dict[s
     assert verify_study(pooled).is_sound
     assert (pooled / "sites/A/blinding/key.sealed").stat().st_mode & 0o777 == 0o600
     shutil.rmtree(pooled / "sites/A/data/sub-P002")
-    said = "sites/A: contains only 1 of the 2 sessions that sites.json lists: restore the others from a back-up"
+    said = "sites/A: contains only 1 of the 2 sessions that sites.json lists: restore the others from a backup"
     assert said in list(map(str, verify_study(pooled).errors))
 
 
@@ -165,7 +165,7 @@ def test_a_withdrawal_by_a_computer_with_a_slow_clock_is_no_missing_session(
     withdraw(pooled / "sites/A", "P001", by="AK", reason="asked", now=slow)
     assert verify_study(pooled).is_sound
     shutil.rmtree(pooled / "sites/B/data/sub-P001")
-    said = "sites/B: contains only 1 of the 2 sessions that sites.json lists: restore the others from a back-up"
+    said = "sites/B: contains only 1 of the 2 sessions that sites.json lists: restore the others from a backup"
     assert said in list(map(str, verify_study(pooled).errors))
 
 
