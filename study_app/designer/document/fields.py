@@ -717,7 +717,7 @@ def _unit_suffix(key: str) -> str:
 
 def _help_of(description: str) -> str:
     """Return a description as one line of plain text: that of a table is a docstring with line breaks and markup."""
-    return " ".join(description.replace("`", "").split())
+    return re.sub("`(.+?)`", "“\\1”", " ".join(description.replace("``", "").split()))
 
 
 def _value_sentences(description: str) -> dict[str, str]:

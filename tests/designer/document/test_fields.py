@@ -75,7 +75,7 @@ def test_every_key_of_every_model_reaches_a_form_with_its_words_and_bounds() -> 
         texts = [row.help, *(choice.sentence for choice in row.choices)]
         assert not [text for text in texts if "\n" in text or "`" in text], row.path
     for key, description, bounds in described(schema()):
-        words = " ".join(description.replace("`", "").split())
+        words = re.sub("`(.+?)`", "“\\1”", " ".join(description.replace("``", "").split()))
         assert (key, words) in found
         assert all(bound in found[key, words] for bound in bounds), key
 

@@ -237,7 +237,7 @@ def test_an_exclusion_rule_is_one_that_can_apply_and_has_its_usual_limit(study: 
     (rule,) = (row for section in form_of(two, EXCLUSION).sections for row in section.rows if row.path[-1] == "rule")
     assert {choice.value: choice.sentence for choice in rule.choices} == {
         "below_chance": "a block has fewer correct answers than expected by chance (binomial p below 0.001)",
-        "fast_answers": "the median response time is below `limit` s",
+        "fast_answers": "the median response time is below “limit” s",
     }
     assert "limit" in refused_at(two.document, EXCLUSION)
     fast = after(two, SetValue((*EXCLUSION, "rule"), "fast_answers"))
