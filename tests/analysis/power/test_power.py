@@ -193,6 +193,30 @@ def test_a_block_of_some_groups_counts_their_participants() -> None:
     assert power_markdown(found).count(words) == 1
 
 
+def test_a_planned_block_has_the_conditions_statements_and_features_of_the_study() -> None:
+    protocol = load("rek2024")
+    blocks = {block.id: block for block in plan(protocol, felt_in(protocol)).blocks}
+    for name, block in blocks.items():
+        stated, conditions = protocol.blocks[name], protocol.conditions
+        names = list(stated.conditions)
+        if block.kind == "delays":
+            names.sort(key=lambda condition: conditions[condition].delay_ms)
+        assert [setting.condition for setting in block.settings] == names
+        assert block.codes == tuple(f"S{place}" for place in range(1, len(names) + 1))
+        assert [setting.liquid for setting in block.settings] == [conditions[it].liquid for it in names]
+        assert [setting.delay_ms for setting in block.settings] == [conditions[it].delay_ms for it in names]
+        assert [setting.label for setting in block.settings] == [conditions[it].label for it in names]
+        assert block.features == tuple(felt_in(protocol)[name, it] for it in names)
+        assert (block.title, block.repetitions, block.groups) == (stated.title["en"], stated.repetitions, ())
+        asked = protocol.questionnaire_of(name)
+        assert asked is not None
+        assert [(item.id, item.text, item.short) for item in block.items] == [
+            (question.id, question.text["en"], question.short["en"]) for question in asked.statements
+        ]
+        assert block.labels == tuple("1234567")
+    assert {block.kind for block in blocks.values()} == {"delays", "liquids"}
+
+
 def test_a_protocol_that_compares_nothing_is_refused() -> None:
     protocol = load("demo")
     alone = {name: block.model_copy(update={"questionnaire": None}) for name, block in protocol.blocks.items()}

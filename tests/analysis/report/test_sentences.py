@@ -18,8 +18,9 @@ from study_app.analysis.report.first_page import cards
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import empty_studies, limits, none_found
 from study_app.analysis.results import Failures
+from study_app.analysis.statistics.outcome import alpha_of_looks
 from study_app.protocol.model import Contrast
-from tests.analysis.made_up import ITEMS
+from tests.analysis.made_up import DECIDED, ITEMS
 from tests.analysis.random_studies import drawn
 from tests.analysis.report.sentences import Told, check, check_verdicts
 
@@ -164,3 +165,18 @@ def test_a_part_of_a_section_that_fails_is_named(monkeypatch: pytest.MonkeyPatch
     incomplete, failures = replace(results.blocks[0], incomplete={ITEMS[0]: ("P001",)}), Failures()
     list(sections.block(incomplete, results, (), failures))
     assert [failure.what for failure in failures.found] == ["missing answers"]
+
+
+@pytest.mark.parametrize("look", [None, 1])
+def test_the_planned_sample_is_a_number_of_participants_or_of_looks(look: int | None) -> None:
+    decided = replace(DECIDED, alpha=0.0123, planned_alpha=0.04, looks=(7, 12), spending="pocock", look=look)
+    planned: Any = SimpleNamespace(protocol={"analysis": {"participants": 31}})
+    results: Any = SimpleNamespace(decided=replace(decided, looks=()) if look is None else decided, people=("P1",) * 7)
+    said = methods_module._planned(planned, results)
+    if look is None:
+        assert said == "The planned sample size was 31 participants."
+        assert methods_module._planned(SimpleNamespace(protocol={"analysis": None}), results) == ""
+        return
+    first, second = (f"{level:.3g}" for level in alpha_of_looks((7, 12), 0.04, "pocock"))
+    assert decided.look_words(7) in said
+    assert f"up to {first} and {second} are significant (Pocock alpha spending with alpha = 0.04, Lan" in said

@@ -130,7 +130,16 @@ liquid = "water"
     [
         pytest.param("a = 1    # one\n", Set(("a",), 100), "a = 100  # one\n", id="column"),
         pytest.param("a = 1 # one\n", Set(("a",), 100), "a = 100 # one\n", id="no column"),
+        pytest.param("a = 1000     # one\n", Set(("a",), 2), "a = 2        # one\n", id="wider column"),
+        pytest.param("a = 1  # one\n", Set(("a",), "x" * 9), 'a = "xxxxxxxxx"  # one\n', id="no room for the column"),
         pytest.param("a = 'x'\n", Set(("a",), "y"), "a = 'y'\n", id="quotes"),
+        pytest.param("a = { b = 1, c = 2 }\n", Set(("a", "b"), 34), "a = { b = 34, c = 2 }\n", id="value of a pair"),
+        pytest.param(
+            "[t]\n  a.b = 1\n  c = 2\n",
+            Set(("t", "a", "b"), {"long": "x" * 70, "longer": "y" * 60}),
+            f'[t]\n  a.b.long = "{"x" * 70}"\n  a.b.longer = "{"y" * 60}"\n  c = 2\n',
+            id="a line for each part of a long value",
+        ),
         pytest.param(
             "a.en = 'x' # c\nb = 1\n", Set(("a", "n"), "y"), "a.en = 'x' # c\na.n = 'y'\nb = 1\n", id="dotted"
         ),
@@ -189,6 +198,7 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
     [
         (Unset(("b",)), "the study no longer contains b"),
         (Set(("a", "b"), 1), "a is not a table"),
+        (Set(("t",), 1), "a table with headers cannot be replaced with a single value"),
         (Set(("c",), None), "a value cannot be empty: remove its key instead"),
         (Set(("c",), {"d": "\ud800"}), "incomplete character"),
         (Duplicate(("a",), "l"), 'the name "l" is already taken'),
@@ -200,7 +210,7 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
 )
 def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
     with pytest.raises(StudyError, match=sentence):
-        apply_edit("a = 1\nl = [1, 2]\n", edit)
+        apply_edit("a = 1\nl = [1, 2]\n[t]\n", edit)
 
 
 def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,6 +10,7 @@ from study_app.protocol.trials.stimuli import SESSION_SD
 from study_app.protocol.warnings.expected_precision import (
     ThresholdPlan,
     expected,
+    expected_of,
     imprecise,
     precision_rows,
     threshold_plan,
@@ -102,3 +103,20 @@ def test_where_limits_clip_the_levels_no_precision_is_expected():
         assert dict(precision_rows(clipped, clipped.blocks["thicker"])) == {
             "Expected precision": "not available, because the levels for most thresholds are clipped"
         }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("decided", [(31, 0.15), (31, None), (None, 0.2), (None, None)])
+def test_the_planned_participants_are_said_before_those_a_precision_requires(decided):
+    keys = {"participants": decided[0], "precision": decided[1]}
+    table = ", ".join(f"{key} = {value}" for key, value in keys.items() if value is not None)
+    protocol = study(more=f"analysis = {{ {table} }}\n")
+    found = expected_of(plan_of(protocol))
+    said = dict(precision_rows(protocol, protocol.blocks["thicker"]))["Expected precision"]
+    planned = f"; ±{100 * found.of_group(31):.0f} % for 31 participants"
+    required = f"; ±20 % requires {found.participants_for(0.2)} participants"
+    assert [text for text in (planned, required) if text in said] == (
+        [planned] if decided[0] else [required] if decided[1] else []
+    )
+    warned = list(imprecise(protocol, protocol.blocks["thicker"]))
+    assert bool(warned) == (None not in decided and found.of_group(31) > 0.15)

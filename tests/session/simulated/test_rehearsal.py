@@ -1,9 +1,12 @@
 """Simulated participants: how they move, what they sense, and how they go through a session."""
 
+import re
 import signal
 from collections.abc import Iterable
+from contextlib import nullcontext
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
@@ -27,11 +30,12 @@ from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Journal
 from study_app.store.journals.journal_events import Responses, SessionResumed
+from study_app.store.missing_trials import MissingTrial, MissingTrials
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
 from study_app.store.withdrawals import withdraw
 from tests.compiled import needs_servo
-from tests.journal_lines import raw
+from tests.journal_lines import event_of, raw
 from tests.session import small
 from tests.studies import made_up
 from tests.transcripts import Files
@@ -165,6 +169,34 @@ def test_no_session_is_begun_after_a_finished_one_or_a_withdrawal(tmp_path: Path
     for participant in ("P001", "P002"):
         finish_session("demo", participant, seed=1, device="scripted", results=study, progress=lines.append)
     assert (list(files.files()), lines) == ([], [])
+
+
+def test_a_rehearsed_session_is_told_with_its_answers_its_time_and_what_is_missing() -> None:
+    """Of two forms, with 2 and 3 questions, one question was skipped."""
+    forms = {"load": (0.25, 0.5), "end": (None, 0.75, 1.0)}
+    lines = [
+        event_of("session_started", t_s=0.0),
+        *(
+            event_of("form_answered", form=form, items=[{"item": f"q{s}", "first_s": s} for s in firsts])
+            for form, firsts in forms.items()
+        ),
+    ]
+    missing = MissingTrials(
+        missing=(MissingTrial(trial=3, block="b", code="L1", broken=()),), asked=40, limits={"missing_percent": 5.0}
+    )
+    ran, said = list[str](), list[str]()
+    session: Any = SimpleNamespace(run=lambda: ran.append("run"))
+    for lost in (missing, MissingTrials(asked=40, limits={})):
+        clock = SimpleNamespace(seconds=lambda: 450.0)
+        store: Any = SimpleNamespace(clock=clock, missing_trials=lost, fingerprint="abcd-efgh", lines=lines)
+        rehearsal._run_to_end("P007", nullcontext((session, store)), said.append)
+    rehearsal._run_to_end("P008", nullcontext((session, store)), None)
+    assert ran == ["run"] * 3
+    assert session.signals is not None
+    sentence = r"P007: 4 responses, 7\.5 min of session time simulated in 0\.\d s, fingerprint abcd-efgh"
+    assert re.fullmatch(f"{sentence}; {re.escape(str(missing))}", said[0])
+    assert re.fullmatch(sentence, said[1])
+    assert len(said) == 2
 
 
 @pytest.mark.slow

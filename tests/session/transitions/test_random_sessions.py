@@ -263,6 +263,21 @@ def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(
     assert not any(isinstance(page, PausePage) for page in pages)
 
 
+@pytest.mark.parametrize(
+    ("name", "has_feedback"),
+    [("forcedelay", {"practice", "main"}), ("delaydetect", {"practice"}), ("thickness", set()), ("matching", set())],
+)
+def test_feedback_follows_the_question_of_the_phases_that_have_it(name: str, has_feedback: set[str]) -> None:
+    shown, phases = preview(parse(text_of(name).encode(), "study.toml")), set()
+    for index, step in enumerate(shown.schedule.steps):
+        if isinstance(step, Trial) and shown.protocol.blocks[step.block].design is not None:
+            kinds = [moment.kind for moment in pages_of_step(shown, index) if moment.kind != "tank"]
+            asked = [] if name == "matching" else ["questions"]
+            assert kinds == asked + ["feedback"] * (step.phase in has_feedback), step
+            phases.add(step.phase)
+    assert phases >= has_feedback
+
+
 def test_answers_that_a_question_no_longer_accepts_are_left_out() -> None:
     shown = preview(load("demo"))
     index = next(at for at, step in enumerate(shown.schedule.steps) if getattr(step, "block", "") == "liquids")

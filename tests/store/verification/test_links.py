@@ -1,5 +1,6 @@
 """Files of a results folder that lead elsewhere, and names in them that are paths."""
 
+import hashlib
 import json
 import os
 import signal
@@ -13,6 +14,7 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.store import receipt
 from study_app.store.blinded import blinding
+from study_app.store.checksums import write_checksums
 from study_app.store.exclusions import exclude
 from study_app.store.folders import StudyFolder
 from study_app.store.journals import journal
@@ -149,3 +151,26 @@ def test_a_name_that_is_no_text_is_reported_and_searched(tmp_path: Path, finishe
     assert name not in [Path(one.place).name for one in verify_study(study).errors]
     left = withdraw(study, "P007", by="AB", reason="asked").left
     assert left == (f"{study / name} still names P007",)
+
+
+def test_of_the_listed_files_only_the_one_that_cannot_be_read_is_an_error(
+    finished: SessionStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder, study = finished.folder, finished.place.study_folder.path
+    notes, photo = folder.path / "notes.txt", folder.path / "photo.jpg"
+    notes.write_bytes(b"calm")
+    photo.write_bytes(b"smile")
+    write_checksums(folder)
+    photo.unlink()
+
+    def refused(path: Path) -> str:
+        if path == notes:
+            raise StoreError(f"{path} cannot be read")
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+
+    monkeypatch.setattr("study_app.store.checksums.sha256", refused)
+    errors = [(Path(error.place).name, error.message) for error in verify_study(study).errors]
+    assert [error for error in errors if error[0] != "ses-01"] == [
+        ("notes.txt", "cannot be read"),
+        ("photo.jpg", "is missing"),
+    ]
