@@ -1,0 +1,357 @@
+"""Lists, tables and messages of the store, from files written by hand: every value differs from its neighbours."""
+
+import json
+import os
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from study_app.errors import StoreError, StudyError
+from study_app.protocol.trials.stimuli import Stimulated
+from study_app.store import atomic, csv_files, drafts, exclusions, merged, output_files, receipt
+from study_app.store.blinded import blinding
+from study_app.store.checksums import file_hash, note_rebuilt, read_checksums, renew_checksums
+from study_app.store.delivered import delay_error_ms
+from study_app.store.exclusions import Exclusion
+from study_app.store.folder_lock import remove_abandoned_claims
+from study_app.store.folders import SessionFolder, rehearsal_folder
+from study_app.store.recorder import Recorder
+from study_app.user_folder import data_folder
+from tests.platforms import needs_links
+
+AT = "2026-03-02T09:30:00.000+01:00"
+COLUMNS = "participant,session,trial,rule_or_person,reason,excluded_at,key_open\n"
+FAILED = OSError(28, "No space left on device")
+
+
+def refuse(*_: object, **__: object) -> None:
+    raise FAILED
+
+
+@pytest.fixture
+def sites(tmp_path: Path) -> Path:
+    """A merged study of two sites, whose P007 and P012 are excluded."""
+    folder = tmp_path / "both"
+    for site, row in (("north", f"P007,2,n/a,AB,slept,{AT},true\n"), ("south", f"P012,1,3,CD,coughed,{AT},false\n")):
+        place = folder / "sites" / site
+        (place / "data" / f"sub-{row[:4]}" / f"ses-0{row[5]}").mkdir(parents=True)
+        (place / "exclusions.csv").write_text(COLUMNS + row, encoding="utf-8", newline="\n")
+    listed = [
+        {"name": name, "merged_at": AT, "key_hash": digit * 64, "sessions": sessions, "withdrawals": withdrawals}
+        for name, digit, sessions, withdrawals in (("north", "a", 7, 1), ("south", "b", 9, None))
+    ]
+    held = {"format": 2, "study": "stirring", "protocol_hash": "c" * 64, "sites": listed}
+    (folder / "sites.json").write_text(json.dumps(held), encoding="utf-8", newline="\n")
+    return folder
+
+
+def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites: Path) -> None:
+    study = merged.read_merged(sites)
+    assert study is not None
+    assert [(it.name, it.key_hash[0], it.sessions, it.withdrawals) for it in study.sites] == [
+        ("north", "a", 7, 1), ("south", "b", 9, None),
+    ]  # fmt: skip
+    assert (study.path, study.study, study.protocol_hash) == (sites, "stirring", "c" * 64)
+    assert merged.folders_of(sites) == {"north-": sites / "sites" / "north", "south-": sites / "sites" / "south"}
+    assert merged.locate_participant(sites, "south-P012") == (sites / "sites" / "south", "P012")
+    assert merged.session_in(sites, "north-P007", 2) == SessionFolder(
+        sites / "sites" / "north" / "data" / "sub-P007" / "ses-02", "P007", 2
+    )
+    assert [(row.participant, row.session, row.trial, row.key_open) for row in merged.all_exclusions(sites)] == [
+        ("north-P007", 2, None, True), ("south-P012", 1, 3, False),
+    ]  # fmt: skip
+    for participant in ("P007", "west-P007", "south-"):
+        with pytest.raises(StoreError, match=r"\(north, south\), but '.*' does not include .* such as north-P007"):
+            merged.locate_participant(sites, participant)
+    alone = sites / "sites" / "north"
+    assert merged.folders_of(alone) == {"": alone}
+    assert merged.locate_participant(alone, "a-P007") == (alone, "a-P007")
+    assert (merged.merged_above(alone), merged.merged_above(sites), merged.merged_above(alone.parent)) == (
+        sites, None, None,
+    )  # fmt: skip
+    with pytest.raises(StoreError, match=f"^{alone} is the copy of a site in the merged study {sites}: run"):
+        merged.refuse_merged(alone)
+    with pytest.raises(StoreError, match=f"^{sites} is a merged study"):
+        merged.refuse_merged(sites)
+
+
+@pytest.mark.parametrize(
+    "change", [{"sites": []}, {"protocol_hash": 7}, {"study": "../x"}, {"sites": [{"name": "north"}]}, {"study": 7}]
+)
+def test_an_invalid_list_of_sites_is_refused(sites: Path, change: dict[str, Any]) -> None:
+    path = sites / "sites.json"
+    path.write_text(json.dumps(json.loads(path.read_text("utf-8")) | change), encoding="utf-8", newline="\n")
+    with pytest.raises(StoreError, match=f"^{path} does not list the sites of a merged study"):
+        merged.read_merged(sites)
+
+
+@needs_links
+def test_a_site_that_is_a_link_is_named_with_its_place(sites: Path, tmp_path: Path) -> None:
+    (sites / "sites" / "north").rename(tmp_path / "away")
+    (sites / "sites" / "north").symlink_to(tmp_path / "away")
+    with pytest.raises(StoreError, match=f"^{sites / 'sites' / 'north'} is a link to {tmp_path / 'away'}, .*{sites}:"):
+        merged.read_merged(sites)
+
+
+def test_a_decision_of_a_person_or_a_rule_is_reversed_with_its_own_words(tmp_path: Path) -> None:
+    """Missing trials exclude no session that a person included again; what was kept despite another rule they do."""
+    for participant in ("P007", "P008", "P009"):
+        (tmp_path / "data" / f"sub-{participant}" / "ses-02").mkdir(parents=True)
+    for participant in ("P007", "P008"):
+        exclusions.exclude_incomplete(tmp_path, participant, 2, f"{participant} lacks trials")
+    taken = exclusions.include(tmp_path, "P007", 2, by="AB", reason="enough trials")
+    exclusions.exclude_incomplete(tmp_path, "P007", 2, "again")
+    assert (taken.participant, taken.rule_or_person, taken.reason) == (
+        "P007", exclusions.MISSING_RULE, "P007 lacks trials",
+    )  # fmt: skip
+    assert [row.participant for row in exclusions.exclusions(tmp_path)] == ["P008"]
+    assert exclusions.reversals(tmp_path) == (taken,)
+    (reversal,) = exclusions.dated_reversals(tmp_path)
+    assert (reversal.by, reversal.reason, reversal.key_open) == ("AB", "enough trials", False)
+    kept = exclusions.keep(tmp_path, "P009", 2, rule="fast_answers", by="CD", reason="read aloud")
+    assert (kept.rule_or_person, kept.reason) == ("fast_answers", "read aloud (decided by CD)")
+    exclusions.exclude_incomplete(tmp_path, "P009", 2, "P009 lacks trials")
+    assert [row.what for row in exclusions.exclusions(tmp_path)] == [("P008", 2, None), ("P009", 2, None)]
+    ruled = exclusions.exclude(tmp_path, "P007", 2, by="EF", reason="too fast", rule="fast_answers")
+    assert (ruled.rule_or_person, ruled.reason) == ("fast_answers", "too fast (decided by EF)")
+    with pytest.raises(StoreError, match=r"is excluded: include it without --rule"):
+        exclusions.keep(tmp_path, "P007", 2, rule="fast_answers", by="CD", reason="no")
+    with pytest.raises(StoreError, match="there is no exclusion rule 'fast'"):
+        exclusions.keep(tmp_path, "P007", 2, rule="fast", by="CD", reason="no")
+    with pytest.raises(StoreError, match=r"^participant P010, session 2, trial 4 is not excluded; exclusions: partici"):
+        exclusions.include(tmp_path, "P010", 2, trial=4, by="AB", reason="no")
+    with pytest.raises(StoreError, match=r"session 1 of participant P007; sessions of that participant: 2$"):
+        exclusions.exclude(tmp_path, "P007", 1, by="AB", reason="no")
+    with pytest.raises(StoreError, match=r"session 1 of participant P1; participants: P007, P008, P009$"):
+        exclusions.exclude(tmp_path, "P1", 1, by="AB", reason="no")
+
+
+@pytest.mark.parametrize(
+    ("key_open", "is_valid"), [(True, True), (False, True), (None, True), ("true", False), (1, False)]
+)
+def test_a_reversed_exclusion_states_whether_the_key_was_open(tmp_path: Path, key_open: Any, is_valid: bool) -> None:
+    row = Exclusion(participant="P7", session=3, trial=5, rule_or_person="AB", reason="rang", excluded_at=AT)
+    record = {"at": "later", "by": "CD", "reason": "heard", "key_open": not key_open}
+    held = record | {"exclusion": row.fields() | {"key_open": key_open}}
+    path = tmp_path / "exclusions_reversed.jsonl"
+    path.write_text(f"\n{json.dumps(held)}\n", encoding="utf-8", newline="\n")
+    if not is_valid:
+        with pytest.raises(StoreError, match=f"^{path}, line 2 is not a reversed exclusion"):
+            exclusions.dated_reversals(tmp_path)
+        return
+    (reversal,) = exclusions.dated_reversals(tmp_path)
+    assert (reversal.at, reversal.by, reversal.reason, reversal.key_open) == ("later", "CD", "heard", not key_open)
+    assert (reversal.exclusion.what, reversal.exclusion.key_open) == (("P7", 3, 5), key_open)
+
+
+def test_files_are_written_into_folders_that_a_failure_removes_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "there").mkdir()
+    study, files = tmp_path / "study", {"there/a.csv": b"1", "new/deep/b.csv": b"22", "c.csv": b"333"}
+    with monkeypatch.context() as failing:
+        failing.setattr(output_files, "move", refuse)
+        with pytest.raises(StudyError, match=f"^{tmp_path} cannot be written \\(No space left on device\\)"):
+            output_files.write_files(tmp_path, files)
+    assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+    said: list[str] = []
+    written = output_files.write_output(study, tmp_path, files, said.append)
+    assert [(path, path.read_bytes()) for path in written] == [(tmp_path / name, held) for name, held in files.items()]
+    for of, to, names in ((tmp_path / "other", tmp_path, ["c.csv"]), (study, tmp_path / "away", ["d.csv"])):
+        output_files.write_output(of, to, dict.fromkeys(names, b"4"), said.append)
+    assert [(output.to, output.files) for output in output_files.outputs(study)] == [
+        (tmp_path, tuple(files)), (tmp_path / "away", ("d.csv",)),
+    ]  # fmt: skip
+    erased, elsewhere = output_files.erase_outputs(study, tmp_path / "away")
+    assert (erased, [output.to for output in elsewhere]) == ((tmp_path / "away" / "d.csv",), [tmp_path])
+    with monkeypatch.context() as failing:
+        failing.setattr(output_files, "append_line", lambda path, *_, **__: atomic.append_line(path / "x", b""))
+        output_files.write_output(study, tmp_path / "third", {"e.csv": b"5"}, said.append)
+    assert [line.partition(" could")[0] for line in said] == [f"the output in {tmp_path / 'third'}"]
+
+
+def test_a_rebuilt_list_of_checksums_names_the_files_that_changed(tmp_path: Path) -> None:
+    session = SessionFolder(tmp_path / "data" / "sub-P1" / "ses-01", "P1", 1)
+    session.path.mkdir(parents=True)
+    files = [session.path / name for name in ("a.csv", "b.csv", "c.csv")]
+    for length, path in enumerate(files, start=1):
+        path.write_bytes(b"x" * length)
+    renew_checksums(session, ())
+    before = read_checksums(session)
+    files[1].write_bytes(b"new")
+    files[2].write_bytes(b"newer")
+    assert renew_checksums(session, files[:2])
+    after = read_checksums(session)
+    assert (after["a.csv"], after["c.csv"]) == (before["a.csv"], before["c.csv"])
+    assert after["b.csv"] == file_hash(session, "b.csv") != before["b.csv"]
+    lines = session.rebuilt.read_text("utf-8").splitlines()
+    assert [line.partition(" rebuild: ")[2] for line in lines] == [
+        "the list of checksums was missing and has been recreated from the existing files",
+        "different checksums were listed for b.csv",
+    ]
+    assert not renew_checksums(session, files[:2])
+    note_rebuilt(session, "by hand")
+    assert renew_checksums(session, [session.rebuilt])
+    assert read_checksums(session)["rebuilt.txt"] == file_hash(session, "rebuilt.txt")
+    assert len(session.rebuilt.read_text("utf-8").splitlines()) == 3
+
+
+def test_a_draft_that_another_program_wrote_is_kept_as_a_version(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "data"))
+    file, kept = tmp_path / "study.toml", list[tuple[Path, bytes]]()
+    monkeypatch.setattr(drafts, "keep_version", lambda file, text, _why: kept.append((file, text)))
+    keeper = drafts.Keeper(file, "base")
+    keeper.note_edit("mine", ("blocks", 2), 10.0)
+    assert not keeper.write_if_due(10.0 + drafts.REST_S - 0.01)
+    keeper.note_edit("mine too", ("blocks", 3), 10.9)
+    assert keeper.write_if_due(10.0 + drafts.REST_S)
+    draft = drafts.draft_of(file)
+    assert draft is not None
+    assert (draft.text, draft.base, draft.selected) == ("mine too", "base", ("blocks", 3))
+    assert (drafts.drafted_files(), drafts.unsaved_files(tmp_path)) == ((file,), (file,))
+    drafts.write_draft(file, drafts.Draft(text="theirs", base="other", selected=()))
+    keeper.note_edit("mine again", (), 20.0)
+    assert keeper.write()
+    assert (kept, keeper.others) == ([(file, b"theirs")], 1)
+    drafts.write_draft(file, drafts.Draft(text="theirs again", base="other", selected=()))
+    keeper.note_saved("saved")
+    assert drafts.draft_of(file) is not None, "the draft of another program stays"
+    (path,) = drafts.draft_files()
+    path.write_text(path.read_text("utf-8").replace('"selected": []', '"selected": ["a", null, 7]'), "utf-8")
+    assert drafts.draft_of(file).selected == ("a", 7)  # type: ignore[union-attr]
+    monkeypatch.setattr(Path, "unlink", refuse)
+    with pytest.raises(StoreError, match=f"^the draft of {file} cannot be deleted: No space left on device$"):
+        drafts.delete_draft(file)
+
+
+def test_claims_are_removed_once_no_program_can_be_making_them(tmp_path: Path) -> None:
+    now = time.time()
+    ages_s = {"new": 0.0, "old": 3600.0 * 48, "later": -3600.0 * 48}
+    folders = {name: atomic.temporary_path(tmp_path / name) for name in ages_s}
+    for name, folder in folders.items():
+        folder.mkdir()
+        os.utime(folder, (now - ages_s[name],) * 2)
+    remove_abandoned_claims(tmp_path)
+    assert {name for name, folder in folders.items() if folder.exists()} == {"new", "later"}
+
+
+def test_plug_ins_are_named_by_package_and_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    held = {
+        "a": [{"package": "oils", "version": "1.2", "kind": "task", "name": "swirl"}],
+        "b": [
+            {"package": "oils", "version": "1.2", "kind": "method", "name": "ladder"},
+            {"package": "oils", "version": "1.3", "kind": "task", "name": "tilt"},
+        ],
+        "c": None,
+    }
+    monkeypatch.setattr(receipt, "read", lambda path: {"plug_ins": held[path.name]})
+    assert receipt.recorded_plug_ins(tmp_path / name for name in held) == {
+        "oils 1.2": ["method ladder", "task swirl"],
+        "oils 1.3": ["task tilt"],
+    }
+
+
+@pytest.mark.parametrize(
+    ("fields", "at"),
+    [
+        ({}, "start"),
+        ({"resumed": [{"at": "later"}]}, "start"),
+        ({"resumed": [{"at": "later"}, {"at": "last"}], "screens": {"steps": 3}}, "later"),
+        ({"resumed": [], "screens": {"steps": 3}}, "start"),
+    ],
+)
+def test_a_session_began_when_a_person_did(fields: dict[str, Any], at: str) -> None:
+    assert receipt.began_at({"started_at": "start", **fields}) == at
+
+
+def test_the_delay_error_of_a_force_is_that_of_its_delay() -> None:
+    summary = {"delay_error_mean_ms": 3.0, "value_delivered": 47.0}
+    errors = [
+        delay_error_ms(Stimulated("oil", vary=vary, value=40.0), summary) for vary in ("delay_ms", "force_delay_ms")
+    ]
+    assert errors == [3.0, 7.0]
+    assert delay_error_ms(Stimulated("oil", vary="force_delay_ms", value=40.0), {"delay_error_mean_ms": 3.0}) is None
+
+
+def test_all_recordings_are_lost_with_the_thread_that_writes_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recorder = Recorder(tmp_path, {})
+    recorder._expected = {(3, 1, None): None, (4, 2, 1): None}
+    monkeypatch.setattr(recorder, "_process_queue", refuse)
+    with pytest.raises(OSError, match="No space"):
+        recorder._run_writer()
+    lost = recorder.collect_results()
+    assert [(line.trial, line.attempt, line.interval) for line in lost] == [(3, 1, None), (4, 2, 1)]
+    assert {line.reason for line in lost} == {"its thread ended (OSError: [Errno 28] No space left on device)"}
+    assert (recorder._waiting, recorder.thread) == (0, None)
+
+
+def test_tables_are_written_and_read_cell_by_cell(tmp_path: Path) -> None:
+    table = np.rec.fromrecords([(0.1, 2.5), (-3.0, 4e-7)], names="time_s,force_n")
+    csv_files.write_columns(tmp_path / "t.csv", table)
+    assert (tmp_path / "t.csv").read_text("utf-8") == "time_s,force_n\n0.1,2.5\n-3.0,4e-07\n"
+    table.force_n[1] = np.inf
+    with pytest.raises(StudyError, match=r"other.csv was not written, because force_n is inf in row 2; it must"):
+        csv_files.write_columns(tmp_path / "other.csv", table)
+    assert not (tmp_path / "other.csv").exists()
+    names = [csv_files.Column("a", "integer", "first", minimum=1), csv_files.Column("b", "text", "second")]
+    assert list(csv_files.table_problems(b"a,c\n1,x\n", names)) == ["columns are missing: b", "columns are unknown: c"]
+    assert list(csv_files.table_problems(b"b,a\nx,1\n", names)) == ["columns are in a different order or duplicated"]
+    assert [text.partition(":")[0] for text in csv_files.table_problems(b"a,b\n1,x\n0,y\n-1,z\n", names)] == [
+        "row 3, a"
+    ]
+    assert list(csv_files.table_problems(b"a,b\n1,x\n2,y,3\n", names)) == ["row 3 has 3 cells, not 2"]
+    assert names[0].variable == {"@type": "PropertyValue", "name": "a", "description": "first", "minValue": 1}
+
+
+@pytest.mark.parametrize(
+    ("act", "sentence"),
+    [
+        (lambda at: atomic.flush_entry(at / "b"), "{at}/b was written, but the disk did not confirm it (No space"),
+        (lambda at: atomic.copy_folder(at / "a", at / "b"), "{at}/b cannot be written (No space left on device): free"),
+        (atomic.remove_temporary_files, "{at}/{half} cannot be written (No space left on device): free"),
+        (lambda at: atomic.is_there(at / "b"), "{at}/b cannot be read (No space left on device): "),
+        (lambda at: blinding.reveal(at, "AB", "why"), "{at} is not a study folder (key.sealed is missing): specify"),
+        (lambda at: _protocol_error(at / "r"), "{at}/r does not contain 'scene': restore it from a back-up"),
+        (lambda at: receipt.read(at / "r"), "{at}/r is not a receipt (Expecting value"),
+    ],
+)
+def test_a_message_names_the_file_and_then_the_reason(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: Callable[[Path], Any], sentence: str
+) -> None:
+    half = atomic.temporary_path(tmp_path / "a")
+    half.write_bytes(b"")
+    (tmp_path / "r").write_bytes(b"[")
+    if "No space" in sentence:
+        for name in ("sync_folder", "shutil.copytree"):
+            monkeypatch.setattr(f"study_app.store.atomic.{name}", refuse)
+        monkeypatch.setattr(Path, "unlink", refuse)
+        if "read" in sentence:
+            monkeypatch.setattr(Path, "stat", refuse)
+    with pytest.raises(StoreError) as raised:
+        act(tmp_path)
+    monkeypatch.undo()
+    assert str(raised.value).startswith(sentence.format(at=tmp_path, half=half.name))
+
+
+def _protocol_error(path: Path) -> None:
+    with blinding.protocol_errors(path):
+        raise KeyError("scene")
+
+
+def test_names_of_new_folders_are_numbered(tmp_path: Path) -> None:
+    for number in (1, 2, 4):
+        (tmp_path / f"demo-rehearsal-{number}").mkdir()
+    assert rehearsal_folder(tmp_path, "demo") == tmp_path / "demo-rehearsal-3"
+    with suppress(StoreError):
+        atomic.copy_folder(tmp_path / "demo-rehearsal-1", tmp_path / "copy")
+    assert (tmp_path / "copy").is_dir()
+    assert data_folder().name
