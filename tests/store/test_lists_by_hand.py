@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,27 @@ import pytest
 
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store import atomic, csv_files, drafts, exclusions, merged, output_files, receipt
+from study_app.store import (
+    atomic,
+    csv_files,
+    drafts,
+    exclusions,
+    merged,
+    output_files,
+    receipt,
+    study_runs,
+    study_settings,
+    study_versions,
+)
 from study_app.store.blinded import blinding
 from study_app.store.checksums import file_hash, note_rebuilt, read_checksums, renew_checksums
-from study_app.store.delivered import delay_error_ms
+from study_app.store.delivered import broken_limits, delay_error_ms, is_within_limits
 from study_app.store.exclusions import Exclusion
 from study_app.store.folder_lock import remove_abandoned_claims
-from study_app.store.folders import SessionFolder, rehearsal_folder
+from study_app.store.folders import SessionFolder, StudyFolder, rehearsal_folder
 from study_app.store.recorder import Recorder
+from study_app.store.sessions import begin
+from study_app.store.sites import merge
 from study_app.user_folder import data_folder
 from tests.platforms import needs_links
 
@@ -355,3 +369,147 @@ def test_names_of_new_folders_are_numbered(tmp_path: Path) -> None:
         atomic.copy_folder(tmp_path / "demo-rehearsal-1", tmp_path / "copy")
     assert (tmp_path / "copy").is_dir()
     assert data_folder().name
+
+
+@pytest.fixture
+def runs(tmp_path: Path) -> Path:
+    """Sessions, pilots and rehearsals with two contents of a study's file, in the folders that each kind has."""
+    sessions = (
+        ("demo", "P001", "a", "2026-03-01", {}),
+        ("demo", "P002", "b", "2026-03-04", {"saved_by": "AK"}),
+        ("demo", "P003", "b", "2026-03-03", {"saved_by": "BL"}),
+        ("demo-pilot", "pilot", "a", "2026-03-05", {"pilot": True}),
+        ("demo-pilot-1", "pilot", "a", "2026-03-02", {"pilot": True, "simulated": True}),
+        ("demo-rehearsal-2", "P001", "b", "2026-03-09", {"simulated": True}),
+        ("demo-other-1", "P001", "a", "2026-03-08", {}),
+    )
+    for folder, participant, content, day, fields in sessions:
+        items = [{"id": "thick"}, {"id": "warm"}] if content == "a" else [{"id": "thick"}]
+        protocol = {"study": {"version": f"0.{content}"}, "questionnaires": {"feel": {"items": items}}}
+        held = {
+            "key_hash": "c" * 64,
+            "protocol_hash": content * 64,
+            "protocol": protocol,
+            "started_at": f"{day}T09:00:00+01:00",
+            **fields,
+        }
+        path = tmp_path / folder / "data" / f"sub-{participant}" / "ses-01" / "receipt.json"
+        path.parent.mkdir(parents=True)
+        path.write_text(json.dumps(held), encoding="utf-8", newline="\n")
+    return tmp_path
+
+
+def test_runs_of_a_study_are_counted_by_kind_and_content(runs: Path) -> None:
+    found = study_runs.runs_of_study(runs, "demo")
+    assert [(run.hash[0], run.version, run.sessions, run.pilots, run.rehearsals, run.last[:10]) for run in found] == [
+        ("a", "0.a", 1, 2, 0, "2026-03-05"), ("b", "0.b", 2, 0, 1, "2026-03-09"),
+    ]  # fmt: skip
+    assert study_runs.recorded_items(found) == {("feel", "thick"): 3, ("feel", "warm"): 1}
+    assert study_runs.runs_of_study(runs, "../demo") == ()
+    contents = study_runs.recorded_contents(runs / "demo")
+    assert [content.name for content in contents] == [
+        "0.a (first session: P001, 2026-03-01)", "0.b (first session: P003, 2026-03-03; saved by BL)",
+    ]  # fmt: skip
+
+
+def test_the_original_and_the_versions_of_a_study_are_kept_by_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LIQUID_STUDY_DATA", str(tmp_path / "data"))
+    file, other = tmp_path / "copy.toml", tmp_path / "other.toml"
+    study_settings.keep_original(file, "rek2024")
+    assert (study_settings.kept_original(file), study_settings.kept_original(other)) == ("rek2024", "")
+    (path,) = (tmp_path / "data" / "settings").glob("*.json")
+    assert json.loads(path.read_text("utf-8")) == {"file": str(file.resolve()), "copy_of": "rek2024"}
+    study_settings.keep_original(file)
+    assert study_settings.kept_original(file) == ""
+    monkeypatch.setattr(study_versions, "load_or_default", lambda: (SimpleNamespace(operator="AK"), None))
+    for origin, text in (("saved", b"one"), ("draft", b"two"), ("found", b"one")):
+        study_versions.keep_version(file, text, origin)
+    kept = study_versions.kept_versions(file)
+    assert [(it.origin, it.by, it.hash) for it in kept] == [
+        ("saved", "AK", study_versions.content_hash(b"one")), ("draft", "", study_versions.content_hash(b"two")),
+    ]  # fmt: skip
+    assert [study_versions.saver_of(study_versions.content_hash(text)) for text in (b"two", b"one", b"3")] == [
+        "", "AK", "",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("participant", "sentence"),
+    [
+        ("P-7", "participant ID 'P-7' cannot be used: use at most 32 letters"),
+        ("p" * 33, f"participant ID '{'p' * 33}' cannot be used: use at most 32 letters"),
+        ("pilot", "participant ID 'pilot' is reserved for pilot sessions"),
+    ],
+)
+def test_an_id_that_cannot_be_used_is_named_with_what_is_permitted(participant: str, sentence: str) -> None:
+    with pytest.raises(StoreError, match=f"^{sentence}"):
+        begin.check_participant(participant)
+    begin.check_participant("p" * 32)
+    begin.check_participant("pilot", pilot=True)
+
+
+@pytest.mark.parametrize(
+    ("names", "sentence"),
+    [
+        ((), "no sites were specified"),
+        (("a", "B"), "site 'B' has already been merged"),
+        (("c", "C"), "site 'C' is specified twice"),
+        (("c", "d-e"), "'d-e' cannot be used as the name of a site"),
+    ],
+)
+def test_names_of_sites_differ_from_those_merged_and_from_each_other(
+    tmp_path: Path, names: tuple[str, ...], sentence: str
+) -> None:
+    there = merged.Site(name="b", merged_at=AT, key_hash="a" * 64, sessions=1)
+    study = merged.Merged(tmp_path, "stirring", "c" * 64, (there,))
+    with pytest.raises(StoreError, match=f"^{sentence}"):
+        merge._check_names(dict.fromkeys(names, tmp_path), study)
+    merge._check_names({"a": tmp_path, "c": tmp_path}, study)
+    merge._check_names({"a": tmp_path, "b": tmp_path}, None)
+
+
+@pytest.mark.parametrize(
+    ("row", "sentence"),
+    [
+        (f"P1,one,2,AB,rang,{AT},true", f"line 3: 'P1,one,2,AB,rang,{AT},true' is not an exclusion"),
+        (f"P1,1,2,AB,rang,{AT},perhaps", f"line 3: 'P1,1,2,AB,rang,{AT},perhaps' is not an exclusion"),
+        (f"P1,1,AB,rang,{AT},true", "line 3: has 6 fields"),
+    ],
+)
+def test_a_row_that_is_no_exclusion_is_quoted_with_its_line(tmp_path: Path, row: str, sentence: str) -> None:
+    path = tmp_path / "exclusions.csv"
+    path.write_text(f"{COLUMNS}P2,1,n/a,AB,rang,{AT},TRUE\n{row}\n", encoding="utf-8", newline="\n")
+    with pytest.raises(StoreError) as raised:
+        exclusions.exclusions(tmp_path)
+    assert str(raised.value).startswith(f"{path}, {sentence}")
+    path.write_bytes(b"\xff")
+    with pytest.raises(StoreError, match=f"^{path}: "):
+        exclusions.exclusions(tmp_path)
+
+
+def test_a_key_of_another_session_is_named_with_that_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "data" / "sub-P1" / "ses-01"
+    path.mkdir(parents=True)
+    (tmp_path / "blinding").mkdir()
+    key: Any = SimpleNamespace(hash="a" * 64, codes={})
+    monkeypatch.setattr(blinding, "read_key", lambda _folder: key)
+    assert blinding.verified_key(StudyFolder(tmp_path)) is key, "a session without any proof does not block others"
+    assert blinding.revealed_key(tmp_path) is None
+    (path / "receipt.json").write_text(json.dumps({"key_hash": "b" * 64}), encoding="utf-8", newline="\n")
+    with pytest.raises(StoreError, match=f"^{tmp_path}/blinding/key.sealed is not the key for session {path} "):
+        blinding.verified_key(StudyFolder(tmp_path))
+    (path / "receipt.json").write_text(json.dumps({"key_hash": "a" * 64}), encoding="utf-8", newline="\n")
+    blinding.reveal(tmp_path, "AB", "analysis")
+    assert blinding.revealed_key(tmp_path) is key
+    (record,) = blinding.reveals(tmp_path)
+    assert [record[name] for name in ("by", "reason", "key_hash")] == ["AB", "analysis", "a" * 64]
+    assert blinding.sealed_hash(tmp_path) is None
+
+
+def test_measured_values_within_the_limits_are_valid_and_none_is_unknown() -> None:
+    limits = {"lateness_ms": 2.0, "withheld_percent": 5.0}
+    measured = ({"lateness_p99_ms": 1.9}, {"lateness_p99_ms": 2.1}, {"worst_gap_ms": 99.0}, {})
+    assert [is_within_limits(row, limits) for row in measured] == [True, False, None, None]
+    assert broken_limits({"lateness_p99_ms": 2.1, "withheld_share": 0.06}, limits) == tuple(limits)

@@ -79,3 +79,30 @@ def test_each_step_lasts_from_its_first_page_to_the_next_without_the_time_of_a_g
     assert progress.durations_s == {0: 10.0 - 2.0, 1: 121.5 - 10.0 - 100.0}
     progress.process_line(event_of("session_ended", t_s=125.0, status="completed"))
     assert progress.durations_s[2] == 125.0 - 121.5
+
+
+def test_choices_that_were_not_confirmed_are_kept_by_trial_and_attempt() -> None:
+    progress = Progress()
+    lines = [
+        event_of("trial_started", t_s=10.0, trial=4, attempt=2, phase="main"),
+        event_of("trial_ended", t_s=17.0, trial=4, attempt=2, outcome="complete"),
+        event_of("item_shown", t_s=18.0, trial=4, item="thick"),
+        event_of("item_shown", t_s=18.5, trial=4, item="warm"),
+        event_of("choice", t_s=20.0, trial=4, item="thick", value=6),
+    ]
+    for line in lines:
+        progress.process_line(line)
+    assert {which: dict(answers) for which, answers in progress.unconfirmed.items()} == {
+        (4, 2): {"thick": progress.answers["thick"]}
+    }
+    answer = progress.answers["thick"]
+    assert (answer.value, answer.onset_s, answer.first_s) == (6, 18.0, 20.0)
+    assert progress.trial_lasted_s == 7.0
+    progress.process_line(event_of("broke", t_s=21.0, what="the cable"))
+    progress.process_line(event_of("session_resumed", t_s=31.0))
+    assert (progress.broke, progress.paused, progress.away_s, progress.trial_lasted_s) == ("", False, 10.0, None)
+    answers = [{"item": "thick", "value": 6, "first_s": 1.0}, {"item": "warm"}]
+    progress.process_line(event_of("responses", t_s=40.0, trial=4, attempt=2, items=answers))
+    assert (progress.answered, progress.unconfirmed) == ({4: 1}, {})
+    progress.process_line(event_of("repeat", t_s=41.0, trial=4, reason="noise"))
+    assert (progress.answered, progress.repeats) == ({}, 1)
