@@ -1,6 +1,8 @@
 import csv
 import io
+import json
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -10,7 +12,9 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.columns import TRIALS
 from study_app.store.csv_files import MISSING, Column, csv_bytes, guard_formula, has_same_cells, header, read_table
-from study_app.store.tables.session_tables import SessionRows
+from study_app.store.folders import SessionFolder
+from study_app.store.tables.session_tables import _MEASURED, SessionRows, latest_attempts
+from study_app.store.tables.study_files import row_of
 from tests.store.tables.test_transcripts import Lines
 
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
@@ -89,3 +93,83 @@ def test_a_table_that_was_written_before_texts_were_guarded_is_what_the_journal_
     assert has_same_cells(csv_bytes(TEXT[:1], [{"first": "=1+2"}, {"first": "'"}]), now)
     assert not has_same_cells(early.replace(b"=1+2", b"=1+3"), now)
     assert not has_same_cells(now, csv_bytes(TEXT[:1], [{"first": "=1+2"}, {"first": "'"}]))
+
+
+_COMBINED = {column.name: column.of_trial for column in TRIALS if column.name in _MEASURED}
+
+
+def test_a_trial_of_intervals_has_the_sum_mean_or_largest_value_of_its_own_intervals() -> None:
+    """Two trials of two intervals and a trial that is presented again: all measured values differ."""
+    script, values = Lines(intervals=True), iter(range(1, 9999))
+    told: dict[tuple[int, int], list[dict[str, float]]] = {}
+    for trial, attempt, arrangement in ((1, 1, "SC"), (2, 1, "CS"), (2, 2, "CS")):
+        which = {"trial": trial, "attempt": attempt}
+        place = {"block": "b", "phase": "main", "part": 1, "index": trial, "of": 2, "code": f"L{trial}"}
+        script.line(
+            "trial_started", t_s=100.0 * trial + 30 * attempt, **which, **place, arrangement=arrangement,
+            level=0.5 * trial + attempt, standard=float(trial), catch=None,
+        )  # fmt: skip
+        for interval in (1, 2):
+            at_s = 100.0 * trial + 30 * attempt + 7 * interval
+            script.line("interval_started", t_s=at_s, **which, interval=interval)
+            told.setdefault((trial, attempt), []).append({name: next(values) + 0.25 for name in _COMBINED})
+            script.line(
+                "interval_ended", t_s=at_s + interval, **which, interval=interval, outcome="complete",
+                invalid=["level_error_percent"] if (trial, interval) == (2, 2) else None, **told[trial, attempt][-1],
+            )  # fmt: skip
+        script.line("trial_ended", t_s=at_s + 5, **which, outcome="complete")
+    rows = SessionRows(script._lines)
+    for trial_row, (which, of_intervals) in zip(rows.trials, told.items(), strict=True):
+        assert (trial_row["trial"], trial_row["attempt"], trial_row["intervals"]) == (*which, 2)
+        for name in _COMBINED:
+            pair = [row[name] for row in of_intervals]
+            expected = {"sum": sum(pair), "mean": sum(pair) / 2, "max": max(pair)}[_COMBINED[name]]
+            assert trial_row[name] == pytest.approx(expected), name
+    columns = ("trial", "attempt", "interval", "interval_started_s", "gap_s", "presented", "standard", "level")
+    assert [tuple(row[name] for name in columns) for row in rows.intervals] == [
+        (1, 1, 1, 137.0, None, "standard", 1.0, 1.5),
+        (1, 1, 2, 144.0, 6.0, "comparison", 1.0, 1.5),
+        (2, 1, 1, 237.0, None, "comparison", 2.0, 2.0),
+        (2, 1, 2, 244.0, 6.0, "standard", 2.0, 2.0),
+        (2, 2, 1, 267.0, None, "comparison", 2.0, 3.0),
+        (2, 2, 2, 274.0, 6.0, "standard", 2.0, 3.0),
+    ]
+    reasons = [row["invalid_reasons"] for row in rows.intervals]
+    assert reasons == [None, None, None, "level_error_percent", None, "level_error_percent"]
+    assert [row["ended_s"] for row in rows.intervals] == [138.0, 146.0, 238.0, 246.0, 268.0, 276.0]
+    assert [row["attempt"] for row in latest_attempts(rows.trials)] == [1, 2]
+
+
+def test_notes_of_a_reconnected_device_stand_beside_the_trials_before_and_after() -> None:
+    script = Lines()
+    script.started(1)
+    script.line("broke", what="the cable")
+    script.line("device_reconnected")
+    script.started(1, 2)
+    script.ended(1, 2)
+    script.line("repeat", trial=1, reason="noise")
+    script.started(2)
+    script.note("note", "coughed")
+    script.note("mark", "laughed")
+    rows = SessionRows(script._lines).trials
+    failed = "the device failed and was reconnected (the cable)"
+    assert [row["notes"] for row in rows] == [
+        failed,
+        f"presented again: {failed}\nrepeated: noise",
+        "coughed\nlaughed",
+    ]
+    assert [row["marked"] for row in rows] == [False, False, True]
+
+
+def test_a_damaged_session_keeps_its_row_from_its_receipt_or_its_first_line(tmp_path: Path) -> None:
+    session = SessionFolder(tmp_path / "ses-03", "P007", 3)
+    session.path.mkdir()
+    at = "2026-03-02T09:30:00+01:00"
+    held = {"key_hash": "a" * 64, "study": "stirring", "simulated": True, "pilot": False, "language": "nl"}
+    session.receipt.write_text(json.dumps(held | {"started_at": at, "device": {"name": "falcon"}}), "utf-8")
+    session.journal.write_bytes(b"damaged\n")
+    (row,) = row_of(session, None)
+    assert {name: value for name, value in row.items() if value is not None} == {
+        "study": "stirring", "simulated": True, "pilot": False, "language": "nl", "device": "falcon",
+        "participant": "P007", "session": 3, "session_started_at": at, "status": "damaged",
+    }  # fmt: skip
