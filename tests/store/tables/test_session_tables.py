@@ -153,11 +153,7 @@ def test_notes_of_a_reconnected_device_stand_beside_the_trials_before_and_after(
     script.note("mark", "laughed")
     rows = SessionRows(script._lines).trials
     failed = "the device failed and was reconnected (the cable)"
-    assert [row["notes"] for row in rows] == [
-        failed,
-        f"presented again: {failed}\nrepeated: noise",
-        "coughed\nlaughed",
-    ]
+    assert [row["notes"] for row in rows] == [failed, f"presented again: {failed}\nrepeated: noise", "coughed\nlaughed"]
     assert [row["marked"] for row in rows] == [False, False, True]
 
 

@@ -1,0 +1,184 @@
+"""The exported tables, codebook and .sav file of a study in memory, against a few lines of its own answers."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+import pyreadstat
+import pytest
+
+from study_app.analysis.data.blocks import Item, Setting
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.export import spss
+from study_app.analysis.export.table_files import table_files
+from study_app.analysis.export.tables import exported_tables, wide_table
+from tests.analysis.made_up import ITEMS, study
+
+SETTINGS = tuple(
+    Setting(code=f"L{place}", condition=f"c{place}", liquid=f"oil{place}", delay_ms=10.0 * place + 0.5)
+    for place in (1, 2, 3)
+)
+PEOPLE = ("A-P001", "A-P002", "B-P001", "B-P009", "B-P010")
+UNSURE, LEFT_OUT = ("A-P001", "L2"), "B-P010"
+
+
+class Given(NamedTuple):
+    """An answer: None without one."""
+
+    participant: str
+    code: str
+    item: str
+    value: int | None
+
+
+@pytest.fixture(scope="module")
+def answers() -> list[Given]:
+    """Two answers of each person to each statement on each setting, of which some are missing."""
+    draw = np.random.default_rng(20)
+    return [
+        Given(person, setting.code, item, None if draw.random() < 0.15 else int(draw.integers(1, 8)))
+        for person in PEOPLE for _ in range(2) for setting in SETTINGS for item in ITEMS
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def made(answers: list[Given]) -> Study:
+    """Five people of two sites; A-P001 cannot judge L2, and B-P010's session is excluded."""
+    pairs = zip(answers[::2], answers[1::2], strict=True)
+    made = study(SETTINGS, [(one.participant, 1, one.code, [one.value, other.value]) for one, other in pairs])
+    trials = made.trials.assign(delay_error_mean_ms=np.arange(len(made.trials)) * 0.25 - 3)
+    rows = made.responses
+    unsure = (rows["participant"] == UNSURE[0]) & (rows["code"] == UNSURE[1])
+    rows = rows.assign(cannot_judge=unsure, response=rows["response"].mask(unsure), title=rows["item"])
+    tables = {"trials": trials, "responses": rows, "participants": made.participants}
+    for name, table in tables.items():
+        excluded = table["participant"] == LEFT_OUT
+        tables[name] = table.assign(excluded=excluded, counted=~excluded)
+    (block,) = made.blocks
+    block = replace(block, items=tuple(Item(id=it, text=f"It is {it}.", short=it[:3]) for it in ITEMS))
+    return replace(made, blocks=(block,), sites=("A", "B"), answered=tables["responses"], **tables)
+
+
+def counted(answers: list[Given]) -> Iterator[Given]:
+    for answer in answers:
+        if answer.participant != LEFT_OUT and (answer.participant, answer.code) != UNSURE:
+            yield answer
+
+
+def test_each_answer_has_its_own_condition_delay_and_site(made: Study, answers: list[Given]) -> None:
+    tables = {table.name: table.frame for table in exported_tables(made)}
+    responses = tables["responses"].astype(object)
+    assert len(responses) == len(answers)
+    for answer, (at, row) in zip(answers, responses.iterrows(), strict=True):
+        place = int(answer.code[1])
+        assert (row["participant"], row["code"], row["item"], row["site"]) == (*answer[:3], answer.participant[0])
+        assert (row["condition"], row["liquid"], row["delay_ms"]) == (f"c{place}", f"oil{place}", 10.0 * place + 0.5)
+        trial = int(str(at)) // 2
+        assert row["trial"] == trial + 1
+        assert row["delay_achieved_ms"] == pytest.approx(10.0 * place + 0.5 + trial * 0.25 - 3)
+        is_given = answer.value is not None and (answer.participant, answer.code) != UNSURE
+        assert row["response"] == str(answer.value) if is_given else pd.isna(row["response"])
+        assert row["counted"] == (answer.participant != LEFT_OUT)
+    assert list(tables["trials"]["code"]) == [answer.code for answer in answers[::2]]
+    assert list(tables["trials"]["delay_achieved_ms"]) == list(responses["delay_achieved_ms"][::2])
+
+
+def test_each_row_of_the_aggregate_counts_the_answers_on_one_setting(made: Study, answers: list[Given]) -> None:
+    aggregate = {table.name: table.frame for table in exported_tables(made)}["aggregate"]
+    assert list(zip(aggregate["code"], aggregate["item"], strict=True)) == [
+        (setting.code, item) for setting in SETTINGS for item in ITEMS
+    ]
+    for row in aggregate.to_dict("records"):
+        of_cell = [answer for answer in answers if answer[1:3] == (row["code"], row["item"])]
+        values = [answer.value for answer in counted(of_cell) if answer.value is not None]
+        unsure = 2 * (row["code"] == UNSURE[1])
+        assert (row["condition"], row["liquid"]) == (f"c{row['code'][1]}", f"oil{row['code'][1]}")
+        assert (row["block"], row["short"], row["study"]) == ("b", row["item"][:3], "made_up")
+        assert (row["simulated"], row["pilot"]) == (True, False)
+        assert (row["n"], row["cannot_judge"], row["presented"]) == (len(values), unsure, 8)
+        assert row["missing"] == 8 - len(values) - unsure
+        assert row["participants"] == len({a.participant for a in counted(of_cell) if a.value is not None})
+        assert [row[f"count_{level}"] for level in range(1, 8)] == [values.count(level) for level in range(1, 8)]
+        assert row["median"] == median(values)
+        assert row["q1"] < row["q3"] or row["q1"] == row["q3"] == row["median"]
+        assert row["agree_percent"] == pytest.approx(100 * sum(value >= 5 for value in values) / len(values), abs=0.05)
+
+
+def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answers: list[Given]) -> None:
+    table, cells = wide_table(made)
+    wide = table.frame.set_index("participant")
+    assert list(wide.index) == list(PEOPLE[:-1])
+    assert list(wide["site"]) == ["A", "A", "B", "B"]
+    assert list(cells) == [f"{item}__c{place}" for place in (1, 2, 3) for item in ITEMS]
+    for name, cell in cells.items():
+        item, _, condition = name.partition("__c")
+        for person in wide.index:
+            values = [
+                answer.value
+                for answer in counted(answers)
+                if answer[:3] == (person, f"L{condition}", item) and answer.value is not None
+            ]
+            held = wide.loc[person, name]
+            assert held == median(values) if values else pd.isna(held), (name, person)
+        (column,) = (column for column in table.columns if column.name == name)
+        assert column.description == f"It is {item}. About {made.blocks[0].name(cell.setting)}, in Block."
+        assert (column.minimum, column.maximum) == (1, 7)
+
+
+def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answer(
+    made: Study, answers: list[Given], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("study_app.analysis.export.table_files.reveals_of", lambda _folder: ({"by": "AK"},))
+    table, cells = wide_table(made)
+    labelled = replace(made, blocks=(replace(made.blocks[0], labels=tuple("abcdefg"), cannot_judge="unsure"),))
+    cells = {name: replace(cell, block=labelled.blocks[0]) for name, cell in cells.items()}
+    files = table_files(labelled, (*exported_tables(labelled), table), ("sav", "wide"), cells)
+    book: dict[str, Any] = json.loads(files["codebook.json"])
+    (block,) = book["blocks"]
+    assert block["levels"] == dict(zip("1234567", "abcdefg", strict=True))
+    assert (block["cannot_judge"], book["key_opened"], book["blinded"]) == ("unsure", [{"by": "AK"}], False)
+    assert block["settings"] == [
+        {"code": f"L{n}", "condition": f"c{n}", "liquid": f"oil{n}", "delay_ms": 10.0 * n + 0.5} for n in (1, 2, 3)
+    ]
+    assert block["items"] == [{"id": item, "text": f"It is {item}.", "short": item[:3]} for item in ITEMS]
+    assert block["sessions"] == [1]
+    head = ("participants", "sites", "sessions", "sessions_left_out", "simulated", "pilot")
+    assert [book["study"][name] for name in head] == [4, ["A", "B"], 5, made.left_out, True, False]
+    path = tmp_path / "wide.sav"
+    path.write_bytes(files["study-made_up_description-wide_data.sav"])
+    frame, meta = pyreadstat.read_sav(path, user_missing=True)
+    assert list(frame["participant"]) == list(PEOPLE[:-1])
+    for name in cells:
+        labels = meta.variable_value_labels[name]
+        assert [labels[float(level)] for level in range(1, 8)] == list("abcdefg")
+        texts = [labels.get(value, value) for value in frame[name]]
+        assert (texts[0] == "unsure") == name.endswith("c2")
+        assert meta.variable_measure[name] == "ordinal"
+    assert {text for name in cells for text in frame[name].map(meta.variable_value_labels[name])} >= {"unsure"}
+
+
+def test_missing_answers_have_the_code_of_their_reason() -> None:
+    people = pd.Series(["P1", "P2", "P3", "P4", "P5"])
+    rows = pd.DataFrame(
+        {
+            "participant": ["P2", "P3", "P4", "P4"],
+            "counted": [True, False, True, False],
+            "cannot_judge": pd.array([True, False, False, True], dtype="boolean"),
+            "excluded": [False, True, False, True],
+        }
+    )
+    coded = spss._with_codes(pd.Series([4, None, None, None, None], dtype="Float64"), people, rows)
+    labels = spss._levels({4: "four"}, "unsure")
+    assert [labels[int(value)] for value in coded] == ["four", "unsure", "Excluded", "No answer", "No answer"]
+    assert spss._levels({}, "")[int(coded[1])] == "Cannot judge"
+
+
+def test_names_in_sav_are_valid_and_differ_without_case() -> None:
+    names = ["a b", "A_b", "all", "1st", "x" * 70, "x" * 71, "é"]
+    short = list(spss._names_of(names).values())
+    assert short == ["a_b", "A_b_2", "v_all", "v_1st", "x" * 64, f"{'x' * 62}_2", "v"]
