@@ -1,5 +1,6 @@
 """Each sentence of the reports of random studies is true of their numbers."""
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -9,8 +10,9 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.contrasts import answer
+from study_app.analysis.data import measures
 from study_app.analysis.data.blocks import other_questions
-from study_app.analysis.data.study_tables import Study
+from study_app.analysis.data.study_tables import Study, group_counts, group_means
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.report import methods as methods_module
 from study_app.analysis.report import sections
@@ -19,8 +21,9 @@ from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import empty_studies, limits, none_found
 from study_app.analysis.results import Failures
 from study_app.analysis.statistics.outcome import alpha_of_looks
+from study_app.analysis.wording import all_of
 from study_app.protocol.model import Contrast
-from tests.analysis.made_up import DECIDED, ITEMS
+from tests.analysis.made_up import DECIDED, ITEMS, everybody, liquids, study
 from tests.analysis.random_studies import drawn
 from tests.analysis.report.sentences import Told, check, check_verdicts
 
@@ -180,3 +183,120 @@ def test_the_planned_sample_is_a_number_of_participants_or_of_looks(look: int | 
     first, second = (f"{level:.3g}" for level in alpha_of_looks((7, 12), 0.04, "pocock"))
     assert decided.look_words(7) in said
     assert f"up to {first} and {second} are significant (Pocock alpha spending with alpha = 0.04, Lan" in said
+
+
+def test_a_form_is_named_with_its_questions_and_the_times_at_which_it_is_completed() -> None:
+    def asked(form: str, title: str, count: int) -> list[Any]:
+        return [SimpleNamespace(where=SimpleNamespace(id=form, title=title, is_form=form != "b")) for _ in range(count)]
+
+    blocks = {"a": {"title": {"en": "First"}, "phase": "main"}, "b": {"title": {"en": "Second"}, "phase": "main"}}
+    groups = {"early": {"sequence": ["load", "a", "b"]}, "late": {"sequence": ["a", "b", "load", "end"]}}
+    head = {"study": {"languages": ["en"], "block_order": "fixed"}, "blocks": blocks, "questionnaires": {}}
+    questions = (*asked("load", "Workload", 3), *asked("b", "Second", 5), *asked("end", "Goodbye", 1))
+    study: Any = SimpleNamespace(others=SimpleNamespace(questions=questions), protocol=head | {"groups": groups})
+    assert list(methods_module._questionnaires(study)) == [
+        "Participants completed the questionnaire “Workload” (three questions) before the first block or after the last "
+        "block, depending on the group or session.",
+        "Participants completed the questionnaire “Goodbye” (1 question) after the last block, in some groups or "
+        "sessions.",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("counts", "sentence"),
+    [
+        ((0, 0, 0, 0), "The study does not contain any reaching trials, so reaching measures are not available."),
+        ((5, 9, 0, 0), "recordings of 5 of 9 reaching trials (reasons for the others: lost). No data are available"),
+        ((5, 9, 4, 0), "of 5 of 9 reaching trials (reasons for the others: lost). All measured trials met the"),
+        (
+            (5, 9, 4, 1),
+            "(reasons for the others: lost). 1 trial exceeded the protocol's timing limits but is included",
+        ),
+        (
+            (5, 9, 4, 3),
+            "(reasons for the others: lost). Three trials exceeded the protocol's timing limits but are incl",
+        ),
+    ],
+)
+def test_recordings_are_counted_with_the_reasons_and_the_trials_beyond_limits(
+    counts: tuple[int, ...], sentence: str
+) -> None:
+    names = ("recorded", "trials", "judged", "invalid")
+    measured: Any = SimpleNamespace(unread=("lost",), **dict(zip(names, counts, strict=True)))
+    assert sentence in sections._recordings(measured)
+
+
+def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
+    def order(orders: int, codes: tuple[str, ...], positions: Any, follows: tuple[int, ...], even: bool) -> Any:
+        return SimpleNamespace(
+            orders=orders, codes=codes, positions=positions, after_another=follows, positions_even=even,
+            follows_even=not even,
+        )  # fmt: skip
+
+    blocks = [SimpleNamespace(id=name, title=name.upper(), revealed=False) for name in "abcd"]
+    orders = {
+        "a": order(7, ("L1", "L2"), ((3, 4), (5, 2)), (1, 6), False),
+        "b": order(9, ("M1", "M2"), ((8, 8), (8, 8)), (2, 5), True),
+        "c": order(0, ("N1", "N2"), ((1, 1),), (1,), True),
+        "d": order(6, ("O1",), ((6,),), (1,), True),
+    }
+    results: Any = SimpleNamespace(blocks=blocks, orders=orders)
+    text = " ".join(re.sub(r"<[^>]+>", " ", "".join(map(str, sections._orders(results)))).split())
+    assert text == (
+        "Trial orders A (seven orders): positions were not balanced; each condition occurred 2 to 5 times in each position "
+        "and followed every other condition equally often. Position L1 L2 1 3 4 2 5 2 B (nine orders): each condition "
+        "occurred eight times in each position and followed every other condition 2 to 5 times. Position M1 M2 1 8 8 2 8 8 "
+        "The tables show how often each condition occurred in each position of its block."
+    )
+
+
+def test_common_methods_name_adjustment_alpha_and_missing_answers() -> None:
+    def block(id_: str, incomplete: dict[str, tuple[str, ...]]) -> Any:
+        return replace(evaluated.blocks[0], id=id_, incomplete=incomplete)
+
+    evaluated = evaluate(study(liquids(3), list(everybody(liquids(3), 8, lambda p, s, c, i: 1 + (p + int(c[1])) % 7))))
+    decided = replace(DECIDED, alpha=0.04, primary=("different",))
+    blocks = [block("a", {"harder": ("P001", "P002")}), block("b", {"different": ("P002",), "harder": ("P005",)})]
+    for count, holm in ((1, "."), (2, ", Holm-adjusted across two blocks.")):
+        said = list(methods_module._common(replace(evaluated, decided=decided, performance=None), blocks[:count]))
+        assert said[0].endswith(f"in its block{holm}")
+        assert said[1] == (
+            "Alpha (0.04) and the primary statements (“different”) were specified before the first session."
+        )
+        assert f"{count + 1} participants with a missing answer" in said[-1].lower()
+    changed = replace(evaluated, decided=replace(decided, changed=True), performance=None)
+    assert "changed between sessions" in list(methods_module._common(changed, blocks))[1]
+    unplanned = replace(evaluated, decided=replace(decided, made=False), performance=None)
+    assert list(methods_module._common(unplanned, blocks))[1].startswith("The analysis was not specified beforehand")
+
+
+def test_answers_are_placed_by_person_setting_and_time() -> None:
+    rows = [
+        ("P2", 2, 9, "L1", "x", 3.0), ("P2", 1, 7, "L1", "x", 5.0), ("P1", 1, 4, "L2", "x", 6.0),
+        ("P1", 1, 2, "L3", "x", 1.0), ("P1", 1, 3, "L1", "y", 7.0), ("P1", 1, 1, "L1", "x", None),
+    ]  # fmt: skip
+    answers = pd.DataFrame(rows, columns=["participant", "session", "trial", "code", "item", "response"])
+    values, sessions = measures.presentations(answers, ("P1", "P2"), {"L1": 0, "L2": 1, "L3": 1}, "x")
+    nan = np.nan
+    assert np.array_equal(values, [[[nan, nan], [1.0, 6.0]], [[5.0, 3.0], [nan, nan]]], equal_nan=True)
+    assert np.array_equal(sessions, [[[nan, nan], [1.0, 1.0]], [[1.0, 2.0], [nan, nan]]], equal_nan=True)
+    assert np.array_equal(measures.medians(values), [[nan, 3.5], [4.0, nan]], equal_nan=True)
+
+
+def test_means_of_groups_are_those_of_their_members() -> None:
+    people = {"P000": "trained", "P001": "naive", "P002": "trained"}
+    made = study(liquids(2), list(everybody(liquids(2), 3, lambda p, s, c, i: 1 + p * 2 + (c == "L2"), repetitions=2)))
+    made = replace(made, participants=made.participants.assign(group=made.participants["participant"].map(people)))
+    assert group_counts(made) == {"naive": 1, "trained": 2}
+    rows = [row for row in group_means(made) if row.item == ITEMS[1]]
+    assert [(row.code, row.group, row.n, row.mean) for row in rows] == [
+        ("L1", "naive", 1, 3.0), ("L1", "trained", 2, 3.0), ("L2", "naive", 1, 4.0), ("L2", "trained", 2, 4.0),
+    ]  # fmt: skip
+    assert [row.sd for row in rows if row.group == "trained"] == pytest.approx([8**0.5] * 2)
+
+
+@pytest.mark.parametrize(
+    ("number", "words"), [(1, "the one statement"), (2, "both statements"), (3, "all three statements")]
+)
+def test_statements_are_counted_in_words(number: int, words: str) -> None:
+    assert all_of(number, "statement") == words
