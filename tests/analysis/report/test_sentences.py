@@ -195,8 +195,8 @@ def test_a_form_is_named_with_its_questions_and_the_times_at_which_it_is_complet
     questions = (*asked("load", "Workload", 3), *asked("b", "Second", 5), *asked("end", "Goodbye", 1))
     study: Any = SimpleNamespace(others=SimpleNamespace(questions=questions), protocol=head | {"groups": groups})
     assert list(methods_module._questionnaires(study)) == [
-        "Participants completed the questionnaire “Workload” (three questions) before the first block or after the last "
-        "block, depending on the group or session.",
+        "Participants completed the questionnaire “Workload” (three questions) before the first block or after the "
+        "last block, depending on the group or session.",
         "Participants completed the questionnaire “Goodbye” (1 question) after the last block, in some groups or "
         "sessions.",
     ]
@@ -208,10 +208,7 @@ def test_a_form_is_named_with_its_questions_and_the_times_at_which_it_is_complet
         ((0, 0, 0, 0), "The study does not contain any reaching trials, so reaching measures are not available."),
         ((5, 9, 0, 0), "recordings of 5 of 9 reaching trials (reasons for the others: lost). No data are available"),
         ((5, 9, 4, 0), "of 5 of 9 reaching trials (reasons for the others: lost). All measured trials met the"),
-        (
-            (5, 9, 4, 1),
-            "(reasons for the others: lost). 1 trial exceeded the protocol's timing limits but is included",
-        ),
+        ((5, 9, 4, 1), "(reasons for the others: lost). 1 trial exceeded the protocol's timing limits but is included"),
         (
             (5, 9, 4, 3),
             "(reasons for the others: lost). Three trials exceeded the protocol's timing limits but are incl",
@@ -243,10 +240,10 @@ def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
     results: Any = SimpleNamespace(blocks=blocks, orders=orders)
     text = " ".join(re.sub(r"<[^>]+>", " ", "".join(map(str, sections._orders(results)))).split())
     assert text == (
-        "Trial orders A (seven orders): positions were not balanced; each condition occurred 2 to 5 times in each position "
-        "and followed every other condition equally often. Position L1 L2 1 3 4 2 5 2 B (nine orders): each condition "
-        "occurred eight times in each position and followed every other condition 2 to 5 times. Position M1 M2 1 8 8 2 8 8 "
-        "The tables show how often each condition occurred in each position of its block."
+        "Trial orders A (seven orders): positions were not balanced; each condition occurred 2 to 5 times in each "
+        "position and followed every other condition equally often. Position L1 L2 1 3 4 2 5 2 B (nine orders): each "
+        "condition occurred eight times in each position and followed every other condition 2 to 5 times. Position M1 "
+        "M2 1 8 8 2 8 8 The tables show how often each condition occurred in each position of its block."
     )
 
 

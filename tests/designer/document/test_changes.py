@@ -1,10 +1,12 @@
 """Changes of a study: names that follow, elements added and copied, series, texts and fragments."""
 
 import re
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import pytest
 
+from study_app.designer.document import steps
 from study_app.designer.document.additions import (
     check_values,
     edits_to_add,
@@ -317,3 +319,98 @@ def test_points_of_a_scale_are_listed_language_by_language_and_those_of_the_stud
     points = next(row for section in form.sections for row in section.rows if row.path[-1] == "labels").facts
     assert points.languages == (("nl", "Dutch"), ("en", "English"), ("fr", "French"))
     assert points.points == (("nee", "no", "non"), ("", "maybe", "oui"), ("", "yes", ""))
+
+
+THICK, LIQUIDS = ("liquids", "thick"), ("blocks", "liquids")
+GONE = {"liquids.thick.density_kg_m3": None, "liquids.thick.effects": None}
+
+
+@pytest.mark.parametrize(
+    ("request_", "words", "select", "said", "changes"),
+    [
+        (steps.SetValue((*THICK, "density_kg_m3"), 9), "Change Density", None, "", {"liquids.thick.density_kg_m3": 9}),
+        (steps.RemoveKey(("study", "resume")), "Remove Resume", None, "", {"study.resume": None}),
+        (
+            steps.AddEntry(("sequence",), "delays"), "Add to Session order", None, "",
+            {"sequence": ("welcome", "liquids", "reaching", "delays", "thanks", "delays")},
+        ),
+        (
+            DuplicateElement(THICK), "Duplicate Thick", ("liquids", "thick_2"), "",
+            {"liquids.thick_2.density_kg_m3": 1400, "liquids.thick_2.effects": ("drag",)},
+        ),
+        (
+            steps.MoveElement(LIQUIDS, 1), "Move Liquids down", LIQUIDS, "Liquids, now 3 of 5",
+            {"sequence": ("welcome", "reaching", "liquids", "delays", "thanks")},
+        ),
+        (
+            steps.MoveElement(LIQUIDS, -1), "Move Liquids up", LIQUIDS, "Liquids, now 1 of 5",
+            {"sequence": ("liquids", "welcome", "reaching", "delays", "thanks")},
+        ),
+        (
+            steps.MoveTo(("sequence", 3), 1), "Move Delays", ("blocks", "delays"), "Delays, now 2 of 5",
+            {"sequence": ("welcome", "delays", "liquids", "reaching", "thanks"), "blocks.delays.part": 1,
+             "blocks.liquids.part": 2},
+        ),
+        (
+            steps.AddToSession(LIQUIDS, (("sequence", 3), ("sequence", 1))), "Add Liquids to the session", None,
+            "Liquids, now step 2", {"sequence": ("welcome", "liquids", "liquids", "reaching", "liquids", "delays",
+                                                 "thanks")},
+        ),
+        (steps.DeleteElement(THICK), "Delete Thick", ("liquids", "thin"), "", GONE),
+        (
+            steps.DeleteElement(THICK, "all"), "Delete Thick", ("liquids", "thin"), "",
+            GONE | {"conditions.thick.liquid": None, "conditions.thick.delay_ms": None,
+                    "blocks.liquids.conditions": ("thin",)},
+        ),
+        (
+            steps.DeleteElement(THICK, "other", "thin"), "Delete Thick", ("liquids", "thin"), "",
+            GONE | {"conditions.thick.liquid": "thin"},
+        ),
+        (
+            steps.RenameElement(THICK, "honey"), "Rename to honey, 1 place updated", ("liquids", "honey"),
+            "1 place updated", GONE | {"liquids.honey.density_kg_m3": 1400, "liquids.honey.effects": ("drag",),
+                                       "conditions.thick.liquid": "honey"},
+        ),
+        (
+            steps.AddElement(("liquids",)), "Add liquid", ("liquids", "liquid"), "",
+            {"liquids.liquid.density_kg_m3": 1200},
+        ),
+        (
+            steps.Several("Both", (steps.SetText(("study", "title"), "en", "New"), steps.RemoveKey(("study", "name")))),
+            "Both", None, "", {"study.title": "New", "study.name": None},
+        ),
+    ],
+)  # fmt: skip
+def test_a_request_is_one_step_with_its_words_its_selection_and_no_other_change(
+    request_: steps.Request, words: str, select: Path | None, said: str, changes: dict[str, Any]
+) -> None:
+    study = study_of("demo")
+    step = request_.step(Situation(study, ("liquids", "thin")))
+    assert (step.words, step.select, step.said) == (words, select, said)
+    before, after = (dict(leaves(each.document)) for each in (study, study.with_edits(*step.edits)[0]))
+    assert {key: after.get(key) for key in {**before, **after} if before.get(key) != after.get(key)} == changes
+
+
+def leaves(value: Any, path: Path = ()) -> Iterator[tuple[str, Any]]:
+    """Yield the dotted path and the value of every key that holds no table."""
+    tables = isinstance(value, tuple) and any(isinstance(entry, Mapping) for entry in value)
+    inner = enumerate(value) if tables else value.items() if isinstance(value, Mapping) else None
+    if inner is None:
+        yield ".".join(map(str, path)), value
+        return
+    for key, entry in inner:
+        yield from leaves(entry, (*path, key))
+
+
+@pytest.mark.parametrize(
+    ("how", "words", "title"), [("add", "Add French", {"en": "T"}), ("copy", "Fill in Dutch", {"en": "T", "nl": "T"}),
+                                ("remove", "Remove Dutch", {"en": "T"})]
+)  # fmt: skip
+def test_a_language_is_added_filled_in_or_removed(how: Any, words: str, title: Any) -> None:
+    languages = '["en", "nl"]' if how == "remove" else '["en"]' if how == "add" else '["en", "nl"]'
+    held = '{ en = "T", nl = "U" }' if how == "remove" else '{ en = "T" }' if how == "copy" else '"T"'
+    study = read_study(f"format = 2\n[study]\nname = 'a'\nlanguages = {languages}\ntitle = {held}\n".encode())
+    step = steps.ChangeLanguage(how, "fr" if how == "add" else "nl").step(Situation(study))
+    changed = study.with_edits(*step.edits)[0].document["study"]
+    assert (step.words, changed["title"]) == (words, title)
+    assert changed["languages"] == {"add": ("en", "fr"), "copy": ("en", "nl"), "remove": ("en",)}[how]
