@@ -1,12 +1,10 @@
 """Every page of the designer in windows of each size: it fits, its parts have names, none is a window of its own."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, QObject, QPoint, Qt
-from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
@@ -178,35 +176,3 @@ def test_each_addable_element_and_the_count_of_texts_are_whole(designer: Any) ->
     row = designer.field("study", "languages").rows[-1]
     (note,) = (part for part in row.findChildren(Elided) if " of " in part.whole)
     assert note.width() >= note.fontMetrics().horizontalAdvance(note.whole.partition(",")[0])
-
-
-@pytest.mark.parametrize("found", [4.0, 5.0])
-def test_the_chosen_card_shows_its_template_and_whether_a_known_answer_is_recovered(
-    designer: Any, found: float
-) -> None:
-    designer.controller.show_new_page()
-    page = designer.place.new_page
-    card, before = page.card, next(one.choice for one in page.buttons if one.choice.recovery)
-    answer = replace(before.recovery, planted=4.1, found=found, low=3.0, high=6.0)
-    choice = replace(
-        before, source="a", title="Thicker", description="Which is thicker?", study_title="Two oils",
-        session=(("text", "Welcome", "1 min"), ("blocks", "Stirring", "7 min")), recovery=answer, languages=("nl",),
-        tags=(("device", "Up to 3 N"), ("lock", "Double-blind")), questions=(),
-    )  # fmt: skip
-    card.show_choice(replace(before, source="b", title="Other", description="Another", recovery=None))
-    card.show_choice(choice)
-    words = [line.text() for line in card.findChildren(QLabel) if line.text()]
-    for texts in (("Thicker",), ("Which is thicker?",), ("The session",), ("Welcome", "1 min"), ("Stirring", "7 min")):
-        at = words.index(texts[0])
-        assert tuple(words[at : at + len(texts)]) == texts
-    assert [chip.word for chip in card.about.findChildren(Chip)] == ["Up to 3 N", "Double-blind"]
-    (chip,) = card.details.findChildren(Chip)
-    assert (chip.word, chip.tone) == (("recovered", "ok") if found == 4.0 else ("not recovered", "warn"))
-    assert answer.sentence in words
-    assert not {"Other", "Another"} & set(words)
-    assert card.questions.title.placeholderText() == "Two oils"
-    assert [code for code, check in card.questions.languages.items() if check.isChecked()] == ["nl"]
-    for height, places in ((800, [0, 2, 1]), (1000, [0, 1, 2])):
-        card.resize(400, height)
-        card.resizeEvent(QResizeEvent(card.size(), card.size()))
-        assert [card.inside.indexOf(part) for part in (card.about, card.details, card.begin)] == places

@@ -11,12 +11,14 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QApplication, QLabel
 
 from study_app.app.main_controller import MainController
 from study_app.designer.controller import DesignerController
 from study_app.designer.document.steps import SetValue
 from study_app.gui.sessions.session_facts import SessionFacts
+from study_app.gui.widgets.cards import Chip
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.drafts import draft_of
 from study_app.store.study_versions import kept_content, kept_versions
@@ -228,3 +230,35 @@ def test_a_text_that_is_being_typed_is_in_the_draft_when_the_designer_is_left(de
     assert draft is not None
     assert draft.text == designer.text
     assert designer.value("study", "version") == "3.7"
+
+
+@pytest.mark.parametrize("found", [4.0, 5.0])
+def test_the_chosen_card_shows_its_template_and_whether_a_known_answer_is_recovered(
+    designer: Any, found: float
+) -> None:
+    designer.controller.show_new_page()
+    page = designer.place.new_page
+    card, before = page.card, next(one.choice for one in page.buttons if one.choice.recovery)
+    answer = replace(before.recovery, planted=4.1, found=found, low=3.0, high=6.0)
+    choice = replace(
+        before, source="a", title="Thicker", description="Which is thicker?", study_title="Two oils",
+        session=(("text", "Welcome", "1 min"), ("blocks", "Stirring", "7 min")), recovery=answer, languages=("nl",),
+        tags=(("device", "Up to 3 N"), ("lock", "Double-blind")), questions=(),
+    )  # fmt: skip
+    card.show_choice(replace(before, source="b", title="Other", description="Another", recovery=None))
+    card.show_choice(choice)
+    words = [line.text() for line in card.findChildren(QLabel) if line.text()]
+    for texts in (("Thicker",), ("Which is thicker?",), ("The session",), ("Welcome", "1 min"), ("Stirring", "7 min")):
+        at = words.index(texts[0])
+        assert tuple(words[at : at + len(texts)]) == texts
+    assert [chip.word for chip in card.about.findChildren(Chip)] == ["Up to 3 N", "Double-blind"]
+    (chip,) = card.details.findChildren(Chip)
+    assert (chip.word, chip.tone) == (("recovered", "ok") if found == 4.0 else ("not recovered", "warn"))
+    assert answer.sentence in words
+    assert not {"Other", "Another"} & set(words)
+    assert card.questions.title.placeholderText() == "Two oils"
+    assert [code for code, check in card.questions.languages.items() if check.isChecked()] == ["nl"]
+    for height, places in ((800, [0, 2, 1]), (1000, [0, 1, 2])):
+        card.resize(400, height)
+        card.resizeEvent(QResizeEvent(card.size(), card.size()))
+        assert [card.inside.indexOf(part) for part in (card.about, card.details, card.begin)] == places

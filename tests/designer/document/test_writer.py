@@ -198,7 +198,6 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
     [
         (Unset(("b",)), "the study no longer contains b"),
         (Set(("a", "b"), 1), "a is not a table"),
-        (Set(("t",), 1), "a table with headers cannot be replaced with a single value"),
         (Set(("c",), None), "a value cannot be empty: remove its key instead"),
         (Set(("c",), {"d": "\ud800"}), "incomplete character"),
         (Duplicate(("a",), "l"), 'the name "l" is already taken'),
@@ -210,7 +209,7 @@ def test_apply_writes_as_the_neighbours_do(before: str, edit: Edit, after: str) 
 )
 def test_apply_refuses_what_makes_no_sense(edit: Edit, sentence: str) -> None:
     with pytest.raises(StudyError, match=sentence):
-        apply_edit("a = 1\nl = [1, 2]\n[t]\n", edit)
+        apply_edit("a = 1\nl = [1, 2]\n", edit)
 
 
 def test_apply_refuses_its_own_mistakes(monkeypatch: pytest.MonkeyPatch) -> None:
