@@ -1,11 +1,13 @@
 """Compilation in a worker process: afterwards a session finds everything compiled, and no process starts again."""
 
+from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from study_app.haptics.kernels import compiled
-from study_app.session.compile_worker import start_compilation
+from study_app.session.compile_worker import carry_out, start_compilation
 from tests.compiled import needs_servo
 
 
@@ -15,6 +17,19 @@ def test_no_process_starts_if_nothing_can_be_stored_or_all_is(monkeypatch: pytes
     monkeypatch.setattr(compiled, "CACHE", tmp_path)
     (tmp_path / "filled").touch()
     assert start_compilation() is None
+
+
+def test_the_cache_is_filled_once_every_device_was_opened_and_stopped(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(compiled, "CACHE", tmp_path)
+    monkeypatch.setattr(compiled, "following_compilation", lambda _send: nullcontext())
+    monkeypatch.setattr(
+        "study_app.devices.rig.open_rig", lambda name, _settings: SimpleNamespace(stop=lambda: done.append(name))
+    )
+    carry_out(("scripted", "mouse"), done.append, lambda: False)
+    assert (done, [path.name for path in tmp_path.iterdir()]) == (["scripted", "mouse"], ["filled"])
 
 
 @needs_servo

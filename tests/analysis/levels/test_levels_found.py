@@ -1,6 +1,8 @@
 """The answers to levels of each design are those that are counted here from the table of trials."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,7 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.blocks import LevelBlock, Setting
+from study_app.analysis.levels import thresholds
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.evaluate import level_results
 from study_app.protocol.presented.presentation import arrangement_text
@@ -107,3 +110,34 @@ def test_answers_to_levels_are_counted_by_hand() -> None:
                 middle = np.exp(np.log(values).mean()) if result.block == "estimation" else values.mean()
                 assert row.value == pytest.approx(middle), row
             assert row.low is None or row.low <= row.value <= row.high, row
+
+
+def test_the_mean_of_reversals_is_that_of_the_tracks_in_the_coordinate_of_the_stimulus(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The tracks of two people give 0.1 and 1.6 on log spacing, and the third none: 0.4, not 0.85."""
+    rows = pd.DataFrame([(f"P{n}", 1, "b", "L1", n) for n in (0, 0, 1, 2)], columns=[*thresholds.TRACK, "track"])
+    estimates = {0: 0.1, 1: 1.6, 2: None}
+    method = SimpleNamespace(target_percent=75.0, reversal_mean=lambda setting, _answers: estimates[setting])
+    stimulus: Any = SimpleNamespace(coordinate=math.log10, level_of=lambda u: 10.0**u)
+    monkeypatch.setattr(thresholds, "setting_of", lambda _block, track: track)
+    monkeypatch.setattr(thresholds, "answers_of", len)
+    block: Any = SimpleNamespace(method=method)
+    assert thresholds._reversal_mean(block, stimulus, rows) == pytest.approx(0.4)
+    assert thresholds._reversal_mean(block, stimulus, rows[-1:]) is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "correct", "two"), [("2ifc", True, True), ("2ifc", False, False), ("abx", True, False)]
+)
+def test_only_pairs_with_a_correct_answer_are_fitted_as_two_intervals(
+    monkeypatch: pytest.MonkeyPatch, kind: str, correct: bool, two: bool
+) -> None:
+    fitted = SimpleNamespace(fit=lambda grid, *, two_intervals: (grid, two_intervals))
+    monkeypatch.setattr(thresholds, "analysis_grid", lambda *_, **__: "grid")
+    monkeypatch.setattr(thresholds, "given_by", lambda *_: fitted)
+    block: Any = SimpleNamespace(
+        stimulus="s", assumed="a", design=SimpleNamespace(kind=kind), has_correct_answer=correct
+    )
+    rows = pd.DataFrame({"participant": ["P1", "P2"], "session": [1, 1]})
+    assert thresholds._flat_fits(block, rows) == {"P1": ("grid", two), "P2": ("grid", two)}

@@ -254,8 +254,11 @@ def test_common_methods_name_adjustment_alpha_and_missing_answers() -> None:
     evaluated = evaluate(study(liquids(3), list(everybody(liquids(3), 8, lambda p, s, c, i: 1 + (p + int(c[1])) % 7))))
     decided = replace(DECIDED, alpha=0.04, primary=("different",))
     blocks = [block("a", {"harder": ("P001", "P002")}), block("b", {"different": ("P002",), "harder": ("P005",)})]
+    untested = replace(block("c", {}), findings={})
     for count, holm in ((1, "."), (2, ", Holm-adjusted across two blocks.")):
-        said = list(methods_module._common(replace(evaluated, decided=decided, performance=None), blocks[:count]))
+        said = list(
+            methods_module._common(replace(evaluated, decided=decided, performance=None), [*blocks[:count], untested])
+        )
         assert said[0].endswith(f"in its block{holm}")
         assert said[1] == (
             "Alpha (0.04) and the primary statements (“different”) were specified before the first session."
@@ -297,3 +300,13 @@ def test_means_of_groups_are_those_of_their_members() -> None:
 )
 def test_statements_are_counted_in_words(number: int, words: str) -> None:
     assert all_of(number, "statement") == words
+
+
+def test_a_sample_is_whole_only_if_each_condition_of_each_block_has_everybody() -> None:
+    trials = list(everybody(liquids(2), 3, lambda p, s, c, i: 4))
+    for left, ends in ((trials, ", each in all conditions."), (trials[1:], ", but some did not complete all condit")):
+        said = methods_module._sample(replace(study(liquids(2), left), sites=("A", "B")))
+        assert said.startswith(
+            "Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, ver"
+        )
+        assert f" at the sites A and B{ends}" in said

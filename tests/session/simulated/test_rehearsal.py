@@ -171,6 +171,18 @@ def test_no_session_is_begun_after_a_finished_one_or_a_withdrawal(tmp_path: Path
     assert (list(files.files()), lines) == ([], [])
 
 
+def test_a_signal_that_was_ignored_before_a_rehearsal_stays_ignored() -> None:
+    before = signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    try:
+        with rehearsal._HeldSignals():
+            assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+            assert signal.getsignal(signal.SIGINT) not in {signal.SIG_IGN, signal.default_int_handler}
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
 def test_a_rehearsed_session_is_told_with_its_answers_its_time_and_what_is_missing() -> None:
     """Of two forms, with 2 and 3 questions, one question was skipped."""
     forms = {"load": (0.25, 0.5), "end": (None, 0.75, 1.0)}
