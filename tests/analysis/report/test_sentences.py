@@ -303,10 +303,9 @@ def test_statements_are_counted_in_words(number: int, words: str) -> None:
 
 
 def test_a_sample_is_whole_only_if_each_condition_of_each_block_has_everybody() -> None:
-    trials = list(everybody(liquids(2), 3, lambda p, s, c, i: 4))
-    for left, ends in ((trials, ", each in all conditions."), (trials[1:], ", but some did not complete all condit")):
-        said = methods_module._sample(replace(study(liquids(2), left), sites=("A", "B")))
-        assert said.startswith(
-            "Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, ver"
-        )
-        assert f" at the sites A and B{ends}" in said
+    made = replace(study(liquids(2), list(everybody(liquids(2), 3, lambda p, s, c, i: 4))), sites=("A", "B"))
+    partly = replace(made, blocks=(*made.blocks, replace(made.blocks[0], id="c")))
+    for sample, ends in ((made, ", each in all conditions."), (partly, ", but some did not complete all conditions.")):
+        said = methods_module._sample(sample)
+        assert said.startswith("Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, ver")
+        assert said.endswith(f" at the sites A and B{ends}")
