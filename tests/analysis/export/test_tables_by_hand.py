@@ -130,6 +130,7 @@ def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answ
         assert (column.minimum, column.maximum) == (1, 7)
 
 
+@pytest.mark.slow
 def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answer(
     made: Study, answers: list[Given], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

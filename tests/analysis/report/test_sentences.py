@@ -247,6 +247,7 @@ def test_orders_are_shown_by_position_for_blocks_with_several_orders() -> None:
     )
 
 
+@pytest.mark.slow
 def test_common_methods_name_adjustment_alpha_and_missing_answers() -> None:
     def block(id_: str, incomplete: dict[str, tuple[str, ...]]) -> Any:
         return replace(evaluated.blocks[0], id=id_, incomplete=incomplete)
@@ -307,5 +308,5 @@ def test_a_sample_is_whole_only_if_each_condition_of_each_block_has_everybody() 
     partly = replace(made, blocks=(*made.blocks, replace(made.blocks[0], id="c")))
     for sample, ends in ((made, ", each in all conditions."), (partly, ", but some did not complete all conditions.")):
         said = methods_module._sample(sample)
-        assert said.startswith("Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, ver")
+        assert said.startswith("Three participants (SIMULATED, not people) took part in “Made up” (protocol made_up, v")
         assert said.endswith(f" at the sites A and B{ends}")

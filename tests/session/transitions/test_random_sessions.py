@@ -48,6 +48,7 @@ from study_app.session.transitions.events import (
 from study_app.session.transitions.page_builder import Moment, build_page, pages_of_step, preview, previewed_page
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance, initial_state
+from study_app.store.journals.journal_events import Answer
 from tests.protocol.edited_studies import text_of
 from tests.session import small
 from tests.session.transitions.states import EVENTS, event_of, shown, state_in
@@ -284,3 +285,19 @@ def test_answers_that_a_question_no_longer_accepts_are_left_out() -> None:
     answers = {"feels_liquid": 6, "like_honey": 99, "removed": 3}
     page = previewed_page(shown, index, Moment("questions"), "en", answers)
     assert page.chosen == (("feels_liquid", 6),)
+
+
+@pytest.mark.parametrize(("hand", "numbers"), [("left", [1, 2, 4]), ("both", [1, 2, 3, 4])])
+def test_answers_have_the_numbers_of_their_questions_although_some_are_hidden(hand: str, numbers: list[int]) -> None:
+    study = parse(text_of("mixed").encode(), "mixed.toml")
+    key = draw_key(study, stream(1, "key").random)
+    state, _ = advance(initial_state(study, build_schedule(study, "P001", 1), key, "en"), Begin(0.0))
+    given = {"age": 31, "hand": hand, "since": 7, "used": ["mouse"]}
+    assert state.items == tuple(given)
+    answers = {item: Answer(onset_s=0.0, first_s=1.0, last_s=2.0, value=value) for item, value in given.items()}
+    _, commands = advance(replace(state, answers=answers), Submitted(3.0))
+    (line,) = (each.line for each in commands if isinstance(each, Write) and each.line.event == "form_answered")
+    assert line.form == "start"
+    assert [(item.number, item.item, item.value) for item in line.items] == [
+        (number, item, value) for number, (item, value) in enumerate(given.items(), 1) if number in numbers
+    ]
