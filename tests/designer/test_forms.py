@@ -370,3 +370,20 @@ def test_the_texts_of_questions_stand_in_a_column_for_each_language(designer: An
             if shown.isVisible() and shown.text() in {text[language] for text in texts}:
                 found.add((shown.mapTo(designer.window, QPoint()).x(), shown.width()))
     assert [len(place) for place in places.values()] == [1, 1], places
+
+
+@pytest.mark.parametrize("blocked", [None, "activePopupWidget", "mouseButtons"])
+def test_typed_text_waits_for_an_open_list_and_a_pressed_button(
+    designer: Any, monkeypatch: pytest.MonkeyPatch, blocked: str | None
+) -> None:
+    designer.open("kitchen", "conditions", "late")
+    line = designer.field("conditions", "late", "delay_ms").findChild(QLineEdit)
+    line.setFocus()
+    line.selectAll()
+    QTest.keyClicks(line, "137")
+    if blocked is not None:
+        held = designer.window if blocked == "activePopupWidget" else Qt.MouseButton.LeftButton
+        monkeypatch.setattr(f"study_app.designer.form.fields.QApplication.{blocked}", lambda: held)
+    line._flush_after_click()
+    assert (designer.value("conditions", "late", "delay_ms") == 137) == (blocked is None)
+    assert line.pending == line._rest.isActive() == (blocked is not None)
