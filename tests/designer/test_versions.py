@@ -242,7 +242,7 @@ def test_the_chosen_card_shows_its_template_and_whether_a_known_answer_is_recove
     answer = replace(before.recovery, planted=4.1, found=found, low=3.0, high=6.0)
     choice = replace(
         before, source="a", title="Thicker", description="Which is thicker?", study_title="Two oils",
-        session=(("text", "Welcome", "1 min"), ("blocks", "Stirring", "7 min")), recovery=answer, languages=("nl",),
+        session=(("lock", "Welcome", "1 min"), ("layers", "Stirring", "7 min")), recovery=answer, languages=("nl",),
         tags=(("device", "Up to 3 N"), ("lock", "Double-blind")), questions=(),
     )  # fmt: skip
     card.show_choice(replace(before, source="b", title="Other", description="Another", recovery=None))
