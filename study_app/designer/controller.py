@@ -76,7 +76,7 @@ class DesignerController(QObject):
             "save": self.saving.save, "banner": self.saving.answer_banner, "open": self.open, "new": self.show_new_page,
             "begin": self.begin_study, "find": self.find_elements, "add": self._show_addable,
             "delete": self.ask_to_delete, "series": self.show_series_card, "judge id": self._judge_id,
-            "repair": self.make_repair, "repairs": self._repairs.show_repairs,
+            "repair": self.make_repair, "leave entries": editing.leave_entries, "repairs": self._repairs.show_repairs,
         }  # fmt: skip
         place.asked.connect(self.handle_request)
         place.new_page.copy_asked.connect(self.show_new_page)
@@ -244,7 +244,7 @@ class DesignerController(QObject):
         self.place.form.head.refuse(why)
 
     def _show_step(self, step: Step) -> None:
-        if step.fresh or step.said:
+        if step.fresh or step.said or step.removed:
             self.show_outline()
         self.place.show_step(step)
 
@@ -280,8 +280,11 @@ class DesignerController(QObject):
         known = facts(study)
         rows = outline_rows(study, known.steps_s, self._find, session_s=known.expected_s)
         self.place.outline.show_outline(rows, self.editing.selected)
-        if known.warnings != self._warnings:
-            self._warnings = known.warnings
+        warned = known.warnings
+        if study.unfinished:  # what is new is shown when the entry is left
+            warned = tuple(warning for warning in warned if warning in self._warnings)
+        if warned != self._warnings:
+            self._warnings = warned
             self._show_header()
         self._show_warnings()
 

@@ -8,7 +8,20 @@ from PySide6.QtCore import QObject, Signal
 from study_app.designer.document.document import Document
 from study_app.designer.document.elements import existing_path
 from study_app.designer.document.fields import edits_to_rename, id_at, suggested_id
-from study_app.designer.document.steps import AddElement, AddNamed, LeaveText, Recorded, Request, Situation, with_path
+from study_app.designer.document.steps import (
+    AddElement,
+    AddLiquid,
+    AddNamed,
+    LeaveText,
+    MoveElement,
+    Recorded,
+    RenameElement,
+    Request,
+    Situation,
+    Step,
+    with_path,
+)
+from study_app.designer.document.study import Entry, Study, is_within
 from study_app.designer.document.toml_edits import Edit
 from study_app.designer.document.toml_text import Refused
 from study_app.protocol.source.document import Path as Place
@@ -46,6 +59,7 @@ class Editing(QObject):
         return () if self.opened is None else self.opened.selected
 
     def open(self, opened: Document | None) -> None:
+        self.leave_entries()
         self.opened = opened
         if opened is not None:
             opened.end_step()
@@ -63,7 +77,8 @@ class Editing(QObject):
         opened.end_step()
         opened.selected = with_path(path, before, opened.selected)
         self._keep_selection()
-        self.changed.emit()
+        if not self.leave_entries(opened.selected):
+            self.changed.emit()
 
     def go_back(self) -> None:
         if self._back:
@@ -81,18 +96,55 @@ class Editing(QObject):
         if isinstance(asked, LeaveText):
             self.suggest_id()
             return
+        before = opened.study, opened.selected
         try:
-            step = asked.step(Situation(opened.study, opened.selected, self.recorded))
+            step = asked.step(Situation(*before, self.recorded))
             opened.edit(step.words, *step.edits, text=step.text, select=step.select, key=step.continues)
         except Refused as refusal:
             path = getattr(asked, "path", opened.selected)
             self.refused.emit(path, f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.", asked)
             return
+        self._note_entries(opened, asked, step, before[0])
+        if step.entry and opened.selected != before[1]:
+            self._back.append(before[1])
         if isinstance(asked, AddElement | AddNamed):
             document, added = opened.study.document, opened.selected
             self._added = added, id_at(document, added), suggested_id(document, added)
         self._note_edit()
         self.made.emit(step)
+
+    def _note_entries(self, opened: Document, asked: Request, step: Step, before: Study) -> None:
+        """Note the entry that a step begins, and leave those that it is not part of."""
+        entries = opened.study.unfinished
+        if isinstance(asked, RenameElement | MoveElement):
+            entries = with_path(entries, asked.path, opened.selected)
+        elif step.entry:
+            by_field = isinstance(asked, AddNamed | AddLiquid) and asked.path  # its element waits for the new one
+            paths = (asked.path[:2], step.entry) if by_field else (step.entry,)
+            entries = tuple(entry for entry in entries if any(is_within(path, entry.path) for path in paths))
+            known = frozenset((fault.path, fault.message) for fault in before.shown_faults)
+            entries += tuple(Entry(path, known) for path in paths if path not in [entry.path for entry in entries])
+        elif step.select is not None:
+            entries = tuple(entry for entry in entries if is_within(opened.selected, entry.path))
+        opened.study = opened.study.with_unfinished(entries)
+
+    def leave_entries(self, selected: Place = (), row: Place = ()) -> bool:
+        """Show the problems of unfinished entries, except those that contain the selected element or a focused row.
+
+        Return whether there were others.
+        """
+        if (opened := self.opened) is None:
+            return False
+        entries = opened.study.unfinished
+        inside = (
+            is_within(selected, entry.path) or bool(row and (is_within(row, entry.path) or is_within(entry.path, row)))
+            for entry in entries
+        )
+        kept = entries[: max((at for at, stays in enumerate(inside, start=1) if stays), default=0)]
+        if kept != entries:
+            opened.study = opened.study.with_unfinished(kept)
+            self.announce_edit()
+        return kept != entries
 
     def suggest_id(self) -> None:
         """Give the last added element an id made from its text, once, when the text field is left."""
@@ -108,6 +160,7 @@ class Editing(QObject):
         edits = edits_to_rename(opened.study.document, path, wanted, recorded)
         select = with_path(opened.selected, path, after)
         opened.edit(f"Rename to {wanted}", *edits, select=select, key=opened.last[0])
+        opened.study = opened.study.with_unfinished(with_path(opened.study.unfinished, path, after))
         self._note_edit()
 
     def make_step(self, name: str, *edits: Edit, text: str | None = None, select: Place | None = None) -> None:

@@ -34,7 +34,8 @@ from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import label
-from study_app.protocol.source.document import Path
+from study_app.protocol.load import located_problems
+from study_app.protocol.source.document import Path, places_of
 
 
 class _VisibleLine(NamedTuple):
@@ -70,7 +71,8 @@ class FileText:
 
 def file_text(study: Study, name: str, path: Path) -> FileText:
     """Return the file with the lines of the element at ``path`` marked."""
-    faulty = tuple(sorted({problem.line - 1 for problem in study.problems if problem.line}))
+    problems = study.problems if not study.is_toml else located_problems(study.shown_faults, places_of(study.text))
+    faulty = tuple(sorted({problem.line - 1 for problem in problems if problem.line}))
     selected: tuple[tuple[int, int], ...] = ()
     if study.is_toml and path:
         pieces = spans_of(study.text).pieces(path)

@@ -59,13 +59,12 @@ class ProblemRow:
         return place_words(self.fault.path, self.line)
 
 
-@lru_cache(maxsize=2)
 def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
-    """Return the problems of a study, in the order of their lines.
+    """Return the problems of a study outside unfinished entries, in the order of their lines.
 
     The texts that are missing in a language are one problem, at the first of them.
     """
-    rows = fault_rows(study)
+    rows = [row for row in fault_rows(study) if not study.is_unfinished(row.fault)]
     missing = Counter(row.fault.missing_language for row in rows if row.fault.kind == "no text")
     shown: dict[object, ProblemRow] = {}
     for row in rows:
@@ -79,6 +78,7 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     return tuple(shown.values())
 
 
+@lru_cache(maxsize=2)
 def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
     """Return a row for each fault of a study, in the order of their lines."""
     if not study.is_toml:

@@ -172,6 +172,7 @@ class Saving(QObject):
     # saving
 
     def save(self) -> None:
+        self.editing.leave_entries()
         opened = self.editing.writable
         if opened is None or (opened.base and not opened.edited):
             return

@@ -35,7 +35,7 @@ from study_app.designer.outline import Addable, AddList, ElementPath, OutlineCar
 from study_app.designer.parts import Segments, small_button
 from study_app.designer.problems import ProblemRow, ProblemsCard
 from study_app.designer.prompts import Prompt
-from study_app.gui.kit.commands import COMMANDS, add_commands, command_tip, connect_button, key_cap
+from study_app.gui.kit.commands import COMMANDS, add_commands, command_tip, connect_button, key_cap, keys_of
 from study_app.gui.theme.theme import SHADOW, font
 from study_app.gui.theme.themed import name_scroll_bars, remove_widget
 from study_app.gui.widgets.accessible import announce
@@ -239,7 +239,12 @@ def _reading_order(part: QWidget, other: QWidget) -> int:
 
 
 class _Arrangement(QWidget):
-    """Places outline, form, pane and problems; ``used`` is the last focused one of the first three."""
+    """Places outline, form, pane and problems; ``used`` is the last focused one of the first three.
+
+    ``entered`` is emitted when a part other than the outline got the focus.
+    """
+
+    entered = Signal()
 
     def __init__(
         self, header: DesignerHeader, outline: OutlineCard, form: FormCard, pane: _RightPane, file: FileCard,
@@ -328,6 +333,8 @@ class _Arrangement(QWidget):
         """Note which part has keyboard focus and show its help; close the drawer when another part takes it."""
         parts = (self.outline, self.form, self.pane)
         self.form.show_help_of(now)
+        if any(part.isAncestorOf(now) for part in (self.form, self.pane, self.problems) if now is not None):
+            self.entered.emit()
         self.used = next((part for part in parts if now is not None and part.isAncestorOf(now)), self.used)
         if self.drawer and now is not None and self.isAncestorOf(now) and not self.outline.isAncestorOf(now):
             self._hide_drawer()
@@ -489,6 +496,7 @@ class DesignerPlace(Place):
         header, outline, form = self.header, self.outline, self.form
         header.study_asked.connect(partial(self.ask, "open"))
         header.new_asked.connect(partial(self.ask, "new"))
+        header.problems.clicked.connect(lambda: self.ask("leave entries"))
         header.problems.clicked.connect(lambda: self.problems.setVisible(not self.problems.isVisible()))
         self.nothing.new.clicked.connect(lambda: self.ask("new"))
         self.banner.asked.connect(partial(self.ask, "banner"))
@@ -500,6 +508,7 @@ class DesignerPlace(Place):
         outline.element_clicked.connect(lambda: self.parts.focus_first_field() if self.parts.drawer else None)
         outline.tree.dropped.connect(lambda entry, to: self.asked.emit(MoveTo(entry, index_of(to))))
         self.adding.chosen.connect(lambda entry: self._handle_request(entry.asks))
+        self.parts.entered.connect(self._leave_entries, Qt.ConnectionType.QueuedConnection)  # when all is shown
         self.parts.path.open_asked.connect(partial(self.finish, "select"))
         form.asked.connect(self._handle_request)
         form.head.id_typed.connect(partial(self.ask, "judge id"))
@@ -643,6 +652,14 @@ class DesignerPlace(Place):
         after = () if self.form.form is None else self.form.form.path
         return asked if before == after else with_path(asked, before, after)
 
+    def _leave_entries(self) -> None:
+        """Leave the entries that the focus has left for another row of the form or for another part."""
+        focused = self.window().focusWidget()
+        if self.form.isAncestorOf(focused):
+            self.ask("leave entries", self.form_path, self.form.row_path_of(focused))
+        elif self.pane.isAncestorOf(focused) or self.problems.isAncestorOf(focused):
+            self.ask("leave entries")
+
     def begin_new(self) -> None:
         if not self.stack.currentIndex():
             self.finish("new")
@@ -674,9 +691,12 @@ class DesignerPlace(Place):
                 self.asked.emit(asked)
 
     def show_step(self, step: Step) -> None:
-        """Announce a step and focus the first text of a new element."""
-        if step.said:
-            announce(self, step.said)
+        """Announce a step, say how to undo a deletion, and focus the first text of a new element."""
+        said = f"Deleted {step.removed}. {keys_of('undo')[0]} restores it." if step.removed else step.said
+        if said:
+            announce(self, said)
+        if step.removed:
+            self.form.foot.show_help("", "", said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
         if step.fresh:
             self.outline.words.clear()  # a search would hide it
@@ -688,6 +708,7 @@ class DesignerPlace(Place):
         """Open the next problem and focus its field, or its repair if there is no field to focus."""
         if self.view.form is not None:
             self.flush()
+            self.ask("leave entries")
         if not (coming := self.problems.rows_after_current):
             return
         row = coming[0]

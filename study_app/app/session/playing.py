@@ -182,6 +182,7 @@ class Playing(QObject):
     def play(self) -> None:
         """Play from here, unless a part of the rest is faulty; ask before a device is used."""
         self.place.flush()
+        self.editing.leave_entries()
         opened = self.editing.opened
         if opened is None or self.is_under_way:
             return

@@ -195,13 +195,18 @@ def _initial_short_text(text: str) -> str:
 
 
 def short_text_edits(study: Study, path: Path, language: str, text: str) -> tuple[Edit, ...]:
-    """Return the edit of a question's short text when its text is typed; none if it was edited separately."""
+    """Return the edit of a question's short text when its text is typed; none if it was edited separately.
+
+    The short text of a copy, which repeats another one, also follows the text.
+    """
     place = (*path[:-1], "short")
     before, short = value_at(study.document, path), value_at(study.document, place)
     if path[-1] != "text" or isinstance(before, Mapping) != isinstance(short, Mapping):
         return ()
     old, own = _text_in(before, language), _text_in(short, language)
-    if old is None or own is None or own != _initial_short_text(old):
+    others = [value for _, value in entries(study.document, f"{path[0]}.{path[1]}.*.*.short")]
+    is_copy = sum(_text_in(other, language) == own for other in others) > 1
+    if old is None or own is None or not (is_copy or own == _initial_short_text(old)):
         return ()
     return (Set((*place, language) if isinstance(short, Mapping) else place, _initial_short_text(text)),)
 
@@ -463,9 +468,16 @@ def _edits_to_fit(before: Study, after: Study, path: Path) -> tuple[Edit, ...]:
 
 
 def _edits_outside(study: Study, fault: Fault) -> tuple[Edit, ...]:
-    """Return the edits elsewhere that a new element needs, such as its place in the session."""
-    offered = repairs(study, fault)
-    return offered[0].edits if offered else ()
+    """Return the edits elsewhere that a new element needs, such as its place in the session, or a scale."""
+    if offered := repairs(study, fault):
+        return offered[0].edits
+    row = row_at(study.document, fault.path)
+    if row is None or row.kind != "reference" or row.value is not None:
+        return ()
+    if row.choices:
+        return (Set(row.path, row.choices[0].value),)
+    edits, added = edits_to_add(study, row.sections[:1])
+    return (*edits, Set(row.path, added[-1]))
 
 
 def _set_nested(value: dict[str, Any], path: Path, inner: Any) -> None:

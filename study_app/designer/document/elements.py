@@ -76,7 +76,7 @@ def outline(study: Study) -> Outline:
 
 def element(study: Study, path: Path, depth: int = 0) -> Element:
     """Return one line of the outline."""
-    faults = sum(fault.path[: len(path)] == path for fault in study.faults)
+    faults = sum(fault.path[: len(path)] == path for fault in study.shown_faults)
     value = value_at(study.document, path)
     name = value.get("id", path[-1]) if isinstance(value, Mapping) else path[-1]
     return Element(path, title_of(study.document, path), str(name), depth, faults)

@@ -67,7 +67,9 @@ class Step:
     text: str | None = None  # the text to edit, None for the present text
     _: KW_ONLY
     said: str = ""  # the text for screen readers
+    removed: str = ""  # what it deletes
     fresh: Literal["", "new", "copy"] = ""  # whether the selection is new: its first text takes the keyboard focus
+    entry: Path = ()  # what it adds, gives another kind or removes an entry from: it is unfinished until it is left
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +100,8 @@ class SetValue(Request):
 
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Set(self.path, self.value))
-        return Step(f"Change {label_at(self.path)}", edits, continues=self.path if self.typing else None)
+        entry = self.path[:2] if self.path[:1] == ("blocks",) and self.path[2:] == ("design",) else ()
+        return Step(f"Change {label_at(self.path)}", edits, None, self.path if self.typing else None, entry=entry)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,7 +146,9 @@ class RemoveKey(Request):
 
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Unset(self.path))
-        return Step(f"Remove {label_at(self.path)}", edits)
+        title = label_at(self.path)
+        entry = self.path[:-1][:2] if isinstance(self.path[-1], int) else ()  # another entry may replace this one
+        return Step(f"Remove {title}", edits, removed=title, entry=entry)
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +159,7 @@ class AddKey(Request):
 
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Set(self.path, _first_value(at.study, self.path)))
-        return Step(f"Add {label_at(self.path)}", edits)
+        return Step(f"Add {label_at(self.path)}", edits, entry=self.path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,11 +177,13 @@ class AddEntry(Request):
             if row is None:
                 raise Refused("new elements cannot be added here")
             if row.kind == "list":
-                return Step(f"Add {element_noun(self.path[-1])}", edits_to_add(at.study, self.path)[0])
+                edits, path = edits_to_add(at.study, self.path)
+                return Step(f"Add {element_noun(self.path[-1])}", edits, entry=path)
             first = initial_value({}, self.path) if not entries else entries[-1]
             value = _as_written(first[0] if not entries and isinstance(first, list | tuple) else first)
         edit: Edit = Insert((*self.path, len(entries)), value) if entries else Set(self.path, [value])
-        return Step(f"Add to {label_of(self.path[-1])}", edits_that_follow(at.study, self.path, edit))
+        edits = edits_that_follow(at.study, self.path, edit)
+        return Step(f"Add to {label_of(self.path[-1])}", edits, entry=(*self.path, len(entries)))
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +195,7 @@ class SwitchKind(Request):
 
     def step(self, at: Situation) -> Step:
         title = f"Switch to {label_of(self.kind or 'nothing').lower()}"
-        return Step(title, edits_to_switch(at.study, self.path, self.kind))
+        return Step(title, edits_to_switch(at.study, self.path, self.kind), entry=self.path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +211,7 @@ class SwitchKey(Request):
         value = _first_value(at.study.with_edits(*gone)[0], place)
         if value in ("", []):
             raise Refused(f"{label_of(self.to)} refers to an element that does not exist yet: add that element first")
-        return Step(f"Specify {label_of(self.to)}", (*gone, Set(place, value)))
+        return Step(f"Specify {label_of(self.to)}", (*gone, Set(place, value)), entry=self.path[:-1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -218,9 +225,8 @@ class AddElement(Request):
         inside = selected[: len(section)] == section and len(selected) > len(section)
         behind = selected[len(section)] if inside else None
         edits, path = edits_to_add(at.study, section, behind=behind)
-        return Step(
-            f"Add {element_noun(section[-1])}", _edits_beside(at.study, edits, selected, path), path, fresh="new"
-        )
+        edits = _edits_beside(at.study, edits, selected, path)
+        return Step(f"Add {element_noun(section[-1])}", edits, path, fresh="new", entry=path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +246,7 @@ class AddNamed(Request):
                 edits = (*edits, Insert(end, path[1]) if listed else Set(self.path, [path[1]]))
         else:
             edits = edits_that_follow(at.study, self.path, *edits, Set(self.path, path[1]))
-        return Step(f"Add {element_noun(self.section)}", edits, path, fresh="new")
+        return Step(f"Add {element_noun(self.section)}", edits, path, fresh="new", entry=path)
 
 
 @dataclass(frozen=True, slots=True)
@@ -252,7 +258,7 @@ class AddInstrument(Request):
     def step(self, at: Situation) -> Step:
         table, edits = _instrument_edits(at.study, self.name)
         path = ("questionnaires", free_id(names(at.study.document, "questionnaires"), self.name.replace("-", "_")))
-        return Step(f"Add {self.name}", (*edits, Set(path, table)), path)
+        return Step(f"Add {self.name}", (*edits, Set(path, table)), path, entry=path)
 
 
 def _instrument_edits(study: Study, name: str) -> tuple[dict[str, Any], tuple[Edit, ...]]:
@@ -359,7 +365,7 @@ class AddLiquid(Request):
         theirs, own = self._scales(at.study)
         if theirs != own and value_at(document, _SCALE) is None:
             edits = (*edits, Set(_SCALE, theirs))
-        return Step(f"Add {label_of(self.name).lower()}", edits, ("liquids", name))
+        return Step(f"Add {label_of(self.name).lower()}", edits, ("liquids", name), entry=("liquids", name))
 
 
 def shipped_liquids_to_add(study: Study, path: Path = ()) -> tuple[AddLiquid, ...]:
@@ -404,7 +410,7 @@ class DuplicateElement(Request):
             copy = (*path[:-1], path[-1] + 1)
             edits = (Insert(copy, list(value) if isinstance(value, tuple) else value),)
         title, edits = f"Duplicate {title_of(at.study.document, path)}", _edits_beside(at.study, edits, path, copy)
-        return Step(title, edits) if self.stays else Step(title, edits, copy, fresh="copy")
+        return Step(title, edits, entry=copy) if self.stays else Step(title, edits, copy, fresh="copy", entry=copy)
 
 
 @dataclass(frozen=True, slots=True)
@@ -439,7 +445,7 @@ class MakeSeries(Request):
             paths.append(copy)
         title = f"Make {counted_elements(len(self.values), self.path[0])} of {title_of(study.document, self.path)}"
         said = ", ".join(title_of(now.document, path) for path in paths[1:])
-        return Step(title, edits, paths[1], said=said)
+        return Step(title, edits, paths[1], said=said, entry=paths[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -502,7 +508,8 @@ class DeleteElement(Request):
         path, document = self.path, at.study.document
         title = f"Delete {title_of(document, path)}"
         if self.how == "other":
-            return Step(title, edits_to_replace(document, path, self.other), (*path[:-1], self.other))
+            edits = edits_to_replace(document, path, self.other)
+            return Step(title, edits, (*path[:-1], self.other), removed=title_of(document, path))
         if isinstance(path[-1], int):
             select: Path = path[:2]
         else:
@@ -511,7 +518,7 @@ class DeleteElement(Request):
         gone = (path,) if self.how == "gaps" else with_references(document, path, at.study.needs)
         if any(select[: len(path)] == path for path in gone):
             select = ("study",)
-        return Step(title, edits_to_delete(gone), select)
+        return Step(title, edits_to_delete(gone), select, removed=title_of(document, path))
 
 
 @dataclass(frozen=True, slots=True)
@@ -553,12 +560,13 @@ class Several(Request):
             step = request.step(replace(at, study=study))
             study, _ = study.with_edits(*step.edits)
             edits += step.edits
-        return Step(self.words, edits)
+        removes = all(isinstance(request, RemoveKey) for request in self.requests)
+        return Step(self.words, edits, removed=self.words.removeprefix("Remove ") if removes else "")
 
 
 Task: TypeAlias = Literal[
     "select", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy",
-    "delete", "series", "judge id", "repair", "repairs",
+    "delete", "series", "judge id", "repair", "repairs", "leave entries",
 ]  # fmt: skip
 
 

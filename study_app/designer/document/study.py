@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path as File
@@ -20,6 +21,18 @@ from study_app.protocol.source.problems import Fault
 _NOT_TOML: Final = "the file cannot be read: correct its text first"
 
 
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A part of a study that is being added or changed in kind, and the faults that it had before."""
+
+    path: Path
+    known: frozenset[tuple[Path, str]]
+
+
+def is_within(path: Path, entry: Path) -> bool:
+    return path[: len(entry)] == entry
+
+
 @dataclass(frozen=True)
 class Study:
     """A study's text and everything that is computed from it."""
@@ -28,6 +41,8 @@ class Study:
     folder: File = File()  # where the liquid files are that it names
     # the document of the last text that was valid TOML, used while this one is not
     before: Mapping[str, Any] = field(default_factory=dict, compare=False)
+    # the entries that are being added or changed in kind: their new problems are not shown yet
+    unfinished: tuple[Entry, ...] = field(default=(), compare=False)
 
     @cached_property
     def _source(self) -> bytes:
@@ -70,6 +85,28 @@ class Study:
     @property
     def faults(self) -> tuple[Fault, ...]:
         return self._validated[1]
+
+    @property
+    def shown_faults(self) -> tuple[Fault, ...]:
+        """The faults, without those that are new in unfinished entries."""
+        return tuple(fault for fault in self.faults if not self.is_unfinished(fault))
+
+    def is_in_entry(self, path: Path) -> bool:
+        """Return whether a place is in an unfinished entry."""
+        return any(is_within(path, entry.path) for entry in self.unfinished)
+
+    def is_unfinished(self, fault: Fault) -> bool:
+        """Return whether a fault is new in an unfinished entry."""
+        return any(
+            is_within(fault.path, entry.path) and (fault.path, fault.message) not in entry.known
+            for entry in self.unfinished
+        )
+
+    def with_unfinished(self, entries: tuple[Entry, ...]) -> Study:
+        """Return the same study with other unfinished entries; nothing is computed again."""
+        same = copy(self)
+        object.__setattr__(same, "unfinished", entries)
+        return same
 
     @cached_property
     def problems(self) -> tuple[Problem, ...]:
@@ -117,7 +154,7 @@ class Study:
         return self._of_text(text)
 
     def _of_text(self, text: str) -> Study:
-        return Study(text, self.folder, self.document)
+        return Study(text, self.folder, self.document, self.unfinished)
 
 
 def read_study(source: bytes, folder: File = File()) -> Study:

@@ -64,7 +64,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, in
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import IconButton
-from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.widgets.labels import Elided, label, set_property
 from study_app.number_text import capitalised
 from study_app.protocol.questionnaires import instruments
 from study_app.protocol.source.document import Path
@@ -160,13 +160,19 @@ EDITORS: Final[Mapping[tuple[str, str], SpecialEditor]] = {
 
 
 class _FaultLine(QWidget):
-    """A sentence about a fault, below an editor."""
+    """A sentence about a fault, or a hint at what an unfinished entry needs, below an editor."""
 
     def __init__(self) -> None:
         super().__init__()
-        icon = (Icon("warning", "bad", 16), 0, Qt.AlignmentFlag.AlignTop)
+        self.icon = Icon("warning", "bad", 16)
         self.sentence = label("", "label", "bad", wraps=True)
+        icon = (self.icon, 0, Qt.AlignmentFlag.AlignTop)
         hbox(icon, (self.sentence, 1), spacing=8, margins=(_LABEL_PX + 8, 0, 0, 0), parent=self)
+
+    def show_text(self, text: str, *, is_hint: bool) -> None:
+        self.icon.show_icon(*(("info", "text2") if is_hint else ("warning", "bad")))
+        self.sentence.setText(text)
+        set_property(self.sentence, "role", "text2" if is_hint else "bad")
 
 
 class _RowWidget(Themed, QWidget):
@@ -195,6 +201,7 @@ class _RowWidget(Themed, QWidget):
         self.words.setBuddy(self.field)
         removes = f"Remove {row.label} from the file"
         self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
+        self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # its key works in the field, so that Tab passes it
         self.remove.clicked.connect(self._ask_to_remove)
         room = self.remove.sizePolicy()
         room.setRetainSizeWhenHidden(True)
@@ -292,7 +299,7 @@ class _RowWidget(Themed, QWidget):
         times = Counter(corrections)
         if corrections or "wrong" in self.__dict__:
             said = (sentence if count == 1 else f"{count} × {sentence}" for sentence, count in times.items())
-            self.wrong.sentence.setText("\n".join(said))
+            self.wrong.show_text("\n".join(said), is_hint=self.row.unfinished and not (self.refusal or refused))
             self.wrong.setVisible(bool(corrections))
         row = self.row
         sentences = filter(None, (row.help, row.permitted, *corrections))
@@ -307,7 +314,7 @@ class _RowWidget(Themed, QWidget):
             if not refused:
                 blamed = part.focusPolicy() != Qt.FocusPolicy.NoFocus and not (some_missing and part.words())
                 blamed = blamed and part not in sound
-                part.show_refused(bool(self.row.faults) and blamed)
+                part.show_refused(bool(self.row.faults) and not self.row.unfinished and blamed)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
         """Offer the first repair of each problem of this row, omitting repairs with the same text."""
@@ -662,6 +669,7 @@ class FormCard(Card):
         self.form, self.read_only = form, read_only
         self.head.show_form(form, read_only=read_only)
         self.own.setText("\n".join(form.faults))
+        set_property(self.own, "role", "text2" if form.unfinished else "bad")
         self.own.setVisible(bool(form.faults))
         self._show_parts(form, before if stays else None)
         if not stays:
@@ -732,8 +740,8 @@ class FormCard(Card):
                 removable = section.path != form.path and not self.read_only
                 yield ("title", at), partial(self._section_heading, section, removable=removable), None
             if section.faults:
-                sentences = "\n".join(section.faults)
-                yield ("faults", at, sentences), partial(label, sentences, "label", "bad", wraps=True), None
+                sentences, ink = "\n".join(section.faults), "text2" if section.unfinished else "bad"
+                yield ("faults", at, sentences, ink), partial(label, sentences, "label", ink, wraps=True), None
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
                 beside = () if is_stacked(row) or _is_wide(row) else row.languages
@@ -880,6 +888,7 @@ class FormCard(Card):
             row.show_messages()
         else:
             self.own.setText(sentence)
+            set_property(self.own, "role", "bad")
             self.own.setVisible(True)
 
     def show_repairs(self, known: Mapping[ProblemRow, tuple[str, ...]]) -> None:
@@ -897,9 +906,17 @@ class FormCard(Card):
 
     def show_help_of(self, part: QWidget | None) -> None:
         """Show the help of the row that contains a part, if any."""
-        row = next((row for row in self.rows if part is not None and row.isAncestorOf(part)), None)
+        row = self._row_with(part)
         if row is not None and row is not self._focused:
             self._show_focused_row(row)
+
+    def row_path_of(self, part: QWidget) -> Path:
+        """Return the path of the row that contains a part, () if there is none."""
+        row = self._row_with(part)
+        return () if row is None else row.row.path
+
+    def _row_with(self, part: QWidget | None) -> _RowWidget | None:
+        return next((row for row in self.rows if part is not None and row.isAncestorOf(part)), None)
 
     def show_help(self) -> None:
         row = self._focused if self._focused in self.rows else next(iter(self.rows), None)

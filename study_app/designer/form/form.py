@@ -1,6 +1,6 @@
 """The form of one element of a study, made from its tables, faults and places in the file."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import compress
 from typing import Any, Final
@@ -60,6 +60,7 @@ from study_app.protocol.checks.designs import missing_for_rule
 from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.source.document import Path, Places, names, places_of, value_at
+from study_app.protocol.source.problems import Fault
 from study_app.protocol.warnings.untranslated import untranslated_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
@@ -67,6 +68,8 @@ _ENTRIES: Final = "In this order"
 _DEEPEST: Final = 3
 """So many tables within each other are shown in one form."""
 KINDS: Final[Mapping[Path, str]] = {SEQUENCE: "Pages, blocks and questionnaires"}
+_TO_FILL_IN: Final = "To be filled in"
+"""What is said of a missing value before its entry is left."""
 _UNREADABLE: Final = "Correct the text in the File tab"
 _WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 """Sections whose elements the lab opens."""
@@ -103,7 +106,7 @@ def form_of(study: Study, path: Path) -> Form:
     shown |= {section.path for section in sections if section.path != path}
     within = [fault for fault in study.faults if fault.path[: len(path)] == path]
     within = [fault for fault in within if not any(fault.path[: len(path_shown)] == path_shown for path_shown in shown)]
-    own = tuple(_sentence(fault.message, fault.hint) for fault in within if fault.path != (*path, "id"))
+    own, is_unfinished = _fault_sentences(study, [fault for fault in within if fault.path != (*path, "id")])
     of_id = tuple(_sentence(fault.message, fault.hint) for fault in within if fault.path == (*path, "id"))
     value = value_at(document, path)
     name = value.get("id") if isinstance(value, Mapping) else None
@@ -120,6 +123,7 @@ def form_of(study: Study, path: Path) -> Form:
         id=None if name is None else str(name),
         sections=sections,
         faults=own,
+        unfinished=is_unfinished,
         id_faults=of_id,
         position=position_of(document, path),
         questions=question_lines(study, path[:-1]) if path[2:3] == ("items",) else NO_QUESTIONS,
@@ -221,14 +225,15 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
             shown.append(_form_row(study, row, places))
     title = "" if depth == 0 else label_of(path[-1])
     inside = {row.path for row in shown}
-    faults = tuple(
-        _sentence(fault.message, fault.hint)
+    own_faults = [
+        fault
         for fault in study.faults
         if depth
         and fault.path[: len(path)] == path
         and not any(fault.path[: len(path)] == path for path in inside)
         and not any(fault.path[: len(path)] == path for path in below)
-    )
+    ]
+    faults, is_unfinished = _fault_sentences(study, own_faults)
     rest = (title, tuple(row.path[-1] for row in (*shown, *absent)))
     for heading, keys in (*sections_of(study.document, path), rest):
         own = tuple(row for key in keys for row in shown if row.path[len(path)] == key)
@@ -236,7 +241,7 @@ def _sections(study: Study, path: Path, places: Places, depth: int) -> Iterator[
         shown = [row for row in shown if row not in own]
         absent = [row for row in absent if row not in missing]
         if own or missing:
-            yield Section(path, heading, own, missing, faults)
+            yield Section(path, heading, own, missing, faults, is_unfinished)
             faults = ()
     for table in below:
         yield from _sections(study, table, places, depth + 1)
@@ -251,11 +256,12 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
     if path[:2] == EXCLUSIONS:
         row = _exclusion_row(study, row)
     own = [fault for fault in study.faults if fault.path[: len(path)] == path and fault.kind != "no text"]
-    faults = tuple(_sentence(fault.message, fault.hint) for fault in own)  # an empty field says that it has no text
+    faults, is_unfinished = _fault_sentences(study, own)  # an empty field says that it has no text
     faulty = () if any(fault.path == path for fault in own) else tuple(str(fault.path[len(path)]) for fault in own)
     if path == STUDY_LANGUAGES:
         row = replace(row, choices=tuple(Choice(code, language_name(code)) for code in LANGUAGES))
     codes, is_text = languages_of(document), row.kind in {"localised", "paragraphs"}
+    is_judged = is_text and not study.is_in_entry(path)
     number = None
     if row.kind == "either":
         number = next((index for index, alternative in enumerate(row.either) if _fits_kind(alternative, row.value)), 0)
@@ -263,9 +269,10 @@ def _form_row(study: Study, row: Row, places: Places) -> FormRow:
         **values_of(row),
         place=place_words(path, places.line(path)),
         faults=faults,
+        unfinished=is_unfinished,
         faulty_languages=faulty if is_text else (),
         languages=tuple((code, language_name(code)) for code in codes) if is_text else (),
-        untranslated=tuple(untranslated_at(document, row.path, row.value, codes)) if is_text else (),
+        untranslated=tuple(untranslated_at(document, row.path, row.value, codes)) if is_judged else (),
         entries=tuple(_entries(study, row)),
         target=named_at(document, path) if row.kind == "reference" and isinstance(row.value, str) else None,
         notes=tuple(_notes(document, row)),
@@ -316,7 +323,7 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:
             path = (*row.path, key)
-            faults = sum(fault.path[: len(path)] == path for fault in study.faults)
+            faults = sum(fault.path[: len(path)] == path for fault in study.shown_faults)
             if row.kind == "references":
                 named = named_at(study.document, path)
                 title = str(row.value[key]) if named is None else title_of(study.document, named)
@@ -337,6 +344,16 @@ def _fits_kind(row: Row, value: Any) -> bool:
     if isinstance(value, Mapping):
         return row.kind in {"table", "tables", "localised"}
     return row.kind not in {"numbers", "vector", "points", "texts", "choices", "references", "list", "table", "tables"}
+
+
+def _fault_sentences(study: Study, faults: Sequence[Fault]) -> tuple[tuple[str, ...], bool]:
+    """Return the sentences about faults, or about those of unfinished entries if there are no others, and which."""
+    shown = [fault for fault in faults if not study.is_unfinished(fault)]
+    sentences = tuple(
+        _TO_FILL_IN if fault.kind == "missing" and not shown else _sentence(fault.message, fault.hint)
+        for fault in shown or faults
+    )
+    return sentences, bool(faults) and not shown
 
 
 def _sentence(message: str, hint: str) -> str:

@@ -56,7 +56,7 @@ def _question_line(
 ) -> QuestionLine:
     kind, text = str(item.get("kind", STATEMENT)), item.get("text", "")
     texts = [text.get(code, "") for code in codes] if isinstance(text, Mapping) else [text, *[""] * (len(codes) - 1)]
-    faults = sum(fault.path[: len(path)] == path for fault in study.faults)
+    faults = sum(fault.path[: len(path)] == path for fault in study.shown_faults)
     shown = tuple(text.strip() if isinstance(text, str) else "" for text in texts)
     number = path[-1] + 1 if isinstance(path[-1], int) else 0
     return QuestionLine(
@@ -106,6 +106,7 @@ class FormRow(Row):
 
     place: str = ""  # its place in the file, such as ``blocks.liquids.order``, with its line
     faults: tuple[str, ...] = ()  # its faults, in the sentences of ``check``
+    unfinished: bool = False  # whether its entry is still being edited, so that its faults are only hints
     faulty_languages: tuple[str, ...] = ()  # languages whose texts have all these faults; () if others have some, too
     languages: tuple[tuple[str, str], ...] = ()  # code and name of each language of the study, for texts
     entries: tuple[Entry, ...] = ()  # what a list holds, or what references name
@@ -151,6 +152,7 @@ class Section:
     rows: tuple[FormRow, ...]
     absent: tuple[Row, ...] = ()
     faults: tuple[str, ...] = ()
+    unfinished: bool = False  # whether the faults are only hints
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -164,8 +166,9 @@ class Form:
     kind: str
     id: str | None = None  # its name in the file, None if it has none
     sections: tuple[Section, ...] = ()  # its rows
-    # faults that belong to no row, and faults of its id
+    # faults that belong to no row, whether they are only hints, and faults of its id
     faults: tuple[str, ...] = ()
+    unfinished: bool = False
     id_faults: tuple[str, ...] = ()
     # its position in the session or list, from 1, and their number; None without an order
     position: tuple[int, int] | None = None

@@ -138,7 +138,8 @@ class _QuestionRow(Themed, QWidget):
         self.write = small_button("", "Write", height=32)
         self.write.setAccessibleName(f"Write the missing text of question {self.line.number}")
         self.write.clicked.connect(self.opened)
-        missing = Icon("warning", "bad", 16), label("Missing", "label", "bad")
+        sign: tuple[str, Ink] = ("warning", "bad") if self.line.faults else ("info", "text2")
+        missing = Icon(*sign, 16), label("Missing", "label", sign[1])
         hbox(*missing, STRETCH, self.write, spacing=6, margins=0, parent=made)
         return made
 

@@ -600,7 +600,10 @@ class ParticipantPreview(Card):
             hiding = next((fault for fault in faults if fault.kind != "no text"), None)  # a missing text hides no page
             found = study.problems[:1] if hiding is None else (hiding.located(places_of(study.text)),)
             problem = next(map(str, found), "the session does not have any steps")
-            self.show_view(ParticipantView(note=f"The page cannot be shown: {problem}"))
+            note = f"The page cannot be shown: {problem}"
+            if hiding is not None and study.is_unfinished(hiding):
+                note = "The page will be shown when its entry is complete"
+            self.show_view(ParticipantView(note=note))
             return
         shown, index = place.shown, place.index
         pages = pages_of_step(shown, index)
@@ -649,7 +652,7 @@ class ParticipantPreview(Card):
     def _page_note(self, study: Study, step: Found) -> str:
         """Return a note, in the page's language, on parts that are not shown as written."""
         first = step.shown.protocol.study.languages[0]
-        faults = [fault for fault in study.faults if fault.concerns(self._language, first)]
+        faults = [fault for fault in study.shown_faults if fault.concerns(self._language, first)]
         count = sum(row.fault.concerns(self._language, first) for row in problem_rows(study))  # as the header counts
         if not count:
             return "This page is not part of any session." if step.session == STANDALONE else ""

@@ -1,0 +1,192 @@
+"""Entries that are being added: their problems are hints until they are left, and a deletion says how to undo it."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QEvent
+from PySide6.QtWidgets import QApplication, QWidget
+
+from study_app.designer.document.document import Answers
+from study_app.designer.document.elements import outline
+from study_app.designer.document.steps import (
+    AddElement,
+    AddEntry,
+    AddKey,
+    AddNamed,
+    DuplicateElement,
+    RemoveKey,
+    SetValue,
+    SwitchKey,
+)
+from study_app.designer.document.toml_edits import Set
+from study_app.designer.outline import addable_elements
+from study_app.designer.problems import problem_rows
+
+pytestmark = pytest.mark.slow
+BLOCK, FORM = ("blocks", "liquids"), ("questionnaires", "after")
+QUESTION = (*FORM, "items", 0)
+COPY = (*FORM, "items", 1)
+
+
+def begin(designer: Any, template: str = "two-liquids-abx") -> None:
+    """Begin a study without problems."""
+    designer.controller.begin_study(f"template:{template}", "mine")
+    assert designer.study.faults == ()
+
+
+def shown(designer: Any) -> int:
+    """The number of problems that the list, the chip, the outline and the form agree on."""
+    QApplication.processEvents()
+    designer.controller.show_outline()
+    count = len(designer.place.problems.problems)
+    assert designer.place.header.problems.words.startswith(f"{count} problem") is (count > 0)
+    assert any(row.faults for row in designer.place.outline.rows) is (count > 0)
+    if not count:
+        assert not [part for part in designer.place.form.findChildren(QWidget)
+                    if part.isVisible() and part.property("state") == "refused"]  # fmt: skip
+        assert not [row for row in designer.place.form.rows if row.row.faults and not row.row.unfinished]
+        assert designer.place.view.file.faulty == ()
+    return count
+
+
+def every_problem(designer: Any) -> int:
+    return len(problem_rows(designer.study.with_unfinished(())))
+
+
+@pytest.mark.parametrize(
+    ("template", "incomplete"),
+    [
+        ("two-liquids-abx", {"Duplicate Easy", "Duplicate Thick", "Add stimulus"}),
+        ("rate-realism", {"Add gear oil", "Duplicate Gear oil"}),
+        ("questionnaire-only", {"Add panas"}),
+    ],
+)
+def test_the_problems_of_an_entry_are_shown_when_it_is_left(
+    designer: Any, template: str, incomplete: set[str]
+) -> None:
+    """Whatever *Add* and *Duplicate* offer adds no problem before it is left."""
+    begin(designer, template)
+    elements = [row.path for part in ("session", "parts") for row in getattr(outline(designer.study), part)]
+    elements = [path for path in dict.fromkeys(elements) if len(path) > 1]
+    asked = {entry.asks: ("study",) for entry in addable_elements(designer.study, ("study",))}
+    for path in elements:
+        asked |= {entry.asks: path for entry in addable_elements(designer.study, path) if entry.asks not in asked}
+    had = set()
+    for request, selected in [*asked.items(), *((DuplicateElement(path), path) for path in elements)]:
+        designer.go_to(*selected)
+        designer.place.parts.focus_form()
+        designer.editing.handle_request(request)
+        assert shown(designer) == 0, request
+        if every_problem(designer):
+            had.add(designer.steps[-1])
+        designer.place.parts.show_tab("file")
+        assert shown(designer) == every_problem(designer), request
+        designer.undo_all()
+        QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    assert incomplete <= had, had
+
+
+def duplicate_question(designer: Any) -> None:
+    begin(designer)
+    designer.go_to(*QUESTION)
+    designer.editing.handle_request(DuplicateElement(QUESTION))
+    assert designer.editing.selected == COPY
+    assert shown(designer) == 0
+
+
+LEAVING: dict[str, Callable[[Any], object]] = {
+    "another element": lambda designer: designer.go_to("pages", "welcome"),
+    "the list of problems": lambda designer: designer.click_on(designer.place.header.problems),
+    "the next problem": lambda designer: designer.hit("F8"),
+    "Save": lambda designer: designer.hit("ctrl+s"),
+    "Play": lambda designer: designer.playing.play(),
+    "another study": lambda designer: (designer.open(), designer.open(str(designer.file.with_name("mine.toml")))),
+}
+
+
+@pytest.mark.parametrize("way", LEAVING)
+def test_each_way_to_leave_a_copy_shows_that_it_reads_the_same(designer: Any, way: str) -> None:
+    duplicate_question(designer)
+    row = designer.form_row(*COPY, "text")
+    said, role = row.wrong.sentence.text(), row.wrong.sentence.property("role")
+    assert (said.startswith("Reads the same as an earlier item"), role) == (True, "text2")
+    LEAVING[way](designer)
+    assert shown(designer) == 2, "the text and its short label"
+    designer.go_to(*COPY)
+    row = designer.form_row(*COPY, "text")
+    assert (row.wrong.sentence.text(), row.wrong.sentence.property("role")) == (said, "bad")
+    (line,) = row.field.lines.values()
+    assert line.property("state") == "refused"
+
+
+def test_save_says_how_many_problems_an_unfinished_entry_has(designer: Any) -> None:
+    duplicate_question(designer)
+    designer.hit("ctrl+s")
+    assert designer.saving.banner.words == "Saved, but the study cannot be run yet because of 2 problems"
+
+
+def test_a_copy_that_is_reworded_before_it_is_left_never_has_a_problem(designer: Any) -> None:
+    duplicate_question(designer)
+    (line,) = designer.field(*COPY, "text").lines.values()
+    designer.fill(line, "I knew which one was X.", "Tab")
+    assert designer.value(*COPY, "short") == "I knew which one was X"
+    assert every_problem(designer) == 0
+    designer.place.parts.show_tab("file")
+    assert shown(designer) == 0
+
+
+def test_a_block_without_conditions_is_unfinished_until_it_is_left(designer: Any) -> None:
+    begin(designer)
+    designer.go_to(*BLOCK)
+    for expected in ("The block has one condition", "Specify either conditions or stimulus"):
+        designer.editing.handle_request(RemoveKey((*BLOCK, "conditions", 0)))
+        assert shown(designer) == 0
+        assert designer.form_row(*BLOCK, "conditions").wrong.sentence.text().startswith(expected)
+    designer.editing.handle_request(AddEntry((*BLOCK, "conditions"), "thin"))
+    designer.editing.handle_request(AddNamed((*BLOCK, "conditions"), "conditions"))
+    assert designer.editing.selected == ("conditions", "condition")
+    assert shown(designer) == 0
+    designer.editing.go_back()
+    designer.editing.handle_request(RemoveKey((*BLOCK, "conditions", 1)))
+    assert shown(designer) == 0, "the block waited for its new condition"
+    designer.go_to("pages", "welcome")
+    assert shown(designer) == every_problem(designer) == 1
+
+
+@pytest.mark.parametrize(
+    "change", [SwitchKey((*BLOCK, "conditions"), "stimulus"), SetValue((*BLOCK, "design"), "2ifc")]
+)
+def test_a_block_that_is_given_another_kind_is_unfinished(designer: Any, change: Any) -> None:
+    begin(designer)
+    designer.editing.handle_request(AddElement(("stimuli",)))
+    designer.editing.make_step("List the effects", Set(("liquids", "thin", "effects"), ["drag"]))
+    designer.editing.make_step("Remove", Set((*BLOCK, "conditions"), ["thin"]), Set((*BLOCK, "design"), "yesno"))
+    designer.go_to(*BLOCK)
+    before = shown(designer)
+    designer.editing.handle_request(change)
+    assert shown(designer) <= before
+    designer.go_to("pages", "welcome")
+    assert shown(designer) == every_problem(designer) > 0
+
+
+def test_a_problem_that_an_element_had_before_stays_shown(designer: Any) -> None:
+    begin(designer)
+    designer.editing.make_step("Change", Set((*BLOCK, "repetitions"), 0))
+    designer.go_to(*BLOCK)
+    assert shown(designer) == 1
+    designer.editing.handle_request(RemoveKey((*BLOCK, "conditions", 0)))
+    assert shown(designer) == 1
+    designer.go_to("pages", "welcome")
+    assert shown(designer) == every_problem(designer)
+
+
+def test_a_field_that_is_added_is_unfinished_until_another_one_has_the_keyboard(designer: Any) -> None:
+    begin(designer)
+    designer.go_to("liquids", "thin")
+    designer.editing.handle_request(AddKey(("liquids", "thin", "region")))
+    designer.editing.handle_request(SetValue(("liquids", "thin", "region", "min_mm"), [90, 0, 0]))
+    assert every_problem(designer) == 1
+    assert shown(designer) == 0
+    designer.field("liquids", "thin", "density_kg_m3").take_keyboard()
+    assert shown(designer) == 1
