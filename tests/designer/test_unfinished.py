@@ -19,7 +19,7 @@ from study_app.designer.document.steps import (
     SetValue,
     SwitchKey,
 )
-from study_app.designer.document.toml_edits import Set
+from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.outline import addable_elements
 from study_app.designer.problems import problem_rows
 
@@ -155,19 +155,27 @@ def test_a_block_without_conditions_is_unfinished_until_it_is_left(designer: Any
 
 
 @pytest.mark.parametrize(
-    "change", [SwitchKey((*BLOCK, "conditions"), "stimulus"), SetValue((*BLOCK, "design"), "2ifc")]
+    ("template", "block", "change"),
+    [
+        ("two-liquids-abx", "liquids", SetValue((*BLOCK, "design"), "2ifc")),
+        ("delay-detection", "delay", SwitchKey(("blocks", "delay", "stimulus"), "conditions")),
+    ],
 )
-def test_a_block_that_is_given_another_kind_is_unfinished(designer: Any, change: Any) -> None:
-    begin(designer)
-    designer.editing.handle_request(AddElement(("stimuli",)))
-    designer.editing.make_step("List the effects", Set(("liquids", "thin", "effects"), ["drag"]))
-    designer.editing.make_step("Remove", Set((*BLOCK, "conditions"), ["thin"]), Set((*BLOCK, "design"), "yesno"))
-    designer.go_to(*BLOCK)
-    before = shown(designer)
+def test_a_block_that_is_given_another_kind_is_unfinished(
+    designer: Any, template: str, block: str, change: Any
+) -> None:
+    begin(designer, template)
+    if block == "liquids":
+        plain = Unset((*BLOCK, "design")), Unset((*BLOCK, "standard"))
+        designer.editing.make_step("Make a plain block", Set((*BLOCK, "conditions"), ["thin"]), *plain)
+    designer.go_to("blocks", block)
+    assert shown(designer) == 0
     designer.editing.handle_request(change)
-    assert shown(designer) <= before
+    assert shown(designer) == 0
     designer.go_to("pages", "welcome")
-    assert shown(designer) == every_problem(designer) > 0
+    assert shown(designer) == 1
+    (problem,) = designer.place.problems.problems
+    assert problem.message == "The block has one condition, but its design compares at least two"
 
 
 def test_a_problem_that_an_element_had_before_stays_shown(designer: Any) -> None:
@@ -190,3 +198,35 @@ def test_a_field_that_is_added_is_unfinished_until_another_one_has_the_keyboard(
     assert shown(designer) == 0
     designer.field("liquids", "thin", "density_kg_m3").take_keyboard()
     assert shown(designer) == 1
+
+
+DELETED = {
+    "a field": (("pages", "welcome", "button"), "Remove Button from the file", "Button"),
+    "a condition": ((*BLOCK, "conditions"), "Remove Thin from Conditions", "condition 1"),
+    "a point": (("scales", "agreement", "labels"), "Remove Point 2", "point 2"),
+    "a hypothesis": (("analysis", "contrasts"), "Remove Hypothesis 1", "hypothesis 1"),
+}
+"""For each kind: its row, the name of its button, and what the deletion is called."""
+
+
+@pytest.mark.parametrize("kind", DELETED)
+def test_a_deletion_by_space_says_how_to_undo_it(designer: Any, kind: str) -> None:
+    path, button, name = DELETED[kind]
+    begin(designer)
+    if kind == "a hypothesis":
+        designer.editing.handle_request(DuplicateElement(BLOCK))
+        for _ in range(2):
+            designer.field(*path).add.click()
+    else:
+        designer.go_to(*path[:2])
+    before = designer.text
+    row = designer.form_row(*path)
+    cross = next(part for part in row.findChildren(QWidget) if part.accessibleName() == button)
+    cross.setFocus()
+    designer.hit("space")
+    assert designer.text != before
+    foot = designer.place.form.foot
+    assert foot.words.text() == f"Deleted {name}. Ctrl+Z restores it."
+    assert designer.place.form.inside.isAncestorOf(designer.keyboard)
+    designer.hit("ctrl+z")
+    assert designer.text == before

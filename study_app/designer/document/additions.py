@@ -62,14 +62,14 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
 
 
 def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
-    """Return edits of a block's design, phase or order, or of an exclusion rule, and those they require.
+    """Return edits of a block's design, stimulus, phase or order, or of an exclusion rule, and those they require.
 
     A rule gets its usual limit. Keys that no longer belong to the block are removed; a questionnaire comes after the
     block, once; with a design, the first condition becomes the standard unless the standard is among the conditions.
     """
     if path[:2] == EXCLUSIONS and path[-1] == "rule":
         return (*edits, *_limit_edits(study, path, edits))
-    if path[:1] == ("blocks",) and path[2:] in (("phase",), ("order",)):
+    if path[:1] == ("blocks",) and path[2:] in (("phase",), ("order",), ("stimulus",), ("conditions",)):
         return (*edits, *_surplus_edits(study, path, edits))
     if path[:1] != ("blocks",) or path[2:3] != ("design",):
         return edits

@@ -211,7 +211,8 @@ class SwitchKey(Request):
         value = _first_value(at.study.with_edits(*gone)[0], place)
         if value in ("", []):
             raise Refused(f"{label_of(self.to)} refers to an element that does not exist yet: add that element first")
-        return Step(f"Specify {label_of(self.to)}", (*gone, Set(place, value)), entry=self.path[:-1])
+        edits = edits_that_follow(at.study, place, *gone, Set(place, value))
+        return Step(f"Specify {label_of(self.to)}", edits, entry=self.path[:-1])
 
 
 @dataclass(frozen=True, slots=True)

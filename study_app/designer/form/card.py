@@ -201,7 +201,6 @@ class _RowWidget(Themed, QWidget):
         self.words.setBuddy(self.field)
         removes = f"Remove {row.label} from the file"
         self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
-        self.remove.setFocusPolicy(Qt.FocusPolicy.ClickFocus)  # its key works in the field, so that Tab passes it
         self.remove.clicked.connect(self._ask_to_remove)
         room = self.remove.sizePolicy()
         room.setRetainSizeWhenHidden(True)
