@@ -62,15 +62,15 @@ def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, .
 
 
 def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...]:
-    """Return edits of a block's design, stimulus, phase or order, or of an exclusion rule, and those they require.
+    """Return edits of a block's design, phase or order, or of an exclusion rule, and those they require.
 
     A rule gets its usual limit. Keys that no longer belong to the block are removed; a questionnaire comes after the
     block, once; with a design, the first condition becomes the standard unless the standard is among the conditions.
     """
     if path[:2] == EXCLUSIONS and path[-1] == "rule":
         return (*edits, *_limit_edits(study, path, edits))
-    if path[:1] == ("blocks",) and path[2:] in (("phase",), ("order",), ("stimulus",), ("conditions",)):
-        return (*edits, *_surplus_edits(study, path, edits))
+    if path[:1] == ("blocks",) and path[2:] in (("phase",), ("order",)):
+        return (*edits, *surplus_edits(study, path, edits))
     if path[:1] != ("blocks",) or path[2:3] != ("design",):
         return edits
     after = study.with_edits(*edits)[0].document
@@ -86,8 +86,8 @@ def edits_that_follow(study: Study, path: Path, *edits: Edit) -> tuple[Edit, ...
     return (*edits, *others)
 
 
-def _surplus_edits(study: Study, path: Path, edits: Sequence[Edit]) -> tuple[Edit, ...]:
-    """Return the edits that remove a block's other keys which do not belong to it after an edit at ``path``."""
+def surplus_edits(study: Study, path: Path, edits: Sequence[Edit]) -> tuple[Edit, ...]:
+    """Return the edits that remove an element's other keys which do not belong to it after an edit at ``path``."""
     gone: tuple[Edit, ...] = ()
     while surplus := [
         Unset(fault.path)

@@ -21,6 +21,7 @@ from study_app.designer.document.additions import (
     edits_to_switch,
     number_row,
     short_text_edits,
+    surplus_edits,
     with_language,
     without_language,
 )
@@ -211,7 +212,8 @@ class SwitchKey(Request):
         value = _first_value(at.study.with_edits(*gone)[0], place)
         if value in ("", []):
             raise Refused(f"{label_of(self.to)} refers to an element that does not exist yet: add that element first")
-        edits = edits_that_follow(at.study, place, *gone, Set(place, value))
+        edits = *gone, Set(place, value)
+        edits = (*edits, *surplus_edits(at.study, place, edits))
         return Step(f"Specify {label_of(self.to)}", edits, entry=self.path[:-1])
 
 
