@@ -4,7 +4,8 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
-from PySide6.QtCore import QEvent
+from PySide6.QtCore import QEvent, Qt
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from study_app.designer.document.document import Answers
@@ -22,6 +23,7 @@ from study_app.designer.document.steps import (
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.outline import addable_elements
 from study_app.designer.problems import problem_rows
+from study_app.designer.window import focus_stops
 
 pytestmark = pytest.mark.slow
 BLOCK, FORM = ("blocks", "liquids"), ("questionnaires", "after")
@@ -229,4 +231,20 @@ def test_a_deletion_by_space_says_how_to_undo_it(designer: Any, kind: str) -> No
     assert foot.words.text() == f"Deleted {name}. Ctrl+Z restores it."
     assert designer.place.form.inside.isAncestorOf(designer.keyboard)
     designer.hit("ctrl+z")
+    assert designer.text == before
+
+
+def test_an_emptied_list_gives_the_keyboard_to_what_adds_to_it(designer: Any) -> None:
+    begin(designer)
+    designer.go_to(*BLOCK)
+    conditions = designer.field(*BLOCK, "conditions")
+    conditions.list.setFocus()
+    for left in (1, 0):
+        designer.hit("Delete")
+        assert len(designer.value(*BLOCK, "conditions")) == left
+    assert designer.keyboard is conditions.add
+    assert conditions.list not in focus_stops(designer.place.form)
+    before = designer.text
+    for key in (Qt.Key.Key_Space, Qt.Key.Key_S, Qt.Key.Key_Down, Qt.Key.Key_Home, Qt.Key.Key_Return):
+        QTest.keyClick(conditions.list, key)  # an event that was on its way
     assert designer.text == before

@@ -187,10 +187,11 @@ class EntryList(Field):
         self.list.clear()
         self.fill_rows()
         self.list.setFixedHeight(len(self.rows) * (FIELD_PX + 6) + 4)
+        self.list.setFocusPolicy(Qt.FocusPolicy.StrongFocus if self.rows else Qt.FocusPolicy.NoFocus)
         if 0 <= chosen < len(self.rows):
             self.list.setCurrentRow(chosen)
         name_scroll_bars(self.list)
-        if inside:
+        if inside or (held is self.list and not self.rows):
             self.take_keyboard()
 
     def add_row(self, name: str, *parts: QWidget | tuple[QWidget, int], faulty: bool = False) -> EntryRow:
@@ -219,7 +220,7 @@ class EntryList(Field):
         return self.row.entries[at].path if self.row.entries else (*self.row.path, at)
 
     def open_entry(self, at: int) -> None:
-        if at < len(self.row.entries) and (target := self.row.entries[at].target):
+        if 0 <= at < len(self.row.entries) and (target := self.row.entries[at].target):
             self.asked.emit(Do("select", (target,)))
 
     def _open_current(self) -> None:
