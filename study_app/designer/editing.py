@@ -12,6 +12,7 @@ from study_app.designer.document.steps import (
     AddElement,
     AddLiquid,
     AddNamed,
+    DuplicateElement,
     LeaveText,
     MoveElement,
     Recorded,
@@ -107,7 +108,7 @@ class Editing(QObject):
         self._note_entries(opened, asked, step, before[0])
         if step.entry and opened.selected != before[1]:
             self._back.append(before[1])
-        if isinstance(asked, AddElement | AddNamed):
+        if isinstance(asked, AddElement | AddNamed | DuplicateElement) and opened.selected == step.entry:
             document, added = opened.study.document, opened.selected
             self._added = added, id_at(document, added), suggested_id(document, added)
         self._note_edit()

@@ -696,7 +696,7 @@ class DesignerPlace(Place):
         if said:
             announce(self, said)
         if step.removed:
-            self.form.foot.show_help("", "", said)
+            self.form.show_note(said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
         if step.fresh:
             self.outline.words.clear()  # a search would hide it

@@ -133,6 +133,7 @@ def test_a_copy_that_is_reworded_before_it_is_left_never_has_a_problem(designer:
     (line,) = designer.field(*COPY, "text").lines.values()
     designer.fill(line, "I knew which one was X.", "Tab")
     assert designer.value(*COPY, "short") == "I knew which one was X"
+    assert designer.value(*COPY, "id") == "i_knew_which_one_was_x"
     assert every_problem(designer) == 0
     designer.place.parts.show_tab("file")
     assert shown(designer) == 0
@@ -204,6 +205,7 @@ def test_a_field_that_is_added_is_unfinished_until_another_one_has_the_keyboard(
 
 DELETED = {
     "a field": (("pages", "welcome", "button"), "Remove Button from the file", "Button"),
+    "a number": ((*BLOCK, "repetitions"), "Remove Repetitions from the file", "Repetitions"),
     "a condition": ((*BLOCK, "conditions"), "Remove Thin from Conditions", "condition 1"),
     "a point": (("scales", "agreement", "labels"), "Remove Point 2", "point 2"),
     "a hypothesis": (("analysis", "contrasts"), "Remove Hypothesis 1", "hypothesis 1"),
@@ -214,6 +216,7 @@ DELETED = {
 @pytest.mark.parametrize("kind", DELETED)
 def test_a_deletion_by_space_says_how_to_undo_it(designer: Any, kind: str) -> None:
     path, button, name = DELETED[kind]
+    designer.window.resize(1366, 700)
     begin(designer)
     if kind == "a hypothesis":
         designer.editing.handle_request(DuplicateElement(BLOCK))
@@ -225,11 +228,13 @@ def test_a_deletion_by_space_says_how_to_undo_it(designer: Any, kind: str) -> No
     row = designer.form_row(*path)
     cross = next(part for part in row.findChildren(QWidget) if part.accessibleName() == button)
     cross.setFocus()
+    designer.place.problems.show()  # the form is low then
     designer.hit("space")
     assert designer.text != before
-    foot = designer.place.form.foot
-    assert foot.words.text() == f"Deleted {name}. Ctrl+Z restores it."
-    assert designer.place.form.inside.isAncestorOf(designer.keyboard)
+    form = designer.place.form
+    assert form.foot.isVisible()
+    assert form.foot.words.text() == f"Deleted {name}. Ctrl+Z restores it."
+    assert path in (form.row_path_of(designer.keyboard), *(at for at, part in form.adds.items() if part.hasFocus()))
     designer.hit("ctrl+z")
     assert designer.text == before
 

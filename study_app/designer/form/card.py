@@ -255,6 +255,8 @@ class _RowWidget(Themed, QWidget):
         for part in self.field.findChildren(QWidget):
             if isinstance(part, TypedLine | TypedText):
                 part.flush()
+        if self.remove.hasFocus():  # it is hidden with the value, and Qt would move the focus to the next row
+            self.field.take_keyboard()
         self.field.asked.emit(RemoveKey(self.row.path))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -917,7 +919,13 @@ class FormCard(Card):
     def _row_with(self, part: QWidget | None) -> _RowWidget | None:
         return next((row for row in self.rows if part is not None and row.isAncestorOf(part)), None)
 
+    def show_note(self, sentence: str) -> None:
+        """Show a sentence at the foot, also of a low form, until another field or step has its help there."""
+        self.foot.show_help("", "", sentence)
+        self.foot.show()
+
     def show_help(self) -> None:
+        self.foot.setVisible(self.height() >= _FOOT_FROM)
         row = self._focused if self._focused in self.rows else next(iter(self.rows), None)
         if row is None:
             self.foot.show_help("", "", "")
