@@ -120,8 +120,9 @@ class Editing(QObject):
         if isinstance(asked, RenameElement | MoveElement):
             entries = with_path(entries, asked.path, opened.selected)
         elif step.entry:
-            by_field = isinstance(asked, AddNamed | AddLiquid) and asked.path  # its element waits for the new one
-            paths = (asked.path[:2], step.entry) if by_field else (step.entry,)
+            paths: tuple[Place, ...] = (step.entry,)
+            if isinstance(asked, AddNamed | AddLiquid) and asked.path:
+                paths = asked.path[:2], step.entry  # the element that will name the new one waits for it
             entries = tuple(entry for entry in entries if any(is_within(path, entry.path) for path in paths))
             known = frozenset((fault.path, fault.message) for fault in before.shown_faults)
             entries += tuple(Entry(path, known) for path in paths if path not in [entry.path for entry in entries])

@@ -8,10 +8,8 @@ from PySide6.QtCore import QEvent, Qt
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.designer.document.document import Answers
 from study_app.designer.document.elements import outline
 from study_app.designer.document.steps import (
-    AddElement,
     AddEntry,
     AddKey,
     AddNamed,
@@ -64,9 +62,7 @@ def every_problem(designer: Any) -> int:
         ("questionnaire-only", {"Add panas"}),
     ],
 )
-def test_the_problems_of_an_entry_are_shown_when_it_is_left(
-    designer: Any, template: str, incomplete: set[str]
-) -> None:
+def test_the_problems_of_an_entry_are_shown_when_it_is_left(designer: Any, template: str, incomplete: set[str]) -> None:
     """Whatever *Add* and *Duplicate* offer adds no problem before it is left."""
     begin(designer, template)
     elements = [row.path for part in ("session", "parts") for row in getattr(outline(designer.study), part)]

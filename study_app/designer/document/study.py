@@ -30,6 +30,7 @@ class Entry:
 
 
 def is_within(path: Path, entry: Path) -> bool:
+    """Return whether a place is that of an entry or in it."""
     return path[: len(entry)] == entry
 
 

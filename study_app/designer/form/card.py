@@ -64,7 +64,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, in
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Icon, Rule, fill_rounded, scrolled, smooth_painter
 from study_app.gui.widgets.controls import IconButton
-from study_app.gui.widgets.labels import Elided, label, set_property
+from study_app.gui.widgets.labels import Elided, Ink, label, set_property
 from study_app.number_text import capitalised
 from study_app.protocol.questionnaires import instruments
 from study_app.protocol.source.document import Path
@@ -741,7 +741,8 @@ class FormCard(Card):
                 removable = section.path != form.path and not self.read_only
                 yield ("title", at), partial(self._section_heading, section, removable=removable), None
             if section.faults:
-                sentences, ink = "\n".join(section.faults), "text2" if section.unfinished else "bad"
+                sentences = "\n".join(section.faults)
+                ink: Ink = "text2" if section.unfinished else "bad"
                 yield ("faults", at, sentences, ink), partial(label, sentences, "label", ink, wraps=True), None
             heads: tuple[tuple[str, str], ...] = ()
             for row in section.rows:
