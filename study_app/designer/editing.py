@@ -97,17 +97,17 @@ class Editing(QObject):
         if isinstance(asked, LeaveText):
             self.suggest_id()
             return
-        before = opened.study, opened.selected
+        study, selected = opened.study, opened.selected
         try:
-            step = asked.step(Situation(*before, self.recorded))
+            step = asked.step(Situation(study, selected, self.recorded))
             opened.edit(step.words, *step.edits, text=step.text, select=step.select, key=step.continues)
         except Refused as refusal:
             path = getattr(asked, "path", opened.selected)
             self.refused.emit(path, f"{str(refusal)[:1].upper()}{str(refusal)[1:]}.", asked)
             return
-        self._note_entries(opened, asked, step, before[0])
-        if step.entry and opened.selected != before[1]:
-            self._back.append(before[1])
+        self._note_entries(opened, asked, step, study)
+        if step.entry and opened.selected != selected:
+            self._back.append(selected)
         if isinstance(asked, AddElement | AddNamed | DuplicateElement) and opened.selected == step.entry:
             document, added = opened.study.document, opened.selected
             self._added = added, id_at(document, added), suggested_id(document, added)

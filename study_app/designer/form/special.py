@@ -138,8 +138,9 @@ class _QuestionRow(Themed, QWidget):
         self.write = small_button("", "Write", height=32)
         self.write.setAccessibleName(f"Write the missing text of question {self.line.number}")
         self.write.clicked.connect(self.opened)
-        sign: tuple[str, Ink] = ("warning", "bad") if self.line.faults else ("info", "text2")
-        missing = Icon(*sign, 16), label("Missing", "label", sign[1])
+        faulty = self.line.faults > 0
+        ink: Ink = "bad" if faulty else "text2"
+        missing = Icon("warning" if faulty else "info", ink, 16), label("Missing", "label", ink)
         hbox(*missing, STRETCH, self.write, spacing=6, margins=0, parent=made)
         return made
 
