@@ -147,9 +147,11 @@ class RemoveKey(Request):
 
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Unset(self.path))
-        title = label_at(self.path)
-        entry = self.path[:-1][:2] if isinstance(self.path[-1], int) else ()  # another entry may replace this one
-        return Step(f"Remove {title}", edits, removed=title, entry=entry)
+        title, last = label_at(self.path), self.path[-1]
+        if isinstance(last, str):
+            return Step(f"Remove {title}", edits, removed=title)
+        removed, around = f"{element_noun(self.path[-2])} {title}", self.path[:-1]
+        return Step(f"Remove {title}", edits, removed=removed, entry=around[:2])  # another entry may replace this one
 
 
 @dataclass(frozen=True, slots=True)
