@@ -174,11 +174,13 @@ class Editing(QObject):
     def undo(self) -> None:
         if (opened := self.writable) is not None:
             opened.undo()
+            self.leave_entries(opened.selected)
             self._note_edit()
 
     def redo(self) -> None:
         if (opened := self.writable) is not None:
             opened.redo()
+            self.leave_entries(opened.selected)
             self._note_edit()
 
     def _note_edit(self) -> None:

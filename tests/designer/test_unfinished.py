@@ -249,3 +249,13 @@ def test_an_emptied_list_gives_the_keyboard_to_what_adds_to_it(designer: Any) ->
     for key in (Qt.Key.Key_Space, Qt.Key.Key_S, Qt.Key.Key_Down, Qt.Key.Key_Home, Qt.Key.Key_Return):
         QTest.keyClick(conditions.list, key)  # an event that was on its way
     assert designer.text == before
+
+
+def test_undo_of_a_step_elsewhere_leaves_the_entry(designer: Any) -> None:
+    begin(designer)
+    designer.go_to(*QUESTION)
+    designer.editing.handle_request(DuplicateElement(QUESTION))
+    designer.editing.undo()
+    designer.editing.redo()
+    assert designer.study.unfinished == ()
+    assert shown(designer) == 2
