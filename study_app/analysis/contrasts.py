@@ -531,7 +531,7 @@ def _difference_words(contrast: ContrastResult) -> str:
     higher = (
         ""
         if contrast.higher is None
-        else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants."
+        else f" It was higher in {first} for {contrast.higher} of {contrast.n} participants{_ties(contrast)}."
     )
     effect = f"mean {'ratio' if contrast.ratio else 'difference'} {number(contrast.effect, decimals)}"
     unadjusted = "unadjusted " * (contrast.members > 1) + "two-sided " * (expected is not None)
@@ -542,6 +542,13 @@ def _difference_words(contrast: ContrastResult) -> str:
         f"{p_kind}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n})."
         f"{higher}{_bayes_words(contrast)}"
     )
+
+
+def _ties(contrast: ContrastResult) -> str:
+    """Return how many participants have equal values on both sides: " and equal for 1"."""
+    same = 1.0 if contrast.ratio else 0.0
+    ties = sum(math.isclose(value, same, abs_tol=1e-12) for value in contrast.differences.values())
+    return f" and equal for {ties}" if ties else ""
 
 
 def _decimals(contrast: ContrastResult) -> int:
@@ -708,7 +715,7 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("SD", lambda row: number(row.sd)),
         ("SE", lambda row: number(None if row.sd is None else row.sd / math.sqrt(len(row.values)))),
     )
-    logs = " For ratios, they refer to natural logarithms." * ("ratio" in kinds)
+    logs = " If a ratio is tested, they refer to natural logarithms of the values." * ("ratio" in kinds)
     yield paragraph(f"SD is the standard deviation across participants, and SE is SD/√n.{logs}", "soft")
 
 

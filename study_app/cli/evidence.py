@@ -287,7 +287,7 @@ def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) ->
     "--delayed",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Measure only the proportion of a delayed force that is not held back, and write it to FILE.",
+    help="Measure only the proportion of a delayed force that the safety layer lets through, and write it to FILE.",
 )
 @click.option(
     "--seed", help="Seed for the cases. Specify a seed to repeat a run; default: a new seed, which is printed."

@@ -20,7 +20,7 @@ from study_app.protocol.formats import relax_schema
 from study_app.protocol.model import Protocol
 
 _LIQUID_FILE = (
-    "Path, relative to this file, of a file that contains one liquid; that liquid replaces the keys of this table."
+    "Path, relative to this file, to a file with one liquid. Its values are used instead of the keys of this table."
 )
 
 

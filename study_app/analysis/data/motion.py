@@ -287,7 +287,7 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
     except SealedRecording:
         return "the recording is sealed (liquid-study unblind opens it)"
     except StoreError:
-        return "the recording is damaged (liquid-study verify shows which one)"
+        return "a recording is damaged (liquid-study verify shows which one)"
     kept = (samples["scene"] == samples["scene"][-1:]) & (samples["limiters"] & LIMITER_GLITCH == 0)
     times_ns, positions_m = samples["time_ns"][kept], samples["position_m"][kept]
     is_during = times_ns <= times_ns[:1] + round(float(row["duration_s"]) * 1e9)

@@ -240,7 +240,7 @@ def draw_threshold(
     sheet.text(MARGIN_PT, 28, "Proportion of answers expressing agreement", size=SMALL, colour=style.TEXT_SOFT)
     below = (
         "Added delay in ms.   Small points: individual participants; circles: all participants; diamond: threshold "
-        "with 95 % interval."
+        "with 95 % interval" + ("." if lowest_ms is None else "; dashed: shortest delay with a trend.")
     )
     sheet.text(MARGIN_PT, sheet.height_pt - 5, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet

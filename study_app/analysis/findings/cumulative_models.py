@@ -28,7 +28,7 @@ class _CumulativeModels(StatementTests):
     row_place = 6
     what = "cumulative mixed model"
     asks = "answers differ, cumulative mixed model"
-    title = "Do the answers differ in a cumulative mixed model? (exploratory)"
+    title = "Cumulative mixed model of the answers (exploratory)"
 
     @classmethod
     def test(cls, answers: BlockAnswers, result: BlockResult) -> tuple[tuple[Tested, ...], Absent]:
@@ -75,8 +75,8 @@ class _CumulativeModels(StatementTests):
         yield paragraph(
             f"A cumulative logit mixed model was fitted to {self._answers()} to each primary statement, including the "
             f"answers of incomplete participants. Effects are log odds ratios {unit}".rstrip()
-            + f" with 95 % Wald intervals; they are positive if {sign}. The SDs describe the participants' intercepts"
-            f"{' and delay effects' if delays else ''}. Effects were tested with likelihood-ratio tests (LR; "
+            + f" and are positive if {sign}; their 95 % intervals are Wald intervals. The SDs describe the "
+            f"participants' intercepts{' and delay effects' if delays else ''}. Effects were tested with likelihood-ratio tests (LR; "
             f"{methods}), and p values were adjusted ({fitted[0].correction}) across "
             f"{number_text.counted(fitted[0].members, 'test')}.",
             "soft",

@@ -251,8 +251,8 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
         if open_ones:
             yield (
                 f"{lead_phrase(result)}: {len(open_ones)} of {number_text.counted(len(against), 'comparison')} with "
-                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} inconclusive: the tests show "
-                "neither that the mean difference lies within the equivalence bounds nor that it lies outside them."
+                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} inconclusive: neither "
+                "equivalence nor a mean difference beyond the bounds can be concluded."
             )
 
     def methods(self) -> Iterator[str]:
@@ -518,7 +518,8 @@ class _NoticedFrom(Finding[None]):
         ]
         return (
             f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
-            f"{listed(rated)}. They may also notice shorter delays. A trend does not imply that mean ratings change."
+            f"{listed(rated)}. They may also notice shorter delays. The trend "
+            "is one of ranks; mean ratings may still be equal."
         )
 
     def _threshold_words(self) -> str:

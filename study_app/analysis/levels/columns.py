@@ -162,7 +162,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
     optional(
         "beyond",
         "text",
-        "Shows whether the threshold lies above or below the range of the stimulus's levels; n/a if it lies within "
+        "Shows whether the threshold lies above or below the range of the stimulus levels; n/a if it lies within "
         "the range.",
         levels=(("above", "above the highest level"), ("below", "below the lowest level")),
     ),
@@ -209,7 +209,7 @@ _THRESHOLDS: Final[tuple[Column, ...]] = (
             ("independent", "each interval is compared with known alternatives"),
         ),
     ),
-    optional("d_prime_other", "number", "Sensitivity (d′) under the alternative to d_prime_model."),
+    optional("d_prime_other", "number", "Sensitivity (d′) under the other model, which d_prime_model does not name."),
     optional(
         "criterion",
         "number",

@@ -550,12 +550,12 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
             "mark interval ends that the answers do not determine. The intervals allow for differences in a person’s "
             f"threshold between sessions (one standard deviation is a factor of {10**SESSION_SD:.2f}) and for changes "
             "over the trials. The group value is the random-effects mean (Paule–Mandel), with the Hartung–Knapp "
-            "interval if there are at least three participants. Each variance is replaced by its geometric mean with "
-            f"the median variance.{level}{reversals} Fit: p value of the deviance, based on {SETS} simulated data "
-            "sets; for the group, the excess clustering of errors, in standard errors, marked “!” if above "
-            f"{MOST_CLUSTERED:g}. "
+            "interval if there are at least three participants. Each participant's variance is replaced by the "
+            f"geometric mean of it and the median variance.{level}{reversals} Fit: p value of the deviance, based on "
+            f"{SETS} simulated data sets; for the group, how much more often errors follow one another than expected, "
+            f"in standard errors, marked “!” if above {MOST_CLUSTERED:g}. "
             "Drift: correlation between trial number and deviance residual, marked “!” if the threshold changes over "
-            f"the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the rise or fall of thresholds "
+            f"the trials by more than {BEYOND_CHANCE:g} standard errors; for the group, the mean change of thresholds "
             "after the first trials, in standard errors. n is the number of "
             f"answers{catch}." + (f" {REMOVED.format('is')}" if result.design == "2ifc" else "")
         )

@@ -217,7 +217,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
             yield (
                 f"Block {block.id}, group: we report the random-effects mean of the logarithmic thresholds "
                 f"(Paule–Mandel), with the Hartung–Knapp 95 % interval if there are at least {FEWEST} participants. "
-                "Each variance is replaced by its geometric mean with the median variance."
+                "Each participant's variance is replaced by the geometric mean of it and the median variance."
             )
             if plan.standards > 1:
                 yield (

@@ -81,8 +81,8 @@ def presented_sentences(study: Study) -> dict[str, str]:
         varied = "" if stimulus is None or not delays else f"varied {quantity_words(stimulus.vary)} and "
         displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
         sentences[block.id] = (
-            f"In {quoted_title(block.title)}, {listed(liquids)} {'were' if len(liquids) > 1 else 'was'} presented with "
-            f"{varied}{'no visual delay' if delays == [0.0] else delay}{''.join(f', {words}' for words in displays)}."
+            f"In {quoted_title(block.title)}, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}, "
+            f"with {varied}{'no visual delay' if delays == [0.0] else delay}{''.join(f', {words}' for words in displays)}."
         )
     return sentences
 
@@ -234,13 +234,20 @@ def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) ->
 
 
 def _number_words(numbers: Numbers) -> str:
-    """Return the means of a score or question by setting, and for two settings the mean difference."""
+    """Return the means of a score or question by setting, and for two settings the mean difference.
+
+    A number that is entered once describes the sample, so its SD and range are stated instead of an interval.
+    """
     what = f"The mean {numbers.title} score" if numbers.is_score else f"The mean of “{numbers.title}”"
     means = [(name, mean, len(held)) for name, held in numbers.by_setting if (mean := mean_of(held.values()))]
     parts = [
         f"{number(mean.value)}{_mean_ends(mean)}{f' {_setting_words(name)}' if name else ''}" for name, mean, _ in means
     ]
     n = max(count for *_, count in means)
+    if numbers.bounds is None and not numbers.is_score and len(means) == 1:
+        values = [*next(held for _, held in numbers.by_setting if held).values()]
+        spread = f"SD {number(float(np.std(values, ddof=1)))}, " if n > 1 else ""
+        return f"{what} was {number(means[0][1].value)} ({spread}range {min(values):g} to {max(values):g}, n = {n})."
     scale = "" if numbers.bounds is None else " on a scale from {:g} to {:g}".format(*numbers.bounds)
     text = f"{what} was {listed(parts)}{scale} (95 % confidence interval{'s' * (len(parts) > 1)}, n = {n})."
     if len(means) != 2:

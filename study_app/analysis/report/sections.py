@@ -129,10 +129,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.pilot:
         yield "These are pilot sessions, so do not report them as results of the study."
     if not decided.made:
-        yield (
-            "The protocol does not specify the analysis (the [analysis] table is missing), so all results are "
-            "exploratory."
-        )
+        yield ("The analysis was not planned (the study file has no table [analysis]), so all results are exploratory.")
     elif decided.changed:
         yield (
             "The decisions about the analysis changed between sessions, so all results are exploratory; the decisions "
@@ -211,7 +208,7 @@ def _low_power(results: Results) -> Iterator[str]:
         kind, size = ("ratio", f"×/÷ {number(math.exp(least))}") if result.ratio else ("difference", number(least))
         yield (
             f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "
-            f"be detected with {power}; a smaller one cannot be ruled out."
+            f"be detected with {power}; the confidence interval shows which {kind}s remain possible."
         )
 
 

@@ -18,7 +18,7 @@ from study_app.workspace import workspace
 
 _NOTHING: Final[Mapping[str, str]] = MappingProxyType({})
 STEPS: Final = 1000  # of a bar
-REASON: Final = "Please enter a reason; it is recorded."
+REASON: Final = "Please enter a reason. It will be recorded."
 
 
 def choose_protocol(parent: QWidget, title: str) -> str:

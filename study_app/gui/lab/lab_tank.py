@@ -352,7 +352,11 @@ class LabTank(Themed, QWidget):
         if view.workbench.blind:
             return "Tail and arrows are hidden during a blind comparison"
         if view.tail is None:
-            return "No tail yet" if "wake" in view.workbench.in_hand.scene.liquids[0].effects else "No wake, no tail"
+            return (
+                "No tail yet"
+                if "wake" in view.workbench.in_hand.scene.liquids[0].effects
+                else "This liquid has no wake"
+            )
         if view.tail.segments == 0:
             return f"At rest, {grouped(view.tail.alive)} of {grouped(view.tail.elements)} elements"
         segments = "1 segment" if view.tail.segments == 1 else f"{view.tail.segments} segments"

@@ -128,7 +128,7 @@ class WriteDialog(Work):
         self.show_done(f"{counted(len(files), 'file')} in {files[0].parent}.{warned}{more}", opens)
 
 
-_NEEDS: Final = {"by": "Please enter a name; it is recorded.", "reason": REASON}
+_NEEDS: Final = {"by": "Please enter a name. It will be recorded.", "reason": REASON}
 
 
 def _decision_fields(by: str, who: str, example: str) -> tuple[Field, Field]:

@@ -172,7 +172,7 @@ def _judged_sentence(trials: Sequence[TrialRecord], *, sealed: bool, verdict: bo
     if not judged:
         return f"No trials have been measured yet.{later}"
     if not outside:
-        every = "The only measured trial" if len(judged) == 1 else f"All {len(judged)} measured trials"
+        every = "The one trial so far" if len(judged) == 1 else f"All {len(judged)} measured trials"
         return f"{every} met the study's limits.{later}"
     return (
         f"Out of limits: {len(outside)} of {counted(len(judged), 'measured trial')} exceeded one of the study's "

@@ -407,8 +407,8 @@ def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
         of = questionnaire.instrument
         if of is not None and (recalled := instrument(of).get("from_memory")) is not None:
             yield (
-                f"questionnaires.{name}: its texts were written from memory and not compared with a source "
-                f"({recalled}); compare them with your copy"
+                f"questionnaires.{name}: the wording was written from memory and has not been checked "
+                f"against a source ({recalled}); check it against your copy"
             )
 
 

@@ -45,8 +45,8 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
                 missed.append(f"{level:.3g}")
         if missed:
             yield (
-                f"{where}: level{'s' * (len(missed) > 1)} {' and '.join(missed)} cannot be delivered to a hand that "
-                "follows the target, because the safety layer removes energy that the liquid returns. Such trials are "
-                "repeated and remain unanswered. Choose a smaller scene.scale, or effects without added_mass, history "
-                "and unsteady_drag"
+                f"{where}: level{'s' * (len(missed) > 1)} {' and '.join(missed)} cannot be rendered if the hand "
+                "follows the target, because the safety layer removes energy that the liquid returns. Trials at these "
+                "levels would be repeated and never answered. Choose a smaller scene.scale, or effects "
+                "without added_mass, history and unsteady_drag"
             )

@@ -26,7 +26,7 @@ _SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     (
         "Participants, interval trials",
         "study-…_description-participants_data.csv",
-        "differences in studies with interval trials",
+        "columns that differ in studies with interval trials",
         tuple(column for column in with_missing_trials(PARTICIPANTS) if column not in PARTICIPANTS),
     ),
     ("Exclusions", "exclusions.csv", "one row per excluded session or trial", EXCLUSIONS),

@@ -403,9 +403,10 @@ def higher_for_so_many(match: re.Match[str], told: Told) -> bool:
     """Check for how many participants the first is higher."""
     (one,) = told.contrasts
     differences = contrast_values(told, one)
-    return match[1] == one["compared"][0] and (int(match[2]), int(match[3])) == (
+    return match[1] == one["compared"][0] and (int(match[2]), int(match[3]), int(match[4] or 0)) == (
         int((differences > 0).sum()),
         len(differences),
+        int((differences == 0).sum()),
     )
 
 
@@ -797,7 +798,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf", (?P<unadjusted>unadjusted )?(?P<two>two-sided )?95 % confidence interval \[(?P<low>{R}), (?P<high>{R})\], "
      rf"(?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
      r"(?P<adjusted>adjusted )?(?P<one>one-sided )?p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
-    (r"It was higher in (\S+) for (\d+) of (\d+) participants\.", higher_for_so_many),
+    (r"It was higher in (\S+) for (\d+) of (\d+) participants(?: and equal for (\d+))?\.", higher_for_so_many),
     (r"The data are ([\d.]+) times as likely if there is (a|no) difference as if there is (one|none) \(JZS Bayes "
      r"factor, Cauchy prior with scale 0\.707\)\.", bayes_factor),
     (r"Standardised effects give all participants equal weight: d_z is .*\.", when(lambda told: bool(told.contrasts))),
@@ -872,8 +873,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf"population; if the answers of such a minority differ by {R} points, they shift the mean by as much as the "
      r"bound\.", missed_minority),
     (rf"This study has {N} participants?\.", lambda match, told: count(match[1]) == told.block["n"]),
-    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) inconclusive: the tests show neither that the mean "
-     rf"difference lies within the equivalence bounds nor that it lies outside them\.", nobody_is_left),
+    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) inconclusive: neither equivalence nor a mean "
+     r"difference beyond the bounds can be concluded\.", nobody_is_left),
     # Methods
     (rf"{N} participants?(?: \(SIMULATED, not people\))? took part in “Made up” \(protocol made_up, version 1\)(, "
      r"each in all conditions|, but some did not complete all conditions)?\.",
@@ -910,8 +911,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"could shift the mean by as much as the bound\.",
      when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
     (rf"Hypothesis(?: (\d+))?: (?:with )?{N} participants (?:and the observed variation between them, a mean "
-     rf"difference must be at least {R} to be detected with 80 % power; a smaller one cannot be ruled out|are "
-     r"too few to find even (a difference of 3 SD|the largest difference on the scale) with 80 % power)\.", low_power),
+     rf"difference must be at least {R} to be detected with 80 % power; the confidence interval shows "
+     r"which differences remain possible|are too few to find even (a difference of 3 SD|the largest difference on the scale) with 80 % power)\.", low_power),
     (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Some participants were excluded from a test because a value was missing \(.*\)\.",
