@@ -76,7 +76,8 @@ class _CumulativeModels(StatementTests):
             f"A cumulative logit mixed model was fitted to {self._answers()} to each primary statement, including the "
             f"answers of incomplete participants. Effects are log odds ratios {unit}".rstrip()
             + f" and are positive if {sign}; their 95 % intervals are Wald intervals. The SDs describe the "
-            f"participants' intercepts{' and delay effects' if delays else ''}. Effects were tested with likelihood-ratio tests (LR; "
+            f"participants' intercepts{' and delay effects' if delays else ''}. "
+            f"Effects were tested with likelihood-ratio tests (LR; "
             f"{methods}), and p values were adjusted ({fitted[0].correction}) across "
             f"{number_text.counted(fitted[0].members, 'test')}.",
             "soft",

@@ -82,7 +82,8 @@ def presented_sentences(study: Study) -> dict[str, str]:
         displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
         sentences[block.id] = (
             f"In {quoted_title(block.title)}, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}, "
-            f"with {varied}{'no visual delay' if delays == [0.0] else delay}{''.join(f', {words}' for words in displays)}."
+            f"with {varied}{'no visual delay' if delays == [0.0] else delay}"
+            f"{''.join(f', {words}' for words in displays)}."
         )
     return sentences
 

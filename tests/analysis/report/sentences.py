@@ -912,7 +912,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: any(one["contrast"]["bound"] is not None for one in told.contrasts))),
     (rf"Hypothesis(?: (\d+))?: (?:with )?{N} participants (?:and the observed variation between them, a mean "
      rf"difference must be at least {R} to be detected with 80 % power; the confidence interval shows "
-     r"which differences remain possible|are too few to find even (a difference of 3 SD|the largest difference on the scale) with 80 % power)\.", low_power),
+     r"which differences remain possible|are too few to find even (a difference of 3 SD|the largest difference on the "
+     r"scale) with 80 % power)\.", low_power),
     (r"No hypothesis tests an interaction between groups and blocks or conditions\.",
      when(lambda told: {one["contrast"]["groups"] is None for one in told.contrasts} == {True, False})),
     (r"Some participants were excluded from a test because a value was missing \(.*\)\.",
