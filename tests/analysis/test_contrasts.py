@@ -33,6 +33,7 @@ from study_app.analysis.report.first_page import cards, first_page
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import limits
 from study_app.analysis.report.write_report import report
+from study_app.analysis.results import Results
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import group_mean
 from study_app.errors import ProtocolError
@@ -112,16 +113,8 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
         assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
 
 
-def test_methods_name_all_compared_conditions_with_their_delays(tmp_path: Path) -> None:
-    text = DELAYED
-    for old, new in D_PRIMES:
-        assert old in text
-        text = text.replace(old, new)
-    (tmp_path / "delayed.toml").write_text(text.replace('"threshold"', '"d_prime"').replace("1.25", "0.3"), "utf-8")
-    folder = rehearse_answers(tmp_path / "delayed.toml", participants=3, seed=3, results=tmp_path / "s")
-    unblind(folder, "AB", "to analyse")
-    made = load_study(folder)
-    words = methods(made, evaluate(made))
+def test_methods_name_all_compared_conditions_with_their_delays(guessed: tuple[Study, Results]) -> None:
+    words = methods(*guessed)
     assert "(two-interval forced choice), damper and damper with a visual delay of 60 ms were compared." in words
 
 
@@ -658,3 +651,43 @@ def test_power_counts_studies_of_statements_that_show_equality() -> None:
     assert 0 < shown < 20
     row = f"| *{planned.contrasts[0].described()}, if there is no difference* | 0% | {shown / 20:.0%} ("
     assert row in power_markdown(powers(planned, (12, 24), 20, 20, 1, counts))
+
+
+@pytest.fixture(scope="module")
+def guessed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Study, Results]:
+    """A study of d′ with three simulated participants."""
+    folder = tmp_path_factory.mktemp("guessed")
+    text = DELAYED
+    for old, new in [*D_PRIMES, ('"threshold"', '"d_prime"'), ("1.25", "0.3")]:
+        text = text.replace(old, new)
+    (folder / "delayed.toml").write_text(text, encoding="utf-8", newline="\n")
+    study = rehearse_answers(folder / "delayed.toml", participants=3, seed=3, results=folder / "s")
+    unblind(study, "AB", "to analyse")
+    made = load_study(study)
+    return made, evaluate(made)
+
+
+@pytest.mark.parametrize(
+    ("ends", "named"),
+    [
+        (((-0.1, 0.9), (0.2, 1.1)), "Prompt"),
+        (((0.1, 0.9), (-0.2, 1.1)), "Late"),
+        (((-0.3, 0.9), (-0.2, 1.1)), "Prompt and Late"),
+        (((0.1, 0.9), (0.2, 1.1)), ""),
+    ],
+)
+def test_a_mean_d_prime_that_may_be_chance_is_a_limit(
+    guessed: tuple[Study, Results], ends: tuple[tuple[float, float], ...], named: str
+) -> None:
+    made, results = guessed
+    (contrast,) = results.contrasts
+    sides = tuple(
+        replace(side, name=name, low=low, high=high)
+        for side, name, (low, high) in zip(contrast.sides, ("Prompt", "Late"), ends, strict=True)
+    )
+    page = limits(made, replace(results, contrasts=(replace(contrast, sides=sides),)))
+    lines = [line for line in page if "(chance)" in line]
+    assert lines == [
+        f"Hypothesis: the interval of the mean d′ in {named} includes 0 (chance). If participants guess, a difference "
+        "in d′ cannot be detected."
+    ] * bool(named)

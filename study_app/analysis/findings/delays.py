@@ -518,8 +518,8 @@ class _NoticedFrom(Finding[None]):
         ]
         return (
             f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
-            f"{listed(rated)}. They may also notice shorter delays. The trend "
-            "is one of ranks; mean ratings may still be equal."
+            f"{listed(rated)}. They may also notice shorter delays. The test "
+            "uses ranks; the mean ratings may be equal."
         )
 
     def _threshold_words(self) -> str:

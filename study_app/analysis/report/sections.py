@@ -50,7 +50,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
-from study_app.protocol.model import RULES
+from study_app.protocol.model import RULES, quoted_title
 from study_app.protocol.orders.balance import Evenness
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import dated_reversals, describe_exclusion
@@ -139,6 +139,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if len({one.groups is None for one in hypotheses}) == 2 and not any(one.is_interaction for one in hypotheses):
         yield "No hypothesis tests an interaction between groups and blocks or conditions."
     yield from _low_power(results)
+    yield from _near_chance(results)
     if any(one.groups for one in hypotheses) and group_assignment(study) == "pre-existing":
         yield (
             "Participants were not assigned to groups at random, so a difference between groups may have other causes."
@@ -210,6 +211,24 @@ def _low_power(results: Results) -> Iterator[str]:
             f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "
             f"be detected with {power}; the confidence interval shows which {kind}s remain possible."
         )
+
+
+def _near_chance(results: Results) -> Iterator[str]:
+    """Yield the sides of hypotheses about d′ at which participants may have guessed."""
+    for place, result in enumerate(results.contrasts, start=1):
+        if result.contrast.measure != "d_prime" or result.contrast.is_interaction:
+            continue
+        sides = [
+            quoted_title(side.name)
+            for side in result.sides
+            if side.low is not None and side.high is not None and side.low <= 0 <= side.high
+        ]
+        lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
+        if sides:
+            yield (
+                f"{lead}: the interval of the mean d′ in {listed(sides)} includes 0 (chance). If participants guess, "
+                "a difference in d′ cannot be detected."
+            )
 
 
 def _mixed_up(result: BlockResult, results: Results) -> Iterator[str]:

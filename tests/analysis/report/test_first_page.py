@@ -137,10 +137,10 @@ def test_the_page_says_what_each_block_presented() -> None:
     ]
     study: Any = SimpleNamespace(blocks=(), levels=blocks)
     assert presented_sentences(study) == {
-        "late": "In Liquids (late), slime and gear oil were presented with a visual delay of 73 ms.",
-        "b": "In Liquids (late), slime was presented with visual delays of 0 and 41 ms.",
-        "c": "In “On time”, slime was presented with no visual delay, force 20 ms late.",
-        "d": "In Liquids (late), slime was presented with a varied visual delay.",
+        "late": "In Liquids (late), the liquids were slime and gear oil, with a visual delay of 73 ms.",
+        "b": "In Liquids (late), the liquid was slime, with visual delays of 0 and 41 ms.",
+        "c": "In “On time”, the liquid was slime, with no visual delay, force 20 ms late.",
+        "d": "In Liquids (late), the liquid was slime, with a varied visual delay.",
     }
 
 

@@ -192,5 +192,5 @@ def test_intervals_of_kappa_cover_it(n: int, known: float) -> None:
     [([[0, 1]], [0, 1, 2]), ([[0, 5, 1]], [0, 1, 2]), ([[0, 1, 1.5]], [0, 1, 2]), ([[0, 1, 2]], [0, 1, 9])],
 )
 def test_names_and_truth_that_do_not_fit_are_refused(names: list[list[float]], truth: list[int]) -> None:
-    with pytest.raises(AnalysisError, match="name"):
+    with pytest.raises(AnalysisError, match=r"name|labels"):
         recognition(names, truth, 3)

@@ -156,7 +156,7 @@ def test_presentations_beyond_a_limit_are_counted(undelivered: int, sentence: st
     )  # fmt: skip
     trials = [trial, *[replace(trial, outcome=UNDELIVERED)] * undelivered]
     text = _limits_sentence(trials, MissingTrials(limits={}), sealed=False)
-    assert text == f"{sentence}The only measured trial met the study's limits."
+    assert text == f"{sentence}The one trial so far met the study's limits."
 
 
 def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblinding_already(tmp_path):
