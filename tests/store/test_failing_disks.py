@@ -423,7 +423,7 @@ def test_an_output_that_cannot_be_listed_is_mentioned(studied: Path, tmp_path: P
     warnings: list[str] = []
     output_files.write_output(studied / "study", tmp_path / "report", {"report.html": b"report"}, warnings.append)
     assert (tmp_path / "report/report.html").read_bytes() == b"report"
-    assert "so withdraw will not list it" in warnings[0]
+    assert "so the withdraw command will not list it" in warnings[0]
 
 
 @needs_posix

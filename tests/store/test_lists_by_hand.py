@@ -334,7 +334,7 @@ def test_tables_are_written_and_read_cell_by_cell(tmp_path: Path) -> None:
         (atomic.remove_temporary_files, "{at}/{half} cannot be written (No space left on device): free"),
         (lambda at: atomic.is_there(at / "b"), "{at}/b cannot be read (No space left on device): "),
         (lambda at: blinding.reveal(at, "AB", "why"), "{at} is not a study folder (key.sealed is missing): specify"),
-        (lambda at: _protocol_error(at / "r"), "{at}/r does not contain 'scene': restore it from a back-up"),
+        (lambda at: _protocol_error(at / "r"), "{at}/r does not contain 'scene': restore it from a backup"),
         (lambda at: receipt.read(at / "r"), "{at}/r is not a receipt (Expecting value"),
     ],
 )

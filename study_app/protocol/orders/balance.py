@@ -210,8 +210,8 @@ def block_order_words(protocol: Protocol, planned: int | None, *, in_group: bool
         return f"{text}; balanced for any multiple of {rows} participants{of}"
     counts = [count for line in order_evenness.positions for count in line]
     even = _times_text(counts[0]) if order_evenness.positions_even else _range_text(counts)
-    more = "" if order_evenness.balanced else f"; the order would be balanced with {planned + -planned % rows} "
-    f"participants{of}"
+    balanced = planned + -planned % rows
+    more = "" if order_evenness.balanced else f"; the order would be balanced with {balanced} participants{of}"
     return f"{text}; with {planned} participants{of}, each block occurs in each position {even}{more}"
 
 
