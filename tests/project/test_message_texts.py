@@ -42,3 +42,14 @@ def test_no_text_prints_the_name_of_a_variable() -> None:
         for line, text in unformatted(path.read_text(encoding="utf-8"))
     }
     assert found == {}
+
+
+def test_no_part_of_a_text_stands_alone() -> None:
+    """An f-string after a finished statement is computed and lost."""
+    lost = [
+        (path, node.lineno)
+        for path in (Path(__file__).parents[2] / "study_app").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.JoinedStr)
+    ]
+    assert not lost

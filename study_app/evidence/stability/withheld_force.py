@@ -145,8 +145,8 @@ def _lines(found: Sequence[Withheld]) -> Iterator[str]:
         which = "except in tar" if most == _MOST else f"in {' with '.join(_REVERSED)}"
         yield f"at most {most:.0%} held back in every stroke, {which}: {_goal(quick <= most)} ({quick:.1%})"
     met = _goal(lasting < MOST_AFTER)
-    yield f"less than {MOST_AFTER:.1%} held back from one second after a shake onwards, except in tar: {met} "
-    f"({lasting:.1%})"
+    after = f"less than {MOST_AFTER:.1%} held back from one second after a shake onwards, except in tar"
+    yield f"{after}: {met} ({lasting:.1%})"
 
 
 def _goal(met: bool) -> str:
