@@ -52,7 +52,7 @@ class TestDoctor:
         assert len(found) == 2
         assert "homing fails" in found[1]
         assert "cause: not every arm has passed its index" in found[1]
-        assert "cure: push the grip fully in" in found[1]
+        assert "cure: push the grip in as far as it goes" in found[1]
 
     def test_the_rule_to_paste_stands_in_one_line(self, monkeypatch):
         monkeypatch.setattr("sys.platform", "linux")

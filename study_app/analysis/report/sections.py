@@ -129,7 +129,10 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.pilot:
         yield "These are pilot sessions, so do not report them as results of the study."
     if not decided.made:
-        yield ("The analysis was not planned (the study file has no table [analysis]), so all results are exploratory.")
+        yield (
+            "The study file does not plan the analysis (the table [analysis] is missing), so all results are "
+            "exploratory."
+        )
     elif decided.changed:
         yield (
             "The decisions about the analysis changed between sessions, so all results are exploratory; the decisions "

@@ -149,7 +149,7 @@ def _names(names: ArrayLike, truth: Sequence[int | None], labels: int) -> Whole:
         )
     if not np.isin(given, _columns(labels)).all() or not {*truth} <= {None, *range(labels)}:
         raise AnalysisError(
-            f"an answer is none of the {labels} labels; give each answer as the position of a label (0 to "
+            f"an answer is outside the {labels} labels; specify each answer as the position of a label (0 to "
             f"{labels - 1}), -1 for undecided or -2 for missing"
         )
     return given.astype(np.int64)

@@ -355,7 +355,7 @@ class LabTank(Themed, QWidget):
             return (
                 "No tail yet"
                 if "wake" in view.workbench.in_hand.scene.liquids[0].effects
-                else "This liquid has no wake"
+                else "This liquid does not leave a wake"
             )
         if view.tail.segments == 0:
             return f"At rest, {grouped(view.tail.alive)} of {grouped(view.tail.elements)} elements"

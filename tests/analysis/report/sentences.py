@@ -850,8 +850,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
-    (r"The analysis was not planned \(the study file has no table \[analysis\]\), so all results are exploratory\.",
-     when(lambda told: not told.results["decided"]["made"])),
+    (r"The study file does not plan the analysis \(the table \[analysis\] is missing\), so all results are "
+     r"exploratory\.", when(lambda told: not told.results["decided"]["made"])),
     (r"The decisions about the analysis changed between sessions, so all results are exploratory; the decisions from "
      r"the first session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
     (r"There is only one participant, so the results do not generalise to other people\.",

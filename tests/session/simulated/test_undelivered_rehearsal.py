@@ -149,7 +149,7 @@ def test_check_notes_levels_of_a_liquid_with_inertia_that_a_rehearsal_does_not_d
     file = tmp_path / "inertia.toml"
     file.write_text(INERTIA.format(scale=scale, vary=goo[0], liquid=goo[1]), encoding="utf-8", newline="\n")
     said = " ".join(CliRunner().invoke(commands, ["check", str(file)]).output.split())
-    assert said.count("levels 0.6 and 0.02 cannot be delivered to a hand") == said.count("cannot be delivered") == notes
+    assert said.count("levels 0.6 and 0.02 cannot be rendered if the hand") == said.count("cannot be rendered") == notes
     study = rehearse(file, participants=1, seed=1, results=tmp_path / "results")
     valid = {row["valid"] for row in rows_of(StudyFolder(study).sessions()[0].path, "trials")}
     assert valid == {"false" if notes else "true"}
