@@ -99,7 +99,7 @@ class DeleteCard(Prompt):
         add_parts(self.buttons, self.gaps, self.other, self.all)
         add_layout(self.column, self.buttons)
         self.other.setVisible(bool(self.other.count()))
-        self.first: QWidget = self.all
+        self.first: QWidget = self.cancel
 
 
 class ConfirmCard(Prompt):
@@ -120,10 +120,8 @@ class SeriesCard(Prompt):
 
     def __init__(self, study: Study, path: Path, numbers: Sequence[Row]) -> None:
         title = title_of(study.document, path)
-        super().__init__(
-            f"Series of {title}",
-            f"Enter one value per copy of {title}. The copies are added to the blocks that use the original.",
-        )
+        where = "the session" if path[0] == "blocks" else "the blocks that use the original"
+        super().__init__(f"Series of {title}", f"Enter one value per copy of {title}. The copies are added to {where}.")
         self.study, self.path, self.numbers = study, path, numbers
         self.number = make_dense(Choice(), "Value to vary")
         for row in numbers:

@@ -259,3 +259,16 @@ def test_undo_of_a_step_elsewhere_leaves_the_entry(designer: Any) -> None:
     designer.editing.redo()
     assert designer.study.unfinished == ()
     assert shown(designer) == 2
+
+
+def test_enter_does_not_confirm_a_deletion_that_also_deletes_other_elements(designer: Any) -> None:
+    """A block that names only the deleted liquid would go with it."""
+    begin(designer)
+    before, liquid = designer.study.text, next(iter(designer.study.document["liquids"]))
+    designer.controller.ask_to_delete(("liquids", liquid))
+    QApplication.processEvents()
+    focused = designer.window.focusWidget()
+    assert designer.place.prompt.all.isVisible()
+    assert focused is designer.place.prompt.cancel
+    QTest.keyClick(focused, Qt.Key.Key_Return)
+    assert designer.study.text == before
