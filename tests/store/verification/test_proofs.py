@@ -72,7 +72,7 @@ def test_the_page_lists_the_forgeries_and_what_tells_them() -> None:
     assert len(alone) == 6
     assert "On its own, `verify` detects six, such as a changed answer or a deleted session folder" in page
     assert alone > {"an answer changed in the journal", "an answer changed in a table", "a session's folder deleted"}
-    (others,) = re.findall(r"but not, for example, ([^.]*)\.", page)
+    (others,) = re.findall(r"does not detect, for example, ([^.]*)\.", page)
     untold = {
         "exchanged answers": {"all answers of a participant inverted", "answers of two participants exchanged"},
         "shifted times": {"all times moved"},
