@@ -3,7 +3,6 @@
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -225,5 +224,5 @@ def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
     from study_app.analysis.report import write_report
 
-    for pictures in ("pictures", "summary_pictures", "level_pictures", "question_pictures"):
-        monkeypatch.setattr(write_report, pictures, partial(getattr(write_report, pictures), forms=("png",)))
+    monkeypatch.setattr(write_report, "ON_PAGE", ("png",))
+    monkeypatch.setattr(write_report, "BESIDE_PAGE", ())

@@ -4,7 +4,6 @@ import csv
 import io
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 
 import pytest
@@ -23,8 +22,8 @@ def figures_as_lines() -> Iterator[None]:
     """Let files of figures hold what these show."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        for name in ("pictures", "summary_pictures", "level_pictures", "question_pictures"):
-            patched.setattr(write_report, name, partial(vars(write_report)[name], forms=("png",)))
+        patched.setattr(write_report, "ON_PAGE", ("png",))
+        patched.setattr(write_report, "BESIDE_PAGE", ())
         yield
 
 

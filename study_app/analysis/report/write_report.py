@@ -61,6 +61,7 @@ from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
 from study_app.store.study_runs import recorded_contents
 from study_app.store.unblinding import reveals_of
+from study_app.workers.forked import Forked
 
 _OF_FORMAT_2: Final = {
     Results: frozenset({"questions", "scores", "levels", "contrasts"}),
@@ -293,6 +294,11 @@ def has_questions(study: Study) -> bool:
     return bool(study.blocks or study.others.questions)
 
 
+ON_PAGE: Final = ("svg",)
+BESIDE_PAGE: Final = ("png", "pdf")
+"""Formats of figures: the page contains the first ones; another process draws the others meanwhile."""
+
+
 def report_files(study: Study, progress: Progress = report_no_progress) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
     """Return the files of a study's report by name, ``report.html`` first, and the sections that failed.
 
@@ -300,9 +306,10 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     """
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
-    drawn = []
     numbers = failures.value("the participants' values", lambda: numbers_of(study), {})
-    for picture in _drawn(study, results, numbers, failures):
+    beside = Forked(lambda: _files_beside_page(study, results, numbers))
+    drawn = []
+    for picture in _drawn(study, results, numbers, failures, ON_PAGE):
         drawn.append(picture)
         progress(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
 
@@ -325,9 +332,10 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     ):
         content = failures.value(file, make, None)
         files |= {} if content is None else {file: content}
-    for one in drawn:
-        files |= {f"{one.name}.{form}": content for form, content in one.files.items()}
-        files[f"{one.name}.txt"] = f"{one.caption}\n".encode()
+    others, failed = beside.result()
+    failures.found += [failure for failure in failed if failure not in failures.found]
+    files |= _files_of(drawn) | others
+    files |= {f"{picture.name}.txt": f"{picture.caption}\n".encode() for picture in drawn}
     files |= failures.value("exported tables", lambda: table_files(study, exported_tables(study)), {})
     page_ = _page(study, results, numbers, drawn, texts, planned, failures).encode()
     return {"report.html": page_, "report.json": document(study, results, texts, failures), **files}, tuple(
@@ -335,15 +343,28 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     )
 
 
+def _files_beside_page(
+    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]]
+) -> tuple[dict[str, bytes], list[Failure]]:
+    """Return the files of all figures that the page does not contain, and the figures that failed."""
+    failures = Failures()
+    files = _files_of(_drawn(study, results, numbers, failures, BESIDE_PAGE))
+    return files, failures.found
+
+
 def _drawn(
-    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], failures: Failures
+    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], failures: Failures, forms: Sequence[str]
 ) -> Iterator[Picture]:
-    yield from pictures(study, results, failures=failures)
+    yield from pictures(study, results, forms, failures)
     if results.questions:
-        yield from question_pictures(study, results.questions, failures=failures)
-    yield from summary_pictures(study, results, numbers, failures=failures)
+        yield from question_pictures(study, results.questions, forms, failures)
+    yield from summary_pictures(study, results, numbers, forms, failures)
     if results.levels:
-        yield from level_pictures(study, results.levels, failures=failures)
+        yield from level_pictures(study, results.levels, forms, failures)
+
+
+def _files_of(drawn: Iterable[Picture]) -> dict[str, bytes]:
+    return {f"{picture.name}.{form}": content for picture in drawn for form, content in picture.files.items()}
 
 
 def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:
