@@ -128,7 +128,7 @@ def test_the_book_and_its_layers_are_as_short_as_they_are_to_be() -> None:
     words = {page: len(documentation.source(page).split()) for page in sections["do"]}
     assert not {page: count for page, count in words.items() if count > 660}
     assert (
-        sum(len(path.read_text("utf-8").split()) for path in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"))) <= 48_000
+        sum(len(path.read_text("utf-8").split()) for path in (ROOT / "README.md", *ROOT.glob("docs/**/*.md"))) <= 49_000
     )
 
 
