@@ -217,7 +217,7 @@ def include(
 @PARTICIPANT
 @BY
 @click.option(
-    "--reason", required=True, metavar="TEXT", help="Reason; it is stored, so it must not identify the participant."
+    "--reason", required=True, metavar="TEXT", help="The reason. It is stored, so it must not identify the participant."
 )
 @click.option(
     "--also",

@@ -709,7 +709,7 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
 )
 @click.option("--to", type=Target(), metavar="DIR", help="Folder for the table and the figure.")
 def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
-    """Compare the delays rated as different (rek2024) and detected (delaydetect) by simulated participants.
+    """Compare the delays that simulated participants rate as different (rek2024) and that they detect (delaydetect).
 
     The ratings depend on each participant's criterion; the forced choices do not.
     """

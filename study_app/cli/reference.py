@@ -28,7 +28,7 @@ _DEVICE_KINDS = {"felt": "with force", "seen": "without force", "simulated": "si
 def kinds_markdown() -> str:
     """Return a Markdown table for each kind that has a descriptor."""
     tables = (
-        ("Questions", ("`kind`", "question", "additional keys", "value in tables"), _question_rows()),
+        ("Questions", ("`kind`", "question", "additional keys", "value in the tables"), _question_rows()),
         ("Standard questionnaires", ("`instrument`", "texts", "scores", "source and comparison"), _instrument_rows()),
         ("Designs", ("`kind`", "question or answer"), _kind_descriptions(designs.KINDS)),
         ("Methods", ("`kind`", "next level"), _kind_descriptions(methods.KINDS)),

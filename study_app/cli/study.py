@@ -325,8 +325,8 @@ def studies() -> None:
 def language(code: str) -> None:
     """Check the translation of the participants' texts in the file WORKSPACE/languages/CODE.toml.
 
-    CODE is a two-letter language code, such as es. If the file does not exist, the command creates it with a line for
-    each text and the English text as a comment.
+    CODE is a two-letter language code, such as es. If the file does not exist, the command creates it, with a line for
+    each text and the English original as a comment.
     """
     from study_app.errors import StudyError
     from study_app.protocol.wording.languages import SHIPPED, language_template, read_language

@@ -46,8 +46,8 @@ class SimulatedParticipants(Table):
     lapse_rate: Annotated[float, within(0, 0.5, "at most half of the answers can be errors")] = Field(
         default=0.0,
         description=(
-            "Proportion of erroneous answers (simulated as 3 points too high); used in power analyses but not in "
-            "rehearsals."
+            "Proportion of erroneous answers, each of which is simulated as 3 points too high; used in power analyses "
+            "but not in rehearsals."
         ),
     )
 

@@ -220,7 +220,7 @@ def replay(session_folder: Path) -> Replayed:
             before, resumed_at = None, resumed
         if resumed not in devices:
             raise StoreError(
-                f"{session.receipt} does not contain the device used since {resumed}: restore it from a backup"
+                f"{session.receipt} does not state which device has been used since {resumed}: restore it from a backup"
             )
         name = attempt_name(*which)
         if not isinstance(line, events.Recorded):

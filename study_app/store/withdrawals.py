@@ -146,8 +146,8 @@ def withdraw(
         with lock_folder(copy.path):
             if others := _other_sessions(copy, tombstone):
                 left += [
-                    f"{other} is not a copy of an erased session: {copy.path} was not changed; if it belongs to the "
-                    "same participant, also withdraw the participant from that folder"
+                    f"{copy.path} was not changed, because its session {other} is not a copy of an erased session; if "
+                    "the session belongs to the same participant, withdraw the participant from this folder, too"
                     for other in others
                 ]
             elif _erase(copy, replace(tombstone, at=at)):

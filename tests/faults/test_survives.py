@@ -76,7 +76,7 @@ def test_panels_that_fail_are_told_and_the_session_goes_on(session: tuple[dict[s
     assert told["force with failed panels"]
     assert not told["trouble with failed panels"]
     last = [row for row in rows(results) if row["trial"] == "1"][-1]
-    assert "part of the operator's window failed: ValueError: no such curve" in last["notes"]
+    assert "part of the operator's window stopped working: ValueError: no such curve" in last["notes"]
     assert "no such colour" in last["notes"]
 
 

@@ -285,7 +285,7 @@ def _reached(folder: Path, row: Mapping[Any, Any], targets: Targets) -> Reached 
     try:
         samples = read_samples(_file(folder, row))
     except SealedRecording:
-        return "the recording is sealed (liquid-study unblind opens it)"
+        return "the recording is sealed (liquid-study unblind unseals it)"
     except StoreError:
         return "a recording is damaged (liquid-study verify shows which one)"
     kept = (samples["scene"] == samples["scene"][-1:]) & (samples["limiters"] & LIMITER_GLITCH == 0)

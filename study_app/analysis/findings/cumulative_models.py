@@ -105,6 +105,6 @@ class _CumulativeModels(StatementTests):
             yield (
                 f"In an exploratory analysis, a cumulative logit mixed model with random intercepts{slopes} was fitted "
                 f"to {self._answers()} to {counted(fitted, 'primary statement')}, including the answers of "
-                "incomplete participants; effects were tested with likelihood-ratio tests, and the false discovery "
-                "rate was controlled (Benjamini–Hochberg)."
+                "participants who did not answer in all conditions; effects were tested with likelihood-ratio tests, "
+                "and the false discovery rate was controlled (Benjamini–Hochberg)."
             )

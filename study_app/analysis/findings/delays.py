@@ -152,7 +152,9 @@ def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
         if tested.verdict == "not equivalent" and tested.delay_ms <= delay_ms:
             beyond.setdefault(tested.delay_ms, []).append(f"“{short_text(result, tested.item)}”")
     differing = (
-        f"at {ms(at)}, mean answers to {listed(items)} differ by more than the bound" for at, items in beyond.items()
+        f"at {ms(at)}, the mean answers to {listed(items)} differ from those at the shortest delay by more than the "
+        "bound"
+        for at, items in beyond.items()
     )
     return (*trends, *differing)
 

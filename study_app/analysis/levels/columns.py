@@ -60,8 +60,8 @@ OF_TRACKS: Final[tuple[Column, ...]] = (
     optional(
         "level_delivered",
         "number",
-        "Level of the comparison as delivered to the hand, computed from the delivered values (for a visual delay, "
-        "from the mean errors of the frames); n/a if it was not measured.",
+        "Level of the comparison that was actually delivered, computed from the delivered values (for a visual delay, "
+        "from the mean delay error of the frames); n/a if it was not measured.",
     ),
     optional(
         "comparison",

@@ -193,10 +193,10 @@ class _Withheld(LevelStatistic[_Row]):
 
     def explained(self) -> str:
         return (
-            f"{' '.join(self._up_to())} The table shows the proportion of the requested force that the limits, the "
-            "passivity controller and the device held back in the comparisons, including repeated trials. A delayed "
-            "force can return energy to the hand. The passivity controller limits this energy by holding back force, "
-            "which makes the stimulus weaker than requested."
+            f"{' '.join(self._up_to())} The table shows the proportion of the requested force that was held back by "
+            "the limits, the passivity controller or the device in the comparisons, including repeated trials. A "
+            "delayed force can return energy to the hand. The passivity controller limits this energy by holding back "
+            "force, which makes the stimulus weaker than requested."
         )
 
     def _up_to(self) -> Iterator[str]:

@@ -344,7 +344,7 @@ _HEADS: Final[dict[Question, tuple[str, str]]] = {
     "trend": ("Do answers change with the delay?", "statement"),
     "lowest delay": ("Can a trend be shown over delays up to this one, or over fewer delays?", "statement, delay"),
     "equivalence": ("Can any delay be shown to be equivalent to the shortest one?", "statement, delay"),
-    "contrast": ("Can the hypothesis be shown?", "hypothesis"),
+    "contrast": ("Can the study support the hypothesis?", "hypothesis"),
 }
 
 

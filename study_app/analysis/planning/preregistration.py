@@ -135,10 +135,10 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
     bounds = sum(contrast.bound is not None for contrast in protocol.analysis.contrasts)
     reach, largest = equality_limits(contrast, contrast.bound, ratio=contrast.measure in RATIOS)
     alpha = decisions(protocol).alphas[-1] / bounds
+    adjusted = "" if bounds == 1 else f", with Holm's adjustment for the {bounds} hypotheses that have a bound"
     return (
-        " We test equivalence with two one-sided t tests and with a bootstrap, Holm-adjusted across "
-        f"{number_text.counted(bounds, 'bound')}; this requires at least {fewest_participants(alpha, reach, largest)} "
-        f"participants{' in each group' if contrast.groups else ''}."
+        f" We test equivalence with two one-sided t tests and a bootstrap{adjusted}. This requires at least "
+        f"{fewest_participants(alpha, reach, largest)} participants{' in each group' if contrast.groups else ''}."
     )
 
 
@@ -256,9 +256,9 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     kinds = {protocol.compared_in(block.id) for block in asked}
     if "delays" in kinds:
         yield (
-            f"Delays: we test trends with {TRENDS[decided.trends]}. The test is one-sided if a direction is stated, "
-            "otherwise two-sided. If a statement shows a trend, we drop the longest delay and test the rank "
-            f"correlations again, until no trend remains. {_equivalence_words(decided)}We estimate the "
+            f"Delays: we test for trends with {TRENDS[decided.trends]}. The test is one-sided if a direction is "
+            "stated, otherwise two-sided. If the answers to a statement show a trend, we drop the longest delay and "
+            f"repeat the test until no trend remains. {_equivalence_words(decided)}We estimate the "
             "detection threshold from agreement if agreement shows a trend."
         )
     if others := kinds - {None, "delays"}:

@@ -410,9 +410,9 @@ def _contrasts(precisions: Precisions) -> Iterator[str]:
         if not rows:
             continue
         share = "" if assumed is None else f", at a mean {what} of {mean:g}"
-        whose = f"of one participant's {what}, due to estimation error and differences between people"
+        whose = f"of one participant's {what}, from the estimation error and the variation between people"
         if contrast.within is not None:
-            whose = "of one participant's difference, due to the two estimation errors and differences between people"
+            whose = "of one participant's difference, from both estimation errors and the variation between people"
         yield from smallest_differences(
             contrast, precisions.sizes, alpha, members, rows,
             f"trials{first.per}",

@@ -118,7 +118,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
             "--reason TEXT."
         )
         if study.own_codes:
-            yield "Until unblinding, each participant has separate codes, so conditions cannot be compared."
+            yield "Until unblinding, each participant has a separate set of codes, so conditions cannot be compared."
         if study.sites:
             yield (
                 "Each site has its own key. Until all sites are unblinded, each code begins with the name of the "
@@ -183,8 +183,8 @@ def _late_devices(study: Study) -> Iterator[str]:
         assumed = " or ".join(f"{ticks:g}" for ticks in sorted(set(late["loop_delay_ticks"])))
         yield (
             f"In {len(late)} of {counted(len(rows), 'trial')} in the main blocks, the device responded later than the "
-            f"servo assumed: after at least {late['device_delay_ticks'].max():g} ticks in one of them, instead of "
-            f"{assumed}. In these trials, the force acted too late, and the passivity controller reduced it."
+            f"servo assumed: in the worst case after at least {late['device_delay_ticks'].max():g} ticks instead of "
+            f"{assumed}. In these trials, the force acted too late and was reduced by the passivity controller."
         )
 
 
@@ -625,7 +625,7 @@ def _missing(study: Study) -> Iterator[str]:
             words=5,
         )
     else:
-        yield paragraph("All trials were delivered.")
+        yield paragraph("All trials were presented as planned.")
     if len(rows) > _SHOWN:
         yield paragraph(f"report.json lists {counted(len(rows) - _SHOWN, 'more session')}.")
     permitted = study.protocol.get("limits", {}).get(MISSING_PERCENT)

@@ -95,7 +95,7 @@ def trend(values: ArrayLike, direction: Direction | None = "increasing", *, seed
         n=n,
         dropped=dropped,
         statistic_name="L",
-        effect_name="mean rank correlation with the order, not corrected for ties",
+        effect_name="mean rank correlation with the order of the levels, not corrected for ties",
         direction=direction,
     )
     if not n or (ranks == k + 1).all():
@@ -159,7 +159,7 @@ def _note(first: Step, lowest: float | None) -> str:
         )
     return (
         f"{lowest:g} ms is the shortest delay at which the answers from {counted(first.trend.n, 'participant')} show a "
-        "trend; it is an upper bound, because participants may also notice shorter delays"
+        "trend; it is only an upper bound, because participants may also notice shorter delays"
     )
 
 

@@ -492,7 +492,7 @@ class SessionBridge(QObject):
             case "failed":
                 what, error = details
                 log.error("part of the operator's window failed: %s", what, exc_info=error)
-                self.record_note(f"part of the operator's window failed: {what}")
+                self.record_note(f"part of the operator's window stopped working: {what}")
             case "page":
                 self.participant.bring_forward()
             case "close":

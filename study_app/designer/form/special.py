@@ -136,7 +136,7 @@ class _QuestionRow(Themed, QWidget):
         made = QWidget()
         made.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Minimum)
         self.write = small_button("", "Write", height=32)
-        self.write.setAccessibleName(f"Write the missing text of question {self.line.number}")
+        self.write.setAccessibleName(f"Write the missing text for question {self.line.number}")
         self.write.clicked.connect(self.opened)
         faulty = self.line.faults > 0
         ink: Ink = "bad" if faulty else "text2"

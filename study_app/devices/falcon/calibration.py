@@ -404,7 +404,7 @@ def _read_scale(grip: Grip, ask: Ask) -> float:
             load_n = -1.0
         if 0.0 < load_n <= MOST_N:
             return load_n
-        question = f"'{reading}' is not a number of grams between 0 and 600. What did the scale show?"
+        question = f"'{reading}' is not a weight between 0 and 600 g. What did the scale show?"
 
 
 def _as_notes(notes: list[tuple[Any, float, Any]]) -> Notes:

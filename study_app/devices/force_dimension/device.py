@@ -101,6 +101,6 @@ class ForceDimensionDevice(FramedDevice):
             f"opened: {facts['system']}, serial number {facts.get('serial')}, SDK {facts['sdk']}",
             f"velocity threshold {facts.get('velocity_threshold')}, "
             f"watchdog {'none' if watchdog_s is None else f'{1000 * watchdog_s:.1f} ms'}",
-            f"readings rejected by the time guard: {counters['guarded']}",
+            f"readings rejected by the library's timing check: {counters['guarded']}",
             f"forces beyond the motors' capacity: {counters['saturated']}",
         )

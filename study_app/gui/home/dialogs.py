@@ -419,7 +419,7 @@ class NewSessionDialog(QDialog):
             fault, sign, ink = str(missing), "info", "text2"
         except (StudyError, ValueError) as error:
             fault, sign, ink = str(error), "warning", "bad"
-        sentence = fault or f"{participant} is available for session {session}"
+        sentence = fault or f"The ID {participant} can be used for session {session}"
         by_id = sentence.startswith(f"{participant} ")  # an id is kept as typed
         self.verdict.setText(sentence if by_id else sentence[:1].upper() + sentence[1:])
         set_ink(self.verdict, ink)

@@ -53,7 +53,7 @@ class _Limiter(NamedTuple):
 
 
 LIMITERS: Final = (
-    _Limiter(bit=LIMITER_SLEW, name="slew", label="Slew", meaning="the slew limit slowed the change of force"),
+    _Limiter(bit=LIMITER_SLEW, name="slew", label="Slew", meaning="the slew limit slowed the change in force"),
     _Limiter(bit=LIMITER_FADE, name="fade", label="Fade", meaning="the force was fading in or out", expected=True),
     _Limiter(
         bit=LIMITER_SLOPE, name="slope", label="Slope", meaning="the slope limit reduced the change of force with speed"

@@ -72,10 +72,10 @@ def read_motion(path: Path) -> Motion:
         table = split(decoded(path.read_bytes()), PLACES + VELOCITIES)
     except OSError as error:
         raise StudyError(
-            f"cannot read the motion {path}: {error.strerror}; specify a CSV file with {_HEADER}"
+            f"cannot read the motion file {path}: {error.strerror}; specify a CSV file with {_HEADER}"
         ) from error
     except ValueError as error:
-        raise StudyError(f"cannot read the motion {path}: {error}; specify a CSV file with {_HEADER}") from error
+        raise StudyError(f"cannot read the motion file {path}: {error}; specify a CSV file with {_HEADER}") from error
     header = table.names
     if header not in {PLACES, PLACES + VELOCITIES}:
         permitted = f"the first line must be {','.join(PLACES)}, optionally followed by {','.join(VELOCITIES)}"

@@ -39,7 +39,13 @@ Vector: TypeAlias = tuple[float, float, float]
 Flow: TypeAlias = Annotated[float, within(-100, 100, "liquids around a hand flow at less than 100 m/s")]
 DensityKgM3: TypeAlias = Annotated[
     float,
-    within(0.01, 25_000, "hydrogen has 0.08 kg/m³; osmium, the densest element, has 22 590", 1200, "Density [kg/m³]."),
+    within(
+        0.01,
+        25_000,
+        "the density of hydrogen is 0.08 kg/m³, that of osmium, the densest element, 22 590 kg/m³",
+        1200,
+        "Density [kg/m³].",
+    ),
 ]
 ViscosityPaS: TypeAlias = Annotated[
     float, within(1e-6, 1e6, "gases have 1e-5 Pa·s, honey 10, tar 100", what="Dynamic viscosity [Pa·s].")

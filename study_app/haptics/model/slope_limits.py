@@ -82,7 +82,8 @@ def damping_limits(period_s: float, delay_ticks: int, velocity: Velocity | Devic
     limits = [limit for row in _rows(velocity, period_s) for limit in _neighbours(row, period_s, delay_ticks)]
     if not limits:
         raise StudyError(
-            f"no force is known to be stable at {1 / period_s:g} ticks per second with a delay of {delay_ticks} ticks: "
+            f"no force has been shown to be stable at {1 / period_s:g} ticks per second with a delay of {delay_ticks} "
+            "ticks: "
             "run at 250 Hz or more, with a delay of at most 4 ticks"
         )
     beyond = min(1.0, period_s / min(entry.period_s for entry in slope_limit_table()))

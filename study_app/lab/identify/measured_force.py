@@ -110,7 +110,8 @@ def read_measurement(path: Path) -> Measured | FlowCurve:
     if names == PLACES + _FORCES and {*VELOCITIES} <= {*table.names}:
         names += VELOCITIES
     if lacking := [name for name in names if name not in table.names]:
-        raise StudyError(f"{path} does not have the column {', '.join(lacking)}: the first line must contain {_HEADER}")
+        columns = f"the column{'s' * (len(lacking) > 1)} {', '.join(lacking)}"
+        raise StudyError(f"{path} does not have {columns}: the first line must contain {_HEADER}")
     if twice := [name for name in names if table.names.count(name) > 1]:
         raise StudyError(f"{path} has two columns named {twice[0]}: remove one of them")
     if not table.lines:

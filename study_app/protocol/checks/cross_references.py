@@ -141,7 +141,7 @@ def check_sequences(document: Document) -> Iterator[Fault]:
     unused += [("blocks", name) for name in blocks if "groups" not in document]
     for place in unused if used else ():
         if place[1] not in used:
-            yield Fault(place, "does not occur in sequence", "add it there, or remove it", kind="not in sequence")
+            yield Fault(place, "is not listed in sequence", "add it there, or remove it", kind="not in sequence")
 
 
 def check_repeats(document: Document) -> Iterator[Fault]:
@@ -162,7 +162,7 @@ def check_items(document: Document) -> Iterator[Fault]:
         if (path[1], name) in seen:
             yield Fault(path, f'this questionnaire already has an item "{name}"', "every item needs its own ID")
         elif statements.setdefault(name, text) != text:
-            yield Fault(path, f'item "{name}" has a different text in another questionnaire', "use a different ID")
+            yield Fault(path, f'item "{name}" is worded differently in another questionnaire', "use a different ID")
         seen.add((path[1], name))
 
 
@@ -296,7 +296,9 @@ def check_questions(document: Document) -> Iterator[Fault]:
         if len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
             listed = " and ".join(map(str, sorted(counts)))
             yield Fault(
-                ("scales", name, "labels"), f"has {listed} points", "every language must have the same number of points"
+                ("scales", name, "labels"),
+                f"has {listed} points",
+                "the scale must have the same number of points in every language",
             )
     language = next((name for _, name in entries(document, "study.languages.*") if isinstance(name, str)), "en")
     for path, table in entries(document, "questionnaires.*"):

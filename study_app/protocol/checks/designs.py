@@ -363,8 +363,7 @@ def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
         if standard is not None and design.intervals > 1 and not values[0] < standard < values[1]:
             yield Fault(
                 ("stimuli", str(block.stimulus), "levels"),
-                f"the settings ({values[0]:g} to {values[1]:g}) do not extend to both sides of the standard "
-                f"{standard:g}",
+                f"the settings ({values[0]:g} to {values[1]:g}) do not bracket the standard, {standard:g}",
                 'level = "value", with levels below and above the standard',
             )
             return

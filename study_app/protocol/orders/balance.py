@@ -309,8 +309,8 @@ def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
     elif people % rows == 0 and block.evenness.positions_even:
         rounds = people // rows
         yield (
-            f"{people} participants complete {'a full round' if rounds == 1 else f'{rounds} full rounds'} of {rows} "
-            "rows."
+            f"{people} participants fill {'one full round' if rounds == 1 else f'{rounds} full rounds'} of the {rows} "
+            "rows of orders."
         )
     elif people % rows == 0:
         yield (

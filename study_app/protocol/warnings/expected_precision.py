@@ -464,8 +464,8 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
         if clips is not None and clips.clips_standard:
             what = f"the standard{named} is"
         yield (
-            f"stimuli.{block.stimulus}.levels: ±{100 * precision:g} % cannot be reached at a threshold of "
-            f"{found.threshold:.2g}: {what} clipped"
+            f"stimuli.{block.stimulus}.levels: a precision of ±{100 * precision:g} % cannot be achieved at a threshold "
+            f"of {found.threshold:.2g}, because {what} clipped"
         )
         return
     if (reached := found.of_group(people)) <= precision:

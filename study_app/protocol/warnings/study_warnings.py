@@ -277,7 +277,7 @@ def _attribute_groups(protocol: Protocol) -> Iterator[str]:
         if suggests_attribute(name):
             yield (
                 f"groups.{name}: the name suggests an attribute that participants already have, but groups are "
-                'randomised; if they do have it, choose study.group_assignment = "pre-existing"'
+                'assigned at random; if participants have it, set study.group_assignment = "pre-existing"'
             )
 
 

@@ -121,7 +121,9 @@ def _check_markers(
             unknown -= len(added)
         if outside := len(sent) - 1 - (last - first):
             when = f"{first} before the recording and {len(sent) - 1 - last} after it"
-            findings.warning(session.path, f"{file.name} does not cover {outside} of its {len(sent)} markers: {when}")
+            findings.warning(
+                session.path, f"{outside} of the {len(sent)} markers fall outside the recording {file.name}: {when}"
+            )
         counts = f"{len(known_numbers)} of {len(sent)} recorded, {len(lost)} lost"
         yield f"markers from {name}: {counts}; times agree within {_error_ms(session, stream, at):.2g} ms"
     if unknown:

@@ -349,7 +349,7 @@ def _check_copy(
     known = {place for _, place in copy}
     for session in sessions:
         if session.fingerprint and not session.running and place_of(study, session.place.folder) not in known:
-            lacks = f"(its fingerprint is {session.fingerprint}) is not in {path}"
+            lacks = f"(fingerprint {session.fingerprint}) is not in {path}"
             findings.error(
                 session.place.folder.path, f"{lacks}: the session was added or ended after that copy was made"
             )

@@ -52,7 +52,10 @@ def found(block: BlockResult) -> Found:
 
 
 UNCLEAR = "neither support nor refute the claim that delays of up to 50 ms do not matter"
-BEYOND = "delays of up to 50 ms do not matter: at 50 ms, mean answers to “Different” differ by more than the bound."
+BEYOND = (
+    "delays of up to 50 ms do not matter: at 50 ms, the mean answers to “Different” differ from those at the shortest "
+    "delay by more than the bound."
+)
 WITHIN = "The mean answers to these statements stay within the bounds"
 
 

@@ -979,7 +979,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: any(one["outcome"]["p"] is not None for one in told.block["mixed"]))),
     (rf"In an exploratory analysis, a cumulative logit mixed model with random intercepts( and delay effects)? was "
      rf"fitted to (?:all individual|the participants' median) answers to {N} primary statements?, including the "
-     r"answers of incomplete participants; "
+     r"answers of participants who did not answer in all conditions; "
      r"effects were tested with likelihood-ratio tests, and "
      r"the false discovery rate was controlled \(Benjamini–Hochberg\)\.",
      cumulative_models),

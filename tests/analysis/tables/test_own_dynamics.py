@@ -219,5 +219,5 @@ def test_reaches_are_those_that_the_session_decided_and_absent_recordings_are_to
     assert less.unread == (
         "1 × the recording is missing from the folder",
         "1 × the recording is damaged (liquid-study verify shows which one)",
-        "1 × the recording is sealed (liquid-study unblind opens it)",
+        "1 × the recording is sealed (liquid-study unblind unseals it)",
     )

@@ -64,7 +64,7 @@ def test_time_must_increase(tmp_path):
 @pytest.mark.parametrize("content", [None, b"\xff\xfe\x00", b't_s,"x'])
 def test_a_file_that_cannot_be_read_is_named(tmp_path, content):
     file = tmp_path / "absent.csv" if content is None else written(tmp_path, content)
-    with pytest.raises(StudyError, match=r"cannot read the motion .*csv"):
+    with pytest.raises(StudyError, match=r"cannot read the motion file .*csv"):
         read_motion(file)
 
 

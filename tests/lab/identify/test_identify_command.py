@@ -104,8 +104,8 @@ def test_from_a_file_to_a_preset(tmp_path):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("", "does not have the column t_s, x_m"),
-        ("t_s,x_m,y_m,z_m\n0,0,0,0\n", "does not have the column fx_n, fy_n, fz_n"),
+        ("", "does not have the columns t_s, x_m"),
+        ("t_s,x_m,y_m,z_m\n0,0,0,0\n", "does not have the columns fx_n, fy_n, fz_n"),
         ("t_s,velocity_mps,force_n\n", "has a header but no rows"),
         ("t_s,velocity_mps,force_n\n0,1,2\n0.001,nan,2\n", "line 3: 'nan' is not a finite number"),
         ("t_s,velocity_mps,force_n\n0,1\n", "line 2: has 2 fields"),

@@ -55,7 +55,7 @@ def test_names_that_suggest_an_attribute_are_warned_of_and_no_others() -> None:
 def test_only_randomised_groups_are_warned_of() -> None:
     said = [sentence for sentence in warnings(experts()) if sentence.startswith("groups.")]
     assert [sentence.partition(":")[0] for sentence in said] == ["groups.experts", "groups.novices"]
-    assert all("groups are randomised" in sentence for sentence in said)
+    assert all("groups are assigned at random" in sentence for sentence in said)
     assert not [sentence for sentence in warnings(experts(PREEXISTING)) if sentence.startswith("groups.")]
     assert not [sentence for sentence in warnings(grouped()) if sentence.startswith("groups.")]
 

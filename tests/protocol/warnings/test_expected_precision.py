@@ -98,7 +98,8 @@ def test_where_limits_clip_the_levels_no_precision_is_expected():
         clipped, faults = validate_document(read_document(text.encode(), "clipped.toml")[0])
         assert faults
         assert list(imprecise(clipped, clipped.blocks["thicker"])) == [
-            f"stimuli.damping.levels: ±15 % cannot be reached at a threshold of 0.11: {what} clipped"
+            "stimuli.damping.levels: a precision of ±15 % cannot be achieved at a threshold of 0.11, "
+            f"because {what} clipped"
         ]
         assert dict(precision_rows(clipped, clipped.blocks["thicker"])) == {
             "Expected precision": "not available, because the levels for most thresholds are clipped"

@@ -205,7 +205,7 @@ def test_a_session_that_goes_on_with_another_device_comes_out_to_the_last_bit(tm
     comes_out(place, 2)
     receipt = json.loads((place / "receipt.json").read_text("utf-8"))
     (place / "receipt.json").write_text(json.dumps(receipt | {"resumed": []}), encoding="utf-8", newline="\n")
-    with pytest.raises(StoreError, match="does not contain the device used since"):
+    with pytest.raises(StoreError, match="does not state which device has been used since"):
         replay(place)
 
 
