@@ -491,7 +491,7 @@ class SessionBridge(QObject):
                 self._reconnect()
             case "failed":
                 what, error = details
-                log.error("part of the operator's window failed: %s", what, exc_info=error)
+                log.error("part of the operator's window stopped working: %s", what, exc_info=error)
                 self.record_note(f"part of the operator's window stopped working: {what}")
             case "page":
                 self.participant.bring_forward()
