@@ -789,7 +789,7 @@ def asked_when(story: Story) -> None:
         assert steps.view().isVisible(), key
         story.act("close it", steps.hidePopup)
     assert story.designer.text == before, "keys only open the list"
-    story.choose(steps, "delay")
+    story.choose(steps, "Block Delays")
     story.expect(undo="Add to Session order", at="Add to Session order")
     story.has('sequence = ["welcome", "liquids", "reaching", "delays", "thanks", "delays"]')
     story.play("@pages.welcome")
