@@ -121,27 +121,3 @@ def test_enter_in_the_outline_leads_to_the_first_field_to_type_in_of_each_elemen
     assert landed["blocks", "liquids"] == "Title, English"
     assert landed["questionnaires", "liquid"] == "Introduction, English"
     assert designer.text == text
-
-
-def test_a_letter_at_the_button_that_removes_a_key_is_typed_in_the_field(designer: Any) -> None:
-    designer.open()
-    path = ("pages", "welcome", "button")
-    designer.go_to(*path[:2])
-    before = designer.value(*path)
-    designer.form_row(*path).remove.setFocus()
-    field = designer.hit("x")
-    assert designer.field(*path).isAncestorOf(field)
-    assert (field.words(), designer.value(*path)) == (f"x{before}", before)
-
-
-def test_the_button_that_removes_a_key_is_reached_by_tab_and_pressed_by_space(designer: Any) -> None:
-    designer.open()
-    path = ("pages", "welcome", "button")
-    designer.go_to(*path[:2])
-    row = designer.form_row(*path)
-    assert row.row.is_removable
-    designer.place.parts.focus_header()
-    assert passed(designer, lambda part: part is row.remove)
-    designer.hit("Space")
-    assert path[2] not in designer.study.document["pages"]["welcome"]
-    assert designer.place.form.isAncestorOf(designer.keyboard), "the keyboard stays in the form"

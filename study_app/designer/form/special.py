@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import Any, Final, Literal
 
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.designer.document.elements import distinct_title, title_of
@@ -15,6 +15,7 @@ from study_app.designer.document.fields import Row, label_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import (
+    LANGUAGE,
     Extra,
     Field,
     LanguagesField,
@@ -24,12 +25,14 @@ from study_app.designer.form.fields import (
     TypedSentence,
     add_button,
     kept_value_sentence,
+    remove_button,
+    removes_key,
     typed_value,
 )
 from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left, question_lines
 from study_app.designer.measures.cards import Verdict
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.parts import FIELD_PX, make_dense, small_button
+from study_app.designer.parts import make_dense, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
@@ -259,14 +262,14 @@ class _PointsField(Field):
             cells.addWidget(figures(sign, "label", "text2"), at + 1, 0)
             self.lines.append([TypedLine(f"Point {at + 1}, {language}") for _code, language in languages])
             for column, (line, (code, language)) in enumerate(zip(self.lines[-1], languages, strict=True)):
+                line.setProperty(LANGUAGE, code)
                 line.setPlaceholderText(f"Missing in {language}")
                 if is_right_to_left(code):
                     line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
                 line.typed.connect(partial(self.take_text, at, column))
                 line.came.connect(self.came)
                 cells.addWidget(line, at + 1, column + 1)
-            away = IconButton("cross", f"Remove Point {at + 1}", size=FIELD_PX, role="plain")
-            away.clicked.connect(partial(self.remove, at))
+            away = remove_button(f"Remove Point {at + 1}", partial(self.remove, at))
             cells.addWidget(away, at + 1, len(languages) + 1)
         add_layout(self.box, cells)
         self.add = add_button(f"Add to {row.label}", "Point")
@@ -304,6 +307,13 @@ class _PointsField(Field):
         path = self.row.path
         gone = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._count_written(code))
         self.asked.emit(Several(f"Remove point {at + 1}", tuple(gone)))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        at = next((at for at, lines in enumerate(self.lines) if any(line.hasFocus() for line in lines)), None)
+        if at is not None and removes_key(event):
+            self.remove(at)
+        else:
+            super().keyPressEvent(event)
 
 
 POINTS: Final = SpecialEditor(
@@ -497,6 +507,7 @@ class Hypothesis(QWidget):
     """One hypothesis; ``changed`` carries its current table."""
 
     changed = Signal(object)
+    removed = Signal()
     refused = Signal(str)  # why the typed bound is refused; "" if it is valid
 
     def __init__(self, name: str) -> None:
@@ -515,10 +526,16 @@ class Hypothesis(QWidget):
         self.bound = TypedLine(f"{name}, largest negligible difference")
         self.bound.setFixedWidth(64)
         self.bound.typed.connect(self._take_bound)
-        self.away = IconButton("cross", f"Remove {name}", size=FIELD_PX, role="plain")
+        self.away = remove_button(f"Remove {name}", self.removed.emit)
         above = hbox((self.measure, 3), label("of", "label"), (self.first, 5), self.away, spacing=8)
         below = hbox((self.relation, 3), (self.second, 6), self.within, self.bound, spacing=8)
         vbox(above, below, spacing=4, margins=(0, 0, 0, 6), parent=self)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if removes_key(event):
+            self.removed.emit()
+        else:
+            super().keyPressEvent(event)
 
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
@@ -634,7 +651,7 @@ class _HypothesesField(Field):
         for at, line in enumerate(self.lines):
             line.changed.connect(lambda value, at=at: self._change_hypothesis(at, value))
             line.refused.connect(self._refuse)
-            line.away.clicked.connect(lambda _on=False, at=at: self._remove_hypothesis(at))
+            line.removed.connect(partial(self._remove_hypothesis, at))
             self.box.addWidget(line)
         self.add, self.why = add_button("Add a hypothesis", "Hypothesis"), label("", "small", "text2", wraps=True)
         self.add.clicked.connect(self._add_hypothesis)
