@@ -121,3 +121,34 @@ def test_enter_in_the_outline_leads_to_the_first_field_to_type_in_of_each_elemen
     assert landed["blocks", "liquids"] == "Title, English"
     assert landed["questionnaires", "liquid"] == "Introduction, English"
     assert designer.text == text
+
+
+def test_three_actions_lead_to_a_second_abx_block_at_another_delay(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "late")
+    designer.go_to("blocks", "liquids")
+    hint = designer.field("analysis", "contrasts").why
+    assert "Duplicate (Ctrl+D) asks for the delay" in hint.text(), "no hypothesis is possible before"
+    designer.place.parts.focus_form()
+    before = designer.actions
+    designer.key("ctrl+d")
+    designer.type("80")
+    designer.key("Return")
+    assert designer.actions - before == 3
+    blocks, conditions = designer.value("blocks"), designer.value("conditions")
+    copy = blocks["liquids_80"]
+    assert (copy["conditions"], copy["standard"]) == (("thin_80", "thick_80"), "thin_80")
+    assert copy["title"] == f"{blocks['liquids']['title']}, 80 ms"
+    assert [conditions[name] for name in copy["conditions"]] == [
+        {"liquid": "thin", "delay_ms": 80}, {"liquid": "thick", "delay_ms": 80},
+    ]  # fmt: skip
+    assert (designer.study.faults, designer.editing.selected) == ((), ("blocks", "liquids_80"))
+    assert blocks["liquids"]["conditions"] == ("thin", "thick")
+    assert designer.field("analysis", "contrasts").why.text() == ""
+
+
+def test_a_copy_of_an_abx_block_can_have_the_same_conditions(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "late")
+    designer.go_to("blocks", "liquids")
+    designer.key("ctrl+d")
+    designer.press("Same conditions")
+    assert designer.value("blocks", "liquids_2", "conditions") == ("thin", "thick")

@@ -396,6 +396,10 @@ _NOTHING_TO_COMPARE: Final = (
     "A hypothesis compares two main blocks, two conditions of a block, or two groups. Add a second block, condition or "
     "group first."
 )
+_ONE_RESULT: Final = (
+    "A block with a trial design has one result for all its conditions. To compare two delays, use a block for each: "
+    f"{with_key('Duplicate', 'duplicate')} asks for the delay of the copy."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -430,15 +434,29 @@ class Compared:
         return tuple(measure for measure in self.measures if measure in other.measures)
 
 
-def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
-    """Return the items that hypotheses can compare, in file order."""
+@dataclass(frozen=True, slots=True)
+class Comparable:
+    """The items that hypotheses can compare, in file order, and a hint at what cannot be compared yet."""
+
+    items: tuple[Compared, ...]
+    hint: str
+
+
+def _comparable(study: Study, _row: Row) -> Comparable:
     after = _form_measures(study)
     every = tuple(
         item if item.key == "conditions" else replace(item, measures=(*item.measures, *after.get(item.block, ())))
         for item in _comparable_items(study)
     )
     every += tuple(_interaction_sides(every))
-    return tuple(item for item in every if item.comparable_with(every))
+    items = tuple(item for item in every if item.comparable_with(every))
+    compared = {item.name for item in items if item.key == "blocks"}
+    alone = any(
+        place[1] not in compared and block.get("phase", "main") == "main" and {"design", "conditions"} <= block.keys()
+        for place, block in entries(study.document, "blocks.*")
+        if isinstance(block, Mapping)
+    )
+    return Comparable(items, _ONE_RESULT if alone else "" if items else _NOTHING_TO_COMPARE)
 
 
 def _measures_of_design(study: Study, block: str) -> tuple[tuple[str, str], ...]:
@@ -661,12 +679,12 @@ class _HypothesesField(Field):
 
     def show_value(self) -> None:
         for line, value in zip(self.lines, self.row.value if self.lines else (), strict=False):
-            line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts)
-        self.add.setEnabled(bool(self.row.facts))
-        self.why.setText("" if self.row.facts else _NOTHING_TO_COMPARE)
+            line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts.items)
+        self.add.setEnabled(bool(self.row.facts.items))
+        self.why.setText(self.row.facts.hint)
 
     def _add_hypothesis(self) -> None:
-        values = list(_comparisons(self.row.facts))
+        values = list(_comparisons(self.row.facts.items))
         known = [_comparison(value) for value in self.row.value or () if isinstance(value, Mapping)]
         self.asked.emit(
             AddEntry(self.row.path, next((value for value in values if _comparison(value) not in known), values[0]))
@@ -702,5 +720,5 @@ def _hypothesis_count(row: FormRow) -> int:
 
 
 HYPOTHESES: Final = SpecialEditor(
-    (("Analysis", "contrasts"),), _HypothesesField, wide=True, structure=_hypothesis_count, facts=comparable_items
+    (("Analysis", "contrasts"),), _HypothesesField, wide=True, structure=_hypothesis_count, facts=_comparable
 )
