@@ -81,7 +81,7 @@ class DeleteCard(Prompt):
             element for element in with_references(document, path, study.needs) if element != path and len(element) == 2
         )
         if too := ", ".join(kind_and_title(document, path) for path in gone if isinstance(path[1], str)):
-            self.column.addWidget(label(f"Also deletes: {too}.", "label", wraps=True))
+            self.column.addWidget(label(f"“Delete them too” also deletes {too}.", "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
         self.gaps = ActionButton("", "Leave gaps", height=40)

@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
+from study_app.designer.measures.study_facts import revealing_texts
 from study_app.designer.outline import ROW_ROLE
 from study_app.designer.window import focus_stops
 from study_app.gui.kit.commands import COMMANDS
@@ -144,6 +145,7 @@ def test_three_actions_lead_to_a_second_abx_block_at_another_delay(designer: Any
     assert (designer.study.faults, designer.editing.selected) == ((), ("blocks", "liquids_80"))
     assert blocks["liquids"]["conditions"] == ("thin", "thick")
     assert designer.field("analysis", "contrasts").why.text() == ""
+    assert revealing_texts(designer.study, designer.study.protocol) == (), "participants do not read its title"
 
 
 def test_a_copy_of_an_abx_block_can_have_the_same_conditions(designer: Any) -> None:
