@@ -124,6 +124,16 @@ def test_enter_in_the_outline_leads_to_the_first_field_to_type_in_of_each_elemen
     assert designer.text == text
 
 
+def test_delete_changes_nothing_in_the_field_to_which_the_outline_leads(designer: Any) -> None:
+    designer.open("kitchen", "liquids", "thin", width=1366)
+    before = designer.text
+    designer.hit("ctrl+1")
+    field = designer.hit("Return")
+    assert designer.field("liquids", "thin", "density_kg_m3").isAncestorOf(field)
+    designer.hit("Delete")
+    assert (field.text(), designer.text) == ("1000", before)
+
+
 def test_three_actions_lead_to_a_second_abx_block_at_another_delay(designer: Any) -> None:
     designer.controller.begin_study("template:two-liquids-abx", "late")
     designer.go_to("blocks", "liquids")

@@ -850,6 +850,8 @@ class FormCard(Card):
         """Focus the first field to type in, in the first language, or the first row in a form without such a field."""
         if (field := next(self._typed_fields(), None)) is not None:
             self._focus_typed(field)
+            if isinstance(field, TypedLine):
+                field.end(False)  # otherwise the key Delete, meant for the element, deletes a letter
         else:
             self.focus_first()
 
