@@ -21,7 +21,7 @@ from study_app.designer.document.document import (
     with_answers,
 )
 from study_app.designer.document.fields import edits_to_rename
-from study_app.designer.document.steps import DeleteElement, Do, RenameElement, Request, Step, Task
+from study_app.designer.document.steps import DeleteElement, Do, DuplicateElement, RenameElement, Request, Step, Task
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.editing import Editing
@@ -75,7 +75,8 @@ class DesignerController(QObject):
             "select": editing.select, "back": editing.go_back, "undo": editing.undo, "redo": editing.redo,
             "save": self.saving.save, "banner": self.saving.answer_banner, "open": self.open, "new": self.show_new_page,
             "begin": self.begin_study, "find": self.find_elements, "add": self._show_addable,
-            "delete": self.ask_to_delete, "series": self.show_series_card, "judge id": self._judge_id,
+            "delete": self.ask_to_delete, "duplicate": self.ask_to_duplicate, "series": self.show_series_card,
+            "judge id": self._judge_id,
             "repair": self.make_repair, "leave entries": editing.leave_entries, "repairs": self._repairs.show_repairs,
         }  # fmt: skip
         place.asked.connect(self.handle_request)
@@ -199,6 +200,19 @@ class DesignerController(QObject):
             self.place.show_prompt(card, card.first)
         else:
             self.editing.handle_request(DeleteElement(path))
+
+    def ask_to_duplicate(self, path: Place) -> None:
+        """Copy an element; for a block that compares conditions by a design, ask how those of the copy differ."""
+        opened = self.editing.writable
+        if opened is None:
+            return
+        numbers = [row for row in number_rows(opened.study.document, path) if row.path[:2] != path]
+        if numbers:
+            card = SeriesCard(opened.study, path, numbers, duplicates=True)
+            card.answered.connect(self.editing.handle_request)
+            self.place.show_prompt(card, card.first)
+        else:
+            self.editing.handle_request(DuplicateElement(path))
 
     def show_series_card(self, path: Place) -> None:
         if (opened := self.editing.opened) is None:

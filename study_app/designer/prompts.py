@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QLineEdit, QScrollArea, QWidget
 
 from study_app.designer.document.elements import element_of, kind_and_title, title_of
 from study_app.designer.document.fields import Row, label_of, orphaned_keys, references_to, with_references
-from study_app.designer.document.steps import DeleteElement, MakeSeries, Situation, index_of
+from study_app.designer.document.steps import DeleteElement, DuplicateElement, MakeSeries, Situation, index_of
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.parts import make_dense
@@ -81,7 +81,7 @@ class DeleteCard(Prompt):
             element for element in with_references(document, path, study.needs) if element != path and len(element) == 2
         )
         if too := ", ".join(kind_and_title(document, path) for path in gone if isinstance(path[1], str)):
-            self.column.addWidget(label(f"Also deletes: {too}.", "label", wraps=True))
+            self.column.addWidget(label(f"“Delete them too” also deletes {too}.", "label", wraps=True))
         self.all = ActionButton("trash", "Delete them too", role="danger", height=40)
         self.all.clicked.connect(lambda: self.answered.emit(DeleteElement(path, "all")))
         self.gaps = ActionButton("", "Leave gaps", height=40)
@@ -116,23 +116,35 @@ class ConfirmCard(Prompt):
 
 
 class SeriesCard(Prompt):
-    """The number that varies between copies of an element, and its values, with the titles of the copies."""
+    """The number that varies between copies of an element, and its values, with the titles of the copies.
 
-    def __init__(self, study: Study, path: Path, numbers: Sequence[Row]) -> None:
+    ``duplicates`` offers a copy with the same conditions, too: it is asked of a block whose copy has other conditions.
+    """
+
+    def __init__(self, study: Study, path: Path, numbers: Sequence[Row], *, duplicates: bool = False) -> None:
         title = title_of(study.document, path)
         where = "the session" if path[0] == "blocks" else "the blocks that use the original"
-        super().__init__(f"Series of {title}", f"Enter one value per copy of {title}. The copies are added to {where}.")
+        heading = f"Series of {title}"
+        explanation = f"Enter one value per copy of {title}. The copies are added to {where}."
+        if duplicates:
+            heading = f"Duplicate {title}"
+            explanation = "Enter the value for the copy's own conditions, such as a delay, or keep the same conditions."
+        super().__init__(heading, explanation)
         self.study, self.path, self.numbers = study, path, numbers
         self.number = make_dense(Choice(), "Value to vary")
         for row in numbers:
             number_title = ", ".join(label_of(step) for step in row.path[2:])
+            number_title += " of its conditions" if row.path[:2] != path else ""
             self.number.addItem(f"{number_title} [{row.unit}]" if row.unit else number_title)
         self.values = make_dense(QLineEdit(), "Values for the copies")
         self.values.setPlaceholderText("60 120 240")
         self.copies = label("", "label", wraps=True)
+        self.same = ActionButton("", "Same conditions", height=40)
+        self.same.clicked.connect(lambda: self.answered.emit(DuplicateElement(path)))
         self.make = ActionButton("bars", "Make the copies", role="primary", height=40)
-        self.buttons.addWidget(self.make)
+        add_parts(self.buttons, self.same, self.make)
         add_parts(self.column, hbox(self.number, (self.values, 1), spacing=10), self.copies, self.buttons)
+        self.same.setVisible(duplicates)
         self.values.textChanged.connect(self._show_titles)
         self.number.activated.connect(self._show_titles)
         self.values.returnPressed.connect(self.make.click)

@@ -11,7 +11,6 @@ from PySide6.QtWidgets import QAbstractScrollArea, QAbstractSlider, QApplication
 
 from study_app.designer.document.steps import (
     Do,
-    DuplicateElement,
     GoTo,
     LeaveText,
     MoveElement,
@@ -543,8 +542,7 @@ class DesignerPlace(Place):
 
     def duplicate(self) -> None:
         if self.form.head.copy.isEnabled():
-            self.flush()
-            self.asked.emit(DuplicateElement(self.form_path))
+            self.finish("duplicate", self.form_path)
 
     def make_series(self) -> None:
         if self.view.form is not None:

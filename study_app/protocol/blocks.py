@@ -180,7 +180,7 @@ class Block(Table):
             message = "the block has one condition, but its design compares at least two"
             raise invalid(message, "conditions", "add another condition")
         if what == "a design" and self.standard not in self.conditions:
-            raise invalid("must be one of the block's conditions", "standard")
+            raise invalid("must be one of the block's conditions", "standard", use=("standard", self.conditions[0]))
         return self
 
     @model_validator(mode="after")

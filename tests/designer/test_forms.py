@@ -10,6 +10,7 @@ from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
+from study_app.designer.document.elements import title_of
 from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
 from study_app.designer.document.toml_edits import Set, Unset
 from study_app.designer.window import focus_stops
@@ -205,10 +206,17 @@ def test_add_offers_the_conditions_that_a_block_does_not_have(designer: Any) -> 
     assert 0 < len(listed) < len(conditions)
     field = designer.field("blocks", "liquids", "conditions")
     offered = {field.names.itemText(at) for at in range(field.names.count())}
-    assert offered == {*conditions, "New condition …"} - {*listed}
-    designer.go_to("sequence")
+    titles = {title_of(designer.study.document, ("conditions", name)) for name in {*conditions} - {*listed}}
+    assert offered == {*titles, "New condition …"}
+
+
+def test_add_to_the_session_shows_titles(designer: Any) -> None:
+    designer.open("kitchen", "sequence")
     names = designer.field("sequence").names
-    assert "welcome" in {names.itemText(at) for at in range(names.count())}, "a step can be repeated"
+    at = names.findText("Page A first look")
+    assert at >= 0, "a step can be repeated"
+    names.activated.emit(at)
+    assert designer.value("sequence")[-1] == "welcome"
 
 
 def test_the_next_problem_of_a_scale_is_its_first_missing_label(designer: Any) -> None:

@@ -7,6 +7,7 @@ import pytest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
+from study_app.designer.measures.study_facts import revealing_texts
 from study_app.designer.outline import ROW_ROLE
 from study_app.designer.window import focus_stops
 from study_app.gui.kit.commands import COMMANDS
@@ -123,25 +124,43 @@ def test_enter_in_the_outline_leads_to_the_first_field_to_type_in_of_each_elemen
     assert designer.text == text
 
 
-def test_a_letter_at_the_button_that_removes_a_key_is_typed_in_the_field(designer: Any) -> None:
-    designer.open()
-    path = ("pages", "welcome", "button")
-    designer.go_to(*path[:2])
-    before = designer.value(*path)
-    designer.form_row(*path).remove.setFocus()
-    field = designer.hit("x")
-    assert designer.field(*path).isAncestorOf(field)
-    assert (field.words(), designer.value(*path)) == (f"x{before}", before)
+def test_delete_changes_nothing_in_the_field_to_which_the_outline_leads(designer: Any) -> None:
+    designer.open("kitchen", "liquids", "thin", width=1366)
+    before = designer.text
+    designer.hit("ctrl+1")
+    field = designer.hit("Return")
+    assert designer.field("liquids", "thin", "density_kg_m3").isAncestorOf(field)
+    designer.hit("Delete")
+    assert (field.text(), designer.text) == ("1000", before)
 
 
-def test_the_button_that_removes_a_key_is_reached_by_tab_and_pressed_by_space(designer: Any) -> None:
-    designer.open()
-    path = ("pages", "welcome", "button")
-    designer.go_to(*path[:2])
-    row = designer.form_row(*path)
-    assert row.row.is_removable
-    designer.place.parts.focus_header()
-    assert passed(designer, lambda part: part is row.remove)
-    designer.hit("Space")
-    assert path[2] not in designer.study.document["pages"]["welcome"]
-    assert designer.place.form.isAncestorOf(designer.keyboard), "the keyboard stays in the form"
+def test_three_actions_lead_to_a_second_abx_block_at_another_delay(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "late")
+    designer.go_to("blocks", "liquids")
+    hint = designer.field("analysis", "contrasts").why
+    assert "Duplicate (Ctrl+D) asks for the delay" in hint.text(), "no hypothesis is possible before"
+    designer.place.parts.focus_form()
+    before = designer.actions
+    designer.key("ctrl+d")
+    designer.type("80")
+    designer.key("Return")
+    assert designer.actions - before == 3
+    blocks, conditions = designer.value("blocks"), designer.value("conditions")
+    copy = blocks["liquids_80"]
+    assert (copy["conditions"], copy["standard"]) == (("thin_80", "thick_80"), "thin_80")
+    assert copy["title"] == f"{blocks['liquids']['title']}, 80 ms"
+    assert [conditions[name] for name in copy["conditions"]] == [
+        {"liquid": "thin", "delay_ms": 80}, {"liquid": "thick", "delay_ms": 80},
+    ]  # fmt: skip
+    assert (designer.study.faults, designer.editing.selected) == ((), ("blocks", "liquids_80"))
+    assert blocks["liquids"]["conditions"] == ("thin", "thick")
+    assert designer.field("analysis", "contrasts").why.text() == ""
+    assert revealing_texts(designer.study, designer.study.protocol) == (), "participants do not read its title"
+
+
+def test_a_copy_of_an_abx_block_can_have_the_same_conditions(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "late")
+    designer.go_to("blocks", "liquids")
+    designer.key("ctrl+d")
+    designer.press("Same conditions")
+    assert designer.value("blocks", "liquids_2", "conditions") == ("thin", "thick")

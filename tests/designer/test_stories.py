@@ -439,7 +439,7 @@ def fields(story: Story) -> None:
     story.play("@blocks.liquids :blocks.liquids.repetitions ctrl+a '2x' Tab")
     assert field(*REPETITIONS).line.text() == "2x"
     assert "“2x” is not a number" in form()
-    story.expect(undo="", at="Remove Repetitions from the file")
+    story.expect(undo="", at="Order")
     story.play("shift+Tab Escape")
     assert (field(*REPETITIONS).line.text(), "“2x” is not a number" in form()) == ("1", False)
     story.play("@liquids.thin :liquids.thin.density_kg_m3 ctrl+a '12x' Return")
@@ -468,7 +468,7 @@ def fields(story: Story) -> None:
     story.play("Escape")
     assert designer.value("conditions", "thin", "view") == ""
     delay = ("conditions", "thin", "force_delay_ms")
-    for typed, leave, then in (("7", "Tab", "Remove Force delay from the file"), ("8", "shift+Tab", "Hidden")):
+    for typed, leave, then in (("7", "Tab", "Force jitter"), ("8", "shift+Tab", "Hidden")):
         story.play(f":{'.'.join(delay)} '{typed}' {leave}")
         assert designer.value(*delay) == int(typed)
         story.expect(undo="Change Force delay", at=then)
@@ -683,7 +683,7 @@ def tab_key(story: Story) -> None:
             designer.hit("Tab")
         return [name for name, _ in groupby(entered)]
 
-    assert areas(85) == ["header", "banner", "outline", "question", "form", "views", "problems"]
+    assert areas(78) == ["header", "banner", "outline", "question", "form", "views", "problems"]
     story.act("answer", place.prompt.cancel.click)
     story.act("smaller", lambda: designer.window.resize(1366, 800))
     assert areas(30) == ["header", "banner", "path", "form"]
@@ -789,7 +789,7 @@ def asked_when(story: Story) -> None:
         assert steps.view().isVisible(), key
         story.act("close it", steps.hidePopup)
     assert story.designer.text == before, "keys only open the list"
-    story.choose(steps, "delay")
+    story.choose(steps, "Block Delays")
     story.expect(undo="Add to Session order", at="Add to Session order")
     story.has('sequence = ["welcome", "liquids", "reaching", "delays", "thanks", "delays"]')
     story.play("@pages.welcome")

@@ -200,18 +200,18 @@ def test_a_field_that_is_added_is_unfinished_until_another_one_has_the_keyboard(
 
 
 DELETED = {
-    "a field": (("pages", "welcome", "button"), "Remove Button from the file", "Button"),
-    "a number": ((*BLOCK, "repetitions"), "Remove Repetitions from the file", "Repetitions"),
-    "a condition": ((*BLOCK, "conditions"), "Remove Thin from Conditions", "condition 1"),
-    "a point": (("scales", "agreement", "labels"), "Remove Point 2", "point 2"),
-    "a hypothesis": (("analysis", "contrasts"), "Remove Hypothesis 1", "hypothesis 1"),
+    "a field": (("pages", "welcome", "button"), "Button", "ctrl+Delete", "Button"),
+    "a number": ((*BLOCK, "repetitions"), "Repetitions", "ctrl+Delete", "Repetitions"),
+    "a condition": ((*BLOCK, "conditions"), "Conditions", "Delete", "condition 1"),
+    "a point": (("scales", "agreement", "labels"), "Point 2, English", "ctrl+Delete", "point 2"),
+    "a hypothesis": (("analysis", "contrasts"), "Hypothesis 1, than what", "ctrl+Delete", "hypothesis 1"),
 }
-"""For each kind: its row, the name of its button, and what the deletion is called."""
+"""For each kind: its row, its field, its keys, and what the deletion is called."""
 
 
 @pytest.mark.parametrize("kind", DELETED)
-def test_a_deletion_by_space_says_how_to_undo_it(designer: Any, kind: str) -> None:
-    path, button, name = DELETED[kind]
+def test_a_deletion_by_keys_says_how_to_undo_it_and_tab_skips_its_button(designer: Any, kind: str) -> None:
+    path, field, keys, name = DELETED[kind]
     designer.window.resize(1366, 700)
     begin(designer)
     if kind == "a hypothesis":
@@ -222,10 +222,11 @@ def test_a_deletion_by_space_says_how_to_undo_it(designer: Any, kind: str) -> No
         designer.go_to(*path[:2])
     before = designer.text
     row = designer.form_row(*path)
-    cross = next(part for part in row.findChildren(QWidget) if part.accessibleName() == button)
-    cross.setFocus()
+    stops = {part.accessibleName(): part for part in focus_stops(row)}
+    assert not [stop for stop in stops if stop.startswith("Remove ")]
+    stops[field].setFocus(Qt.FocusReason.TabFocusReason)
     designer.place.problems.show()  # the form is low then
-    designer.hit("space")
+    designer.hit(keys)
     assert designer.text != before
     form = designer.place.form
     assert form.foot.isVisible()

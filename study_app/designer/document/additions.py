@@ -496,12 +496,22 @@ _DEEPEST: Final = 2
 def number_rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
     """Return the numbers of an element that a series can vary, in the order of its form.
 
-    Pages differ only in their texts, so they have none.
+    Pages differ only in their texts, so they have none. A block that compares conditions by a design also has those of
+    its first condition: its copy then has its own conditions.
     """
     section = row_at(document, path[:1])
     if len(path) != 2 or path[0] == "pages" or section is None or section.kind != "tables":
         return ()
-    return tuple(_number_rows(document, path, _DEEPEST)) if isinstance(value_at(document, path), Mapping) else ()
+    value = value_at(document, path)
+    compared = _compared_conditions(value)[:1]
+    varied = [table for table in (path, *compared) if isinstance(value_at(document, table), Mapping)]
+    return tuple(row for table in varied for row in _number_rows(document, table, _DEEPEST))
+
+
+def _compared_conditions(block: Any) -> tuple[Path, ...]:
+    """Return the paths of the conditions that a block compares by a design."""
+    names_in_block = block.get("conditions") if isinstance(block, Mapping) and "design" in block else None
+    return tuple(("conditions", name) for name in names_in_block) if isinstance(names_in_block, tuple) else ()
 
 
 def _number_rows(document: Mapping[str, Any], path: Path, deepest: int) -> Iterator[Row]:
@@ -518,8 +528,8 @@ def _number_rows(document: Mapping[str, Any], path: Path, deepest: int) -> Itera
 
 
 def number_row(document: Mapping[str, Any], path: Path, field: Path) -> Row:
-    """Return the number of an element that a series varies."""
-    number = next((row for row in number_rows(document, path) if row.path == field), None)
+    """Return the number that a series varies, ``field`` in the element or in one of which it is a copy."""
+    number = next((row for row in number_rows(document, path) if row.path[2:] == field[2:]), None)
     if number is None:
         raise Refused("choose one of this element's numeric fields")
     return number
@@ -539,13 +549,24 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
 
 
 def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:
-    """Return the edits that copy an element with another number in its id and titles, and the path of the copy."""
+    """Return the edits that copy an element with another number in its id and titles, and the path of the copy.
+
+    If it is a number of a block's conditions, these are copied too.
+    """
     word = _number_in_id(value)
     stem = str(path[1]).removesuffix("" if row.value is None else f"_{_number_in_id(row.value)}")
     name = f"{stem[: MAX_ID - len(word) - 1]}_{word}"
     edits, copy = edits_to_duplicate(study, path, free_id(names(study.document, str(path[0])), name))
-    titles = (Set((*copy, *place), text) for place, text in _titles_of_copy(study.document, path, row, value))
-    return (*edits, Set((*copy, *row.path[2:]), value), *titles), copy
+    edits += tuple(Set((*copy, *place), text) for place, text in _titles_of_copy(study.document, path, row, value))
+    if row.path[:2] == path:
+        return (*edits, Set((*copy, *row.path[2:]), value)), copy
+    block, own = value_at(study.document, path), dict[str, str]()
+    for condition in dict.fromkeys(_compared_conditions(block)):
+        after, _ = study.with_edits(*edits)
+        made, own_path = edits_to_copy_with(after, condition, number_row(after.document, condition, row.path), value)
+        edits, own[str(condition[1])] = (*edits, *made), str(own_path[1])
+    edits = (*edits, Set((*copy, "conditions"), [own[name] for name in block["conditions"]]))
+    return (*edits, *(Set((*copy, "standard"), own[name]) for name in own if name == block.get("standard"))), copy
 
 
 def _titles_of_copy(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:

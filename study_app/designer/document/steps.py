@@ -420,7 +420,7 @@ class DuplicateElement(Request):
 
 @dataclass(frozen=True, slots=True)
 class MakeSeries(Request):
-    """Copy an element once for each value of the number ``field``.
+    """Copy an element once for each value of the number ``field``, which may be one of a block's conditions.
 
     A copy is added to the blocks that list the element, unless this would cause a problem in the block.
     """
@@ -435,7 +435,7 @@ class MakeSeries(Request):
         edits: tuple[Edit, ...] = ()
         paths, now = [self.path], study
         for value in self.values:
-            row = number_row(now.document, paths[-1], (*paths[-1], *self.field[2:]))
+            row = number_row(now.document, paths[-1], self.field)
             made, copy = edits_to_copy_with(now, paths[-1], row, value)
             made = _edits_beside(now, made, paths[-1], copy)
             now, _ = now.with_edits(*made)
@@ -571,7 +571,7 @@ class Several(Request):
 
 Task: TypeAlias = Literal[
     "select", "write", "back", "find", "undo", "redo", "save", "open", "new", "begin", "banner", "add", "copy",
-    "delete", "series", "judge id", "repair", "repairs", "leave entries",
+    "delete", "duplicate", "series", "judge id", "repair", "repairs", "leave entries",
 ]  # fmt: skip
 
 

@@ -35,6 +35,7 @@ from study_app.designer.form.fields import (
     UnknownField,
     add_button,
     is_stacked,
+    remove_button,
     removes_key,
 )
 from study_app.designer.form.lists import CONDITIONS, EntriesField, EntryList, LanguageListField, LinesField
@@ -199,9 +200,7 @@ class _RowWidget(Themed, QWidget):
         self.words.setMinimumHeight(FIELD_PX)
         self.words.setAlignment(Qt.AlignmentFlag.AlignVCenter)
         self.words.setBuddy(self.field)
-        removes = f"Remove {row.label} from the file"
-        self.remove = IconButton("cross", removes, with_key(removes, "remove"), size=FIELD_PX, role="plain")
-        self.remove.clicked.connect(self._ask_to_remove)
+        self.remove = remove_button(f"Remove {row.label} from the file", self._ask_to_remove)
         room = self.remove.sizePolicy()
         room.setRetainSizeWhenHidden(True)
         self.remove.setSizePolicy(room)
@@ -262,8 +261,6 @@ class _RowWidget(Themed, QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if removes_key(event) and self.row.is_removable and self.remove.isEnabled():
             self._ask_to_remove()
-        elif self.remove.hasFocus() and event.text().strip() and event.text().isprintable():
-            self._type_letter(event)  # it is meant for the field
         else:
             super().keyPressEvent(event)
 
@@ -853,6 +850,8 @@ class FormCard(Card):
         """Focus the first field to type in, in the first language, or the first row in a form without such a field."""
         if (field := next(self._typed_fields(), None)) is not None:
             self._focus_typed(field)
+            if isinstance(field, TypedLine):
+                field.end(False)  # otherwise the key Delete, meant for the element, deletes a letter
         else:
             self.focus_first()
 

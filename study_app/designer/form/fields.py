@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from PySide6.QtCore import QEvent, QMimeData, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QFocusEvent, QKeyEvent, QKeySequence, QResizeEvent
@@ -43,10 +43,21 @@ _LINE_BREAK = re.compile(r"\s*[\r\n\u2028\u2029]+\s*")
 _WINDOW_REASONS = {Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason}
 KEYS_OF_PLACE = (QKeySequence.StandardKey.Undo, QKeySequence.StandardKey.Redo, QKeySequence.StandardKey.Save)
 
+LANGUAGE: Final = "language"
+"""The property of a field with the code of its text's language."""
+
 
 def removes_key(event: QKeyEvent) -> bool:
     """Return whether a key press removes the field's key from the file."""
     return QKeySequence(event.keyCombination()) == QKeySequence(keys_of("remove")[0])
+
+
+def remove_button(name: str, remove: Callable[[], object]) -> IconButton:
+    """Return a × that Tab skips, because a key in its field does the same."""
+    made = IconButton("cross", name, with_key(name, "remove"), size=FIELD_PX, role="plain")
+    made.setFocusPolicy(Qt.FocusPolicy.ClickFocus)
+    made.clicked.connect(lambda _on=False: remove())
+    return made
 
 
 if TYPE_CHECKING:
@@ -659,6 +670,7 @@ class LanguagesField(Field):
         for code, language in row.languages:
             name = row.label if len(row.languages) == 1 else f"{row.label}, {language}"
             made = (TypedText if several else typed_in)(name)
+            made.setProperty(LANGUAGE, code)
             if len(row.languages) > 1:
                 made.setPlaceholderText(f"Missing in {language}")
                 made.setToolTip(plain_tip(language))

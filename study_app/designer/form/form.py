@@ -16,6 +16,7 @@ from study_app.designer.document.elements import (
     rows_of_blocks,
     short_note,
     title_of,
+    unique_name,
     usage_text,
 )
 from study_app.designer.document.fields import (
@@ -33,6 +34,7 @@ from study_app.designer.document.fields import (
 )
 from study_app.designer.document.steps import (
     AddElement,
+    AddEntry,
     AddNamed,
     AddToSession,
     Request,
@@ -59,7 +61,7 @@ from study_app.number_text import capitalised
 from study_app.protocol.checks.designs import missing_for_rule
 from study_app.protocol.groups import ASSIGNMENT, sequences_in
 from study_app.protocol.model import RULE_LIMITS
-from study_app.protocol.source.document import Path, Places, names, places_of, value_at
+from study_app.protocol.source.document import Path, Places, has, names, places_of, value_at
 from study_app.protocol.source.problems import Fault
 from study_app.protocol.warnings.untranslated import untranslated_at
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
@@ -302,7 +304,11 @@ def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:
 
 
 def _additions(study: Study, row: Row) -> Iterator[tuple[str, Request]]:
-    """Yield the labels and requests that add a liquid, or an element to which a reference then refers."""
+    """Yield the labels and requests that add a liquid, a reference, or an element to which a reference then refers."""
+    repeats = row.path[0] == "sequences" or row.path[-1] == "sequence"
+    for name in (str(choice.value) for choice in row.choices if row.kind == "references"):
+        if repeats or name not in (row.value or ()):
+            yield _label_to_add(study.document, row, name), AddEntry(row.path, name)
     for section in row.sections:
         yield new_element_label(section), AddNamed(row.path, section)
     if row.path == ("liquids",):
@@ -310,6 +316,15 @@ def _additions(study: Study, row: Row) -> Iterator[tuple[str, Request]]:
         yield from ((asked.words, asked) for asked in shipped_liquids_to_add(study))
     elif row.kind == "reference" and row.sections == ("liquids",):
         yield from ((asked.words, asked) for asked in shipped_liquids_to_add(study, row.path))
+
+
+def _label_to_add(document: Mapping[str, Any], row: Row, name: str) -> str:
+    """Return the title of an element that a list can refer to, with its kind if the list has several kinds."""
+    sections = (*row.sections, "liquids")  # without conditions, each liquid is one
+    path = next(((section, name) for section in sections if has(document.get(section), name)), None)
+    if path is None:
+        return name
+    return unique_name(document, path) if len(row.sections) > 1 else distinct_title(document, path)
 
 
 def _entries(study: Study, row: Row) -> Iterator[Entry]:

@@ -292,11 +292,7 @@ class EntriesField(EntryList):
     def show_value(self) -> None:
         super().show_value()
         if self.names is not None:
-            row = self.row
-            repeats = row.path[0] == "sequences" or row.path[-1] == "sequence"
-            names = [str(choice.value) for choice in row.choices if repeats or choice.value not in (row.value or ())]
-            items: list[tuple[str, Request]] = [(name, AddEntry(row.path, name)) for name in names]
-            self.names.show_items([*items, *row.additions])
+            self.names.show_items(self.row.additions)
 
     def fill_rows(self) -> None:
         label, count = self.row.label, len(self.row.entries)

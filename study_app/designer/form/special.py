@@ -7,7 +7,7 @@ from itertools import combinations
 from typing import Any, Final, Literal
 
 from PySide6.QtCore import QRectF, Qt, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QBoxLayout, QLabel, QSizePolicy, QWidget
 
 from study_app.designer.document.elements import distinct_title, title_of
@@ -15,6 +15,7 @@ from study_app.designer.document.fields import Row, label_of
 from study_app.designer.document.steps import AddElement, AddEntry, Do, RemoveKey, Request, SetValue, Several
 from study_app.designer.document.study import Study
 from study_app.designer.form.fields import (
+    LANGUAGE,
     Extra,
     Field,
     LanguagesField,
@@ -24,12 +25,14 @@ from study_app.designer.form.fields import (
     TypedSentence,
     add_button,
     kept_value_sentence,
+    remove_button,
+    removes_key,
     typed_value,
 )
 from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left, question_lines
 from study_app.designer.measures.cards import Verdict
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.parts import FIELD_PX, make_dense, small_button
+from study_app.designer.parts import make_dense, small_button
 from study_app.gui.kit.commands import with_key
 from study_app.gui.theme.theme import TypeRole, font
 from study_app.gui.theme.themed import Themed, remove_widget
@@ -259,14 +262,14 @@ class _PointsField(Field):
             cells.addWidget(figures(sign, "label", "text2"), at + 1, 0)
             self.lines.append([TypedLine(f"Point {at + 1}, {language}") for _code, language in languages])
             for column, (line, (code, language)) in enumerate(zip(self.lines[-1], languages, strict=True)):
+                line.setProperty(LANGUAGE, code)
                 line.setPlaceholderText(f"Missing in {language}")
                 if is_right_to_left(code):
                     line.setLayoutDirection(Qt.LayoutDirection.RightToLeft)
                 line.typed.connect(partial(self.take_text, at, column))
                 line.came.connect(self.came)
                 cells.addWidget(line, at + 1, column + 1)
-            away = IconButton("cross", f"Remove Point {at + 1}", size=FIELD_PX, role="plain")
-            away.clicked.connect(partial(self.remove, at))
+            away = remove_button(f"Remove Point {at + 1}", partial(self.remove, at))
             cells.addWidget(away, at + 1, len(languages) + 1)
         add_layout(self.box, cells)
         self.add = add_button(f"Add to {row.label}", "Point")
@@ -304,6 +307,13 @@ class _PointsField(Field):
         path = self.row.path
         gone = (RemoveKey((*path, code, at)) for code, _ in self.row.facts.languages if at < self._count_written(code))
         self.asked.emit(Several(f"Remove point {at + 1}", tuple(gone)))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        at = next((at for at, lines in enumerate(self.lines) if any(line.hasFocus() for line in lines)), None)
+        if at is not None and removes_key(event):
+            self.remove(at)
+        else:
+            super().keyPressEvent(event)
 
 
 POINTS: Final = SpecialEditor(
@@ -386,6 +396,10 @@ _NOTHING_TO_COMPARE: Final = (
     "A hypothesis compares two main blocks, two conditions of a block, or two groups. Add a second block, condition or "
     "group first."
 )
+_ONE_RESULT: Final = (
+    "A block with a trial design has one result for all its conditions. To compare two delays, use a block for each: "
+    f"{with_key('Duplicate', 'duplicate')} asks for the delay of the copy."
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -420,15 +434,29 @@ class Compared:
         return tuple(measure for measure in self.measures if measure in other.measures)
 
 
-def comparable_items(study: Study, _row: Row) -> tuple[Compared, ...]:
-    """Return the items that hypotheses can compare, in file order."""
+@dataclass(frozen=True, slots=True)
+class Comparable:
+    """The items that hypotheses can compare, in file order, and a hint at what cannot be compared yet."""
+
+    items: tuple[Compared, ...]
+    hint: str
+
+
+def _comparable(study: Study, _row: Row) -> Comparable:
     after = _form_measures(study)
     every = tuple(
         item if item.key == "conditions" else replace(item, measures=(*item.measures, *after.get(item.block, ())))
         for item in _comparable_items(study)
     )
     every += tuple(_interaction_sides(every))
-    return tuple(item for item in every if item.comparable_with(every))
+    items = tuple(item for item in every if item.comparable_with(every))
+    compared = {item.name for item in items if item.key == "blocks"}
+    alone = any(
+        place[1] not in compared and block.get("phase", "main") == "main" and {"design", "conditions"} <= block.keys()
+        for place, block in entries(study.document, "blocks.*")
+        if isinstance(block, Mapping)
+    )
+    return Comparable(items, _ONE_RESULT if alone else "" if items else _NOTHING_TO_COMPARE)
 
 
 def _measures_of_design(study: Study, block: str) -> tuple[tuple[str, str], ...]:
@@ -497,6 +525,7 @@ class Hypothesis(QWidget):
     """One hypothesis; ``changed`` carries its current table."""
 
     changed = Signal(object)
+    removed = Signal()
     refused = Signal(str)  # why the typed bound is refused; "" if it is valid
 
     def __init__(self, name: str) -> None:
@@ -515,10 +544,16 @@ class Hypothesis(QWidget):
         self.bound = TypedLine(f"{name}, largest negligible difference")
         self.bound.setFixedWidth(64)
         self.bound.typed.connect(self._take_bound)
-        self.away = IconButton("cross", f"Remove {name}", size=FIELD_PX, role="plain")
+        self.away = remove_button(f"Remove {name}", self.removed.emit)
         above = hbox((self.measure, 3), label("of", "label"), (self.first, 5), self.away, spacing=8)
         below = hbox((self.relation, 3), (self.second, 6), self.within, self.bound, spacing=8)
         vbox(above, below, spacing=4, margins=(0, 0, 0, 6), parent=self)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if removes_key(event):
+            self.removed.emit()
+        else:
+            super().keyPressEvent(event)
 
     def show_value(self, value: Mapping[str, Any], known: tuple[Compared, ...]) -> None:
         self.value, self.known = value, known
@@ -634,7 +669,7 @@ class _HypothesesField(Field):
         for at, line in enumerate(self.lines):
             line.changed.connect(lambda value, at=at: self._change_hypothesis(at, value))
             line.refused.connect(self._refuse)
-            line.away.clicked.connect(lambda _on=False, at=at: self._remove_hypothesis(at))
+            line.removed.connect(partial(self._remove_hypothesis, at))
             self.box.addWidget(line)
         self.add, self.why = add_button("Add a hypothesis", "Hypothesis"), label("", "small", "text2", wraps=True)
         self.add.clicked.connect(self._add_hypothesis)
@@ -644,12 +679,12 @@ class _HypothesesField(Field):
 
     def show_value(self) -> None:
         for line, value in zip(self.lines, self.row.value if self.lines else (), strict=False):
-            line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts)
-        self.add.setEnabled(bool(self.row.facts))
-        self.why.setText("" if self.row.facts else _NOTHING_TO_COMPARE)
+            line.show_value(value if isinstance(value, Mapping) else {}, self.row.facts.items)
+        self.add.setEnabled(bool(self.row.facts.items))
+        self.why.setText(self.row.facts.hint)
 
     def _add_hypothesis(self) -> None:
-        values = list(_comparisons(self.row.facts))
+        values = list(_comparisons(self.row.facts.items))
         known = [_comparison(value) for value in self.row.value or () if isinstance(value, Mapping)]
         self.asked.emit(
             AddEntry(self.row.path, next((value for value in values if _comparison(value) not in known), values[0]))
@@ -685,5 +720,5 @@ def _hypothesis_count(row: FormRow) -> int:
 
 
 HYPOTHESES: Final = SpecialEditor(
-    (("Analysis", "contrasts"),), _HypothesesField, wide=True, structure=_hypothesis_count, facts=comparable_items
+    (("Analysis", "contrasts"),), _HypothesesField, wide=True, structure=_hypothesis_count, facts=_comparable
 )

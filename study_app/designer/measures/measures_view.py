@@ -72,14 +72,15 @@ def measures_view(
 
 
 def _liquids(protocol: Protocol, path: Path, block: Block | None) -> list[str]:
-    """Return the liquids of an element, or all liquids if it has none."""
+    """Return the liquids of an element in file order; if it has none, those of all blocks, or else every liquid."""
     if path[0] == "liquids" and len(path) > 1 and path[1] in protocol.liquids:
         return [str(path[1])]
-    names = () if block is None else protocol.conditions_in(block.id)
+    blocks = protocol.blocks if block is None else (block.id,)
+    names = [name for block_id in blocks for name in protocol.conditions_in(block_id)]
     if path[0] == "conditions" and len(path) > 1 and path[1] in protocol.conditions:
-        names = (str(path[1]),)
-    liquids = dict.fromkeys(liquid for name in names for liquid in protocol.conditions[name].liquid_ids)
-    return list(liquids) or list(protocol.liquids)
+        names = [str(path[1])]
+    used = {liquid for name in names for liquid in protocol.conditions[name].liquid_ids}
+    return [name for name in protocol.liquids if name in used or not used]
 
 
 def _session_card(study: Study, facts: Facts, path: Path) -> MeasureCard:

@@ -37,6 +37,7 @@ from shiboken6 import isValid
 from study_app.designer.document.elements import element_of, unique_name
 from study_app.designer.document.study import Study
 from study_app.designer.editing import Editing
+from study_app.designer.form.fields import LANGUAGE
 from study_app.designer.measures.study_facts import restored_part
 from study_app.designer.participant.playable import (
     SIZES,
@@ -419,6 +420,9 @@ class ParticipantPreview(Card):
         editing.changed.connect(self._after_form.start)
         editing.edited.connect(self._show_if_visible)
         place.entered.connect(self._look_at_screen)
+        application = QApplication.instance()
+        assert isinstance(application, QApplication)  # noqa: S101 - a window has one
+        application.focusChanged.connect(self._follow_focus)
         self.page.shown.connect(self._show_if_visible)
         self.page.happened.connect(self._handle_page_event)
         self.page.frame_due.connect(self._move_ball)
@@ -475,6 +479,13 @@ class ParticipantPreview(Card):
     def show_language(self, language: str) -> None:
         self._language = language
         self._show_step()
+
+    def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:
+        """Show the pages in the language of the text that is edited."""
+        language = now.property(LANGUAGE) if now is not None and self.place.form.isAncestorOf(now) else None
+        if language in self.view.languages and language != self._language:
+            self._language = language
+            self._after_form.start()
 
     def go(self, by: int) -> None:
         if (shown := self._found) is None:

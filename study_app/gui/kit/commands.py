@@ -87,7 +87,7 @@ COMMANDS: Final = (
     Command("next field", "Next field", ("Tab",), within="field"),
     Command("accept", "Accept", ("Return",), within="field"),
     Command("restore", "Restore", ("Escape",), within="field"),
-    Command("remove", "Remove the key from the file", ("Ctrl+Delete",), within="field"),
+    Command("remove", "Remove the key, scale point or hypothesis (×)", ("Ctrl+Delete",), within="field"),
     Command("count", "Increase, decrease", ("Up", "Down"), within="field"),
 )
 _OF: Final = {command.id: command for command in COMMANDS}

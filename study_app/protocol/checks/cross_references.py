@@ -128,12 +128,14 @@ def check_sequences(document: Document) -> Iterator[Fault]:
             path = (*place, index)
             yield from _unknown_name(path, name, "page or block", {*pages, *blocks, *forms})
             if name in blocks and name in seen:
-                yield Fault(path, f'block "{name}" occurs twice', "use repetitions in the block instead")
+                message = f'block "{name}" occurs twice'
+                yield Fault(path, message, "use repetitions in the block", kind="surplus")
             elif name in forms and (name in pages or name in blocks) and name not in used:
                 other = "page" if name in pages else "block"
                 yield Fault(("questionnaires", name), f"a {other} has the same name", apart)
             elif name in forms and name in since:
-                yield Fault(path, f'form "{name}" occurs twice after the same block', "put a block between them")
+                message = f'form "{name}" occurs twice after the same block'
+                yield Fault(path, message, "put a block between them", kind="surplus")
             seen.add(str(name))
             since = {*(since if name not in blocks else ()), str(name)}
         used |= seen

@@ -209,11 +209,8 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
                 (*place, "conditions"), f"block {name} does not have {missing[0]}", missing[0], block.conditions
             )
         if contrast.conditions is not None and block.design is not None:
-            yield Fault(
-                (*place, "conditions"),
-                f"the results of {name} apply to all its levels together",
-                "compare two blocks instead",
-            )
+            message = f"block {name} has one result for all its conditions, because it has a design"
+            yield Fault((*place, "conditions"), message, "compare two blocks instead")
 
 
 def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, place: Path) -> Iterator[Fault]:

@@ -1,6 +1,7 @@
 """Templates: each is a study that works, and ``liquid-study new`` makes a study of one's own of it."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,15 @@ def test_each_template_is_rehearsed(name: str, tmp_path: Path) -> None:
     folder = rehearse(str(FOLDER / f"{name}.toml"), participants=1, seed=1, results=tmp_path / name, recordings=False)
     assert len(StudyFolder(folder).sessions()) == 1
     assert verify_study(folder).is_sound
+
+
+@pytest.mark.parametrize("name", templates())
+def test_no_page_of_a_template_names_a_liquid_or_a_number_that_is_easily_replaced(name: str) -> None:
+    study = template(name)
+    replaced = {*study.document["liquids"], "three", "four"}
+    texts = {path[1]: str(text).lower() for path, text in texts_of(study) if path[0] == "pages" and path[2] == "body"}
+    later = {page: words for page, words in texts.items() if page != "welcome"}
+    assert not {page: word for page, words in later.items() for word in replaced if re.search(rf"\b{word}\b", words)}
 
 
 @pytest.mark.parametrize("name", templates())

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.designer.document.additions import edits_to_duplicate, edits_to_fill_in
+from study_app.designer.document.additions import edits_to_duplicate, edits_to_fill_in, repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import kind_note, refused_at, row_at
@@ -132,7 +132,8 @@ def test_another_standard_is_not_chosen_for_one_that_is_removed(study: Study) ->
     ):
         assert two.document["blocks"]["feel"]["conditions"] == ("slime", "late")
         assert two.document["blocks"]["feel"]["standard"] == "water"
-        assert [fault.path[-1] for fault in two.faults] == ["standard"]
+        (fault,) = two.faults
+        assert (fault.path[-1], [repair.words for repair in repairs(two, fault)]) == ("standard", ['Use "slime"'])
 
 
 def test_a_repeated_form_is_counted_each_time_with_and_without_groups() -> None:
@@ -200,13 +201,13 @@ def test_a_hypothesis_on_a_design_of_conditions_begins_with_d_prime(study: Study
     whole = after(study, SetValue(DESIGN, "abx"))
     two, _ = whole.with_edits(*edits_to_duplicate(whole, DESIGN[:2])[0])
     rows = (row for section in form_of(two, ("sequence",)).sections for row in section.rows)
-    first, _ = next(row.facts for row in rows if row.path == ("analysis", "contrasts"))
+    first, _ = next(row.facts.items for row in rows if row.path == ("analysis", "contrasts"))
     assert first.measures[0] == ("d_prime", "Sensitivity d′")
     assert not {"threshold", "pse", "exponent"} & {measure for measure, _ in first.measures}
     untranslated = after(two, ChangeLanguage("add", "fr"))
     assert untranslated.protocol is None
     rows = (row for section in form_of(untranslated, ("sequence",)).sections for row in section.rows)
-    assert next(row.facts for row in rows if row.path == ("analysis", "contrasts"))[0].measures == first.measures
+    assert next(row.facts.items for row in rows if row.path == ("analysis", "contrasts"))[0].measures == first.measures
 
 
 @pytest.mark.parametrize(
@@ -255,7 +256,7 @@ def test_the_form_of_the_analysis_begins_a_hypothesis_with_what_it_compares(stud
     two = after(study, SetValue(DESIGN, "abx"), SetValue(("analysis", "participants"), 16))
     two, _ = two.with_edits(*edits_to_duplicate(two, DESIGN[:2])[0])
     rows = [row for section in form_of(two, ("analysis",)).sections for row in section.rows]
-    assert len(next(row.facts for row in rows if row.path == ("analysis", "contrasts"))) == 2
+    assert len(next(row.facts for row in rows if row.path == ("analysis", "contrasts")).items) == 2
 
 
 def test_a_published_form_without_a_title_in_a_language_has_its_name_as_heading(study: Study) -> None:

@@ -11,6 +11,7 @@ from study_app.designer.document.additions import additions_for, repairs
 from study_app.designer.document.elements import CHOSEN, LABEL, OTHER, found_fields
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.measures.cards import Lines
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import Simulated
 from study_app.designer.measures.study_facts import facts
@@ -95,6 +96,20 @@ def card_lines() -> Iterator[str]:
 def test_what_measures_say(pytestconfig: pytest.Config) -> None:
     words = (line.strip() for line in card_lines() if not re.search(r"icon:|path:", line))
     compare(GOLDEN / "measures.txt", each_once(words), pytestconfig)
+
+
+def test_forces_are_shown_of_liquids_that_blocks_use() -> None:
+    ((_, study),) = studies(("demo",))
+    spare = edited(study, Set(("liquids", "spare"), {**study.document["liquids"]["thick"], "density_kg_m3": 1300}))
+
+    def forces(*path: str) -> tuple[str, ...]:
+        cards = measures_view(spare, facts(spare), path, Simulated()).cards
+        lines = next(card.parts[0] for card in cards if card.title == "Force for each liquid")
+        assert isinstance(lines, Lines)
+        return tuple(line.title for line in lines.lines)
+
+    assert forces("study") == ("Thin", "Thick")
+    assert forces("liquids", "spare") == ("Spare",)
 
 
 FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods", "pace", "questions", "sound")

@@ -321,6 +321,16 @@ def test_the_note_counts_the_missing_texts_of_a_language_once_as_the_header_does
     assert designer.value("pages", "thanks", "title") == {"en": "That was it", "nl": "Dank u"}
 
 
+def test_the_page_has_the_language_of_the_text_that_is_edited(designer: Any, tab: Any, qtbot: Any) -> None:
+    designer.editing.handle_request(ChangeLanguage("add", "fr"))
+    designer.editing.handle_request(ChangeLanguage("copy", "fr"))
+    for language, text in (("fr", "Cela coule"), ("en", "It flows")):
+        line = designer.field(*ITEM, "text").lines[language]
+        designer.fill(line, text)
+        qtbot.waitUntil(lambda: text in dict(statements(tab)).values(), timeout=5000)  # noqa: B023 - called at once
+        assert tab.view.language == language
+
+
 def test_an_answer_that_was_emptied_does_not_come_back_when_the_page_is_repainted(designer: Any, live: Any) -> None:
     field = live.page_window.widget.fields[0]
     field.give_answer(3)

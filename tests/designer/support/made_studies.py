@@ -53,7 +53,7 @@ def make_likert(user: User) -> None:
     user.write("Point 7, English", "Very much")
     shorten(user)
     user.select("Liquids", "Session, in order")
-    user.choose("Add to Conditions", "honey")
+    user.choose("Add to Conditions", "Honey")
     user.press("Add Questionnaire")
 
 

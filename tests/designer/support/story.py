@@ -139,7 +139,7 @@ class Story:
         if kept:
             assert self.kept == kept
         if at:
-            assert name_of(QApplication.focusWidget() or self.designer.window) == at
+            assert (now := name_of(QApplication.focusWidget() or self.designer.window)) == at, now
 
     def has(self, *lines: str) -> None:
         """Check that the text of the study has lines that begin so."""
