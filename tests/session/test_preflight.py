@@ -95,6 +95,7 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("small", {"free_bytes": None}, "warning Free space: not known; a session needs about 64 MB"),
     *(("small", {"free_bytes": count}, f"{verdict} Free space: {count / 1e6:.0f} MB free; a session needs about 64 MB")
       for count, verdict in ((19_000_000, "failure"), (60_500_000, "failure"), (10**8, "ok"), (3 * 10**8, "ok"))),
+    ("small", {"free_bytes": 1_234_567_890_000}, "ok Free space: 1 234 568 MB free"),
     *(("small", {"free_bytes": count, "recordings": False}, f"{verdict} Free space: {count / 1e6:.0f} MB free; a "
        "session needs about 60 MB")
       for count, verdict in ((19_000_000, "failure"), (59_000_000, "failure"), (60_500_000, "ok"))),
@@ -153,10 +154,13 @@ def test_both_sides_of_each_limit(pytestconfig: pytest.Config) -> None:
         lines += [f"== {name}", *(f"{check} {check.share}" for check in preflight_checks(small.WELL, study))]
     for name, changed, told in FACTS:
         found = preflight_checks(replace(small.WELL, **changed), known[name])
-        checks = [f"{check.verdict} {check.name}: {check.value}; {check.about}" for check in found]
+        checks = ["{verdict} {name}: {value}; {about}".format(**check.entry) for check in found]
         assert [line.startswith(told) for line in checks].count(True) == 1 if told else "Velocity" not in str(checks), (
             f"{changed} is not told as {told!r}: {checks}"
         )
+        assert bool(refusal_reasons(found)) == told.startswith("failure"), changed
+        shares = {check.name: check for check in found if check.share is not None and check.name != "Scene cost"}
+        assert all((check.share > 1) == (check.verdict == "warning") for check in shares.values()), changed
         usual = {str(check) for check in preflight_checks(small.WELL, known[name])}
         lines.append(f"== {name} {changed}")
         lines += [f"{check} {check.share} {check.entry}" for check in found if str(check) not in usual]

@@ -1,10 +1,12 @@
 """Where an interrupted session goes on, for every line its journal may end with, and what it then presents."""
 
 import json
-from collections.abc import Iterator
+from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import pytest
 from click.testing import CliRunner
@@ -16,18 +18,20 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
 from study_app.protocol.source.files import protocol_hash, source_bytes
+from study_app.session import preflight_measurements
 from study_app.session.pages import PausePage
+from study_app.session.preflight import Masking, Screen
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule, find_protocol, is_rehearsal, resume_at
-from study_app.session.start import NewSession, check_choices, open_store, resumed_choices
+from study_app.session.start import MEASURED_S, NewSession, check_choices, measure_rig, open_store, resumed_choices
 from study_app.session.transitions.events import Begin, ResumeRequested, ShowPage, StartTrial, Write
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance, initial_state
+from study_app.store import receipt
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduce_session
 from study_app.store.verification.verify_study import verify_study
-from tests import golden
 from tests.journal_lines import event_from, event_of
 from tests.outlets.collector import Collector
 from tests.session import small
@@ -68,34 +72,38 @@ def walked(protocol: Protocol, lines: list[dict[str, Any]]) -> tuple[list[dict[s
         event = ResumeRequested(at_s, "participant") if paused else small.next_event(state, at_s)
 
 
-def where(lines: list[dict[str, Any]], first: int, *, breaks: bool = False) -> Iterator[str]:
-    """Yield each line of a journal and, where it has changed, what is presented if the journal ends there."""
-    before = None
-    for count in range(first, len(lines) + 1):
-        line = lines[count - 1]
-        said = (str(line[name]) for name in ("event", "page", "trial", "item") if line.get(name) is not None)
-        yield " ".join(said)
-        found = [walked(study(resume, breaks=breaks), lines[:count])[1] for resume in ("trial", "block")]
-        if found != before:
-            for resume, then in zip(("trial", "block"), found, strict=True):
-                yield f"    by {resume}: {', '.join(then) or 'nothing'}"
-        before = found
+BLOCKS: dict[int | str, str] = {1: "practice", 2: "feeling", 3: "feeling", 4: "baseline", 5: "seeing", 6: "seeing"}
+UNASKED = (1, 4)
+"""Trials without questions."""
 
 
-def test_where_it_goes_on_for_every_last_line(pytestconfig: pytest.Config) -> None:
-    def told() -> Iterator[str]:
-        lines = [STARTED, *walked(study("block"), [STARTED])[0]]
-        yield "=== a session"
-        yield from where(lines, 1)
-        yield "=== a session with breaks within a block"
-        yield from where([STARTED, *walked(study("block", breaks=True), [STARTED])[0]], 1, breaks=True)
-        yield "=== a session that went on by block after the first choice about its third trial"
-        cut = next(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
-        again = [*lines[: cut + 1], {"event": "session_resumed", "t_s": 100.0}]
-        yield from where([*again, *walked(study("block"), again)[0]], len(again))
+def presented_after(lines: list[dict[str, Any]], resume: str, *, breaks: bool) -> list[str]:
+    """Return what is presented after these lines: from the first step that is not finished, or its block's first."""
+    steps: list[Any] = ["welcome", 1, 2, *["rest"] * breaks, *range(3, 7), "thanks"]
+    begun, at = Counter(line["trial"] for line in lines if line["event"] == "trial_started"), 0
+    for line in lines:
+        name = line.get("page", line.get("trial"))
+        if line["event"] in {"page_shown", "trial_started"}:
+            at = steps.index(name)
+        if line["event"] in {"page_left", "responses"} or (line["event"] == "trial_ended" and name in UNASKED):
+            at = steps.index(name) + 1
+    block = (BLOCKS | {"rest": "feeling"}).get(steps[at]) if at < len(steps) else None
+    if block is not None and resume == "block":
+        at = steps.index(next(trial for trial, its_block in BLOCKS.items() if its_block == block))
+    left = [f"{BLOCKS[step]} {step}/{begun[step] + 1}" if step in BLOCKS else step for step in steps[at:]]
+    return [*["waits"] * (steps[at : at + 1] != [] and steps[at] in BLOCKS), *left]
 
-    lines = golden.each_once(golden.what_comes(told()))
-    golden.compare(Path(__file__).parent / "golden" / "resume.txt", lines, pytestconfig)
+
+@pytest.mark.parametrize("resume", ["trial", "block"])
+@pytest.mark.parametrize("breaks", [False, True])
+def test_it_goes_on_with_what_is_not_finished(resume: str, breaks: bool) -> None:
+    lines = [STARTED, *walked(study("block", breaks=breaks), [STARTED])[0]]
+    cut = next(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
+    again = [*lines[: cut + 1], {"event": "session_resumed", "t_s": 100.0}]
+    for told in (lines, [*again, *walked(study("block", breaks=breaks), again)[0]]):
+        for count in range(1, len(told) + 1):
+            found = walked(study(resume, breaks=breaks), told[:count])[1]
+            assert found == presented_after(told[:count], resume, breaks=breaks), told[count - 1]
 
 
 def test_a_journal_of_another_order_is_refused() -> None:
@@ -216,6 +224,32 @@ def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str, 
     assert any(
         "differs from the journal in row_of" in str(one) for one in verify_study(square.parent / "results").errors
     )
+
+
+def test_a_session_is_measured_and_begun_with_what_was_chosen(square: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = mock.Mock(return_value=small.WELL)
+    monkeypatch.setattr(preflight_measurements, "measure_servo_and_disk", asked)
+    videos: Any = SimpleNamespace(open=lambda: "opened", describe=lambda: {"camera": "left"})
+    rig: Any = SimpleNamespace(device=SimpleNamespace(name="mouse"), **vars(RIG))
+    chosen = chosen_for(square, "P025", "P002")
+    played = replace(chosen, row_of=None, played=True, recordings=True)
+    for given, participant, lasts_s in ((chosen, "P002", MEASURED_S), (played, "P025", 0.5)):
+        facts = measure_rig(rig, given, videos, sleep=str)
+        told = {"device": "mouse", "screen": Screen(0.0, 1.0), "participant": participant, "sleep": str}
+        asked.assert_called_with(rig.servo, chosen.results, recordings=given.recordings, lasts_s=lasts_s, **told)
+        assert (facts.video, facts.ran_otherwise, facts.untranslated, facts.late_device) == ("opened", "", (), "")
+    outlets: Any = Collector()
+    outlets.described = {"markers": ["usb:1"]}
+    source = square.read_bytes()
+    more = Masking("noise", 61), outlets, videos
+    with open_store(chosen, parse(source, str(square)), source, RIG, {"one": {"width": 9}}, *more) as store:
+        held, first = receipt.read(store.folder.receipt), start_of(store.lines)
+    told = {"participant": "P025", "session": 1, "seed": SEED, "operator": "AK", "language": "en", "device": "mouse"}
+    told |= {"simulated": False, "pilot": False, "recordings": False, "row_of": "P002"}
+    assert {name: getattr(first, name) for name in told} == told
+    told = {"device": {"name": "mouse"}, "screens": {"one": {"width": 9}}, "outlets": {"markers": ["usb:1"]}}
+    told |= {"motors_masked": {"means": "noise", "noise_db": 61}, "video": {"camera": "left"}}
+    assert {name: held[name] for name in told} == told
 
 
 def test_resumed_session_keeps_the_row(square: Path) -> None:

@@ -11,7 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_a
 
 from study_app.errors import StoreError
 from study_app.store import unblinding
-from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
+from study_app.store.exclusions import Exclusion, exclude, exclusions, include, keep, reversals
 from study_app.store.unblinding import late_exclusions, unblind
 from study_app.store.verification.verify_study import verify_study
 from tests.platforms import files_up_to
@@ -74,7 +74,6 @@ def test_a_decision_after_unblinding_is_late_although_the_clock_was_set_back(fol
 
 def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path) -> None:
     path = folder / "exclusions.csv"
-    unblind(folder, "CD", "to analyse")
     later = (datetime.now().astimezone() + timedelta(hours=1)).isoformat(timespec="milliseconds")
     path.write_text(
         "participant,session,trial,rule_or_person,reason,excluded_at\n"
@@ -82,7 +81,9 @@ def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path)
         encoding="utf-8",
         newline="\n",
     )
-    assert [row.key_open for row in exclusions(folder)] == [None, None]
+    assert late_exclusions(folder, exclusions(folder)) == (), "the key is sealed"
+    unblind(folder, "CD", "to analyse")
+    assert [row.fields().get("key_open", "not a key") for row in exclusions(folder)] == ["not a key"] * 2
     assert [row.participant for row in late_exclusions(folder, exclusions(folder))] == ["P007"]
     assert verify_study(folder).is_sound
     exclude(folder, "P007", 1, trial=1, by="AB", reason="tired")
@@ -96,6 +97,13 @@ def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, m
     assert {row.reason for row in found} == {"3 of 4 catch trials; 2 of 2 catch trials"}
     include(folder, "P007", 1, by="AB", reason="the task was understood late")
     assert unblinding.exclude_inattentive(folder) == ()
+    with pytest.raises(StoreError, match="is excluded: include it without --rule"):
+        keep(folder, "P008", 1, rule="fast_answers", by="AB", reason="it counts")
+    for planned in ("fast_answers", "below_chance"):
+        keep(folder, "P007", 1, rule=planned, by="AB", reason="it counts")
+        with pytest.raises(StoreError, match=f"has already been kept, although the rule {planned} applies"):
+            keep(folder, "P007", 1, rule=planned, by="AB", reason="it counts")
+    assert [row.rule_or_person for row in reversals(folder)] == ["catch", "fast_answers", "below_chance"]
 
 
 def test_a_full_disk_leaves_the_list_as_it_was(folder: Path) -> None:

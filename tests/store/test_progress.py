@@ -79,6 +79,39 @@ def test_each_step_lasts_from_its_first_page_to_the_next_without_the_time_of_a_g
     assert progress.durations_s == {0: 10.0 - 2.0, 1: 121.5 - 10.0 - 100.0}
     progress.process_line(event_of("session_ended", t_s=125.0, status="completed"))
     assert progress.durations_s[2] == 125.0 - 121.5
+    ends = {status: Progress() for status in ("completed", "incomplete", "aborted", "withdrawn", "broken")}
+    for status, ended in ends.items():
+        ended.process_line(event_of("session_ended", status=status))
+    assert [status for status, ended in ends.items() if ended.reached_end] == ["completed", "incomplete"]
+
+
+def test_each_further_attempt_at_a_trial_of_intervals_has_its_reason() -> None:
+    progress = Progress()
+    for attempt, (outcome, between) in enumerate(
+        (("interrupted", {}), ("complete", {"name": "repeat", "reason": "a call"}), ("invalid", {}), ("", {})), start=1
+    ):
+        which = {"trial": 4, "attempt": attempt}
+        progress.process_line(event_of("trial_started", t_s=10.0, phase="main", arrangement="SC", **which))
+        progress.process_line(event_of("trial_ended", t_s=12.0, outcome=outcome, **which))
+        if between:
+            progress.process_line(event_of(t_s=13.0, trial=4, **between))
+    assert progress.repeated == {4: ("interrupted", "a call")}
+    assert progress.invalid == 1
+
+
+@pytest.mark.parametrize(
+    ("limits", "invalid", "missing"), [({"attempts": 3.0}, 2, 0), ({"attempts": 3.0}, 3, 1), ({}, 1, 1)]
+)
+def test_a_trial_is_missing_once_it_is_not_presented_again(
+    limits: dict[str, float], invalid: int, missing: int
+) -> None:
+    progress = Progress()
+    progress.process_line(event_of("session_started", limits=limits))
+    for attempt in range(1, invalid + 1):
+        which = {"trial": 4, "attempt": attempt}
+        progress.process_line(event_of("trial_started", phase="main", arrangement="SC", block="b", code="V1", **which))
+        progress.process_line(event_of("trial_ended", outcome="invalid", **which))
+    assert (progress.missing_trials.count, progress.missing_trials.asked) == (missing, missing)
 
 
 def test_choices_that_were_not_confirmed_are_kept_by_trial_and_attempt() -> None:

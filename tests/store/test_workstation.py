@@ -16,9 +16,13 @@ from study_app.store.workstation import (
     STATEMENT_X_HEIGHT_PX,
     DisplayOffset,
     MachineSettings,
+    keep_workspace,
     load_settings,
+    recent_protocols,
+    remember_protocol,
     save_settings,
 )
+from study_app.workspace import Workspace
 
 OFFSET = DisplayOffset(mean_ms=23.5, spread_ms=1.2, how="photodiode", measured="2026-11-20", screen="DP-1")
 ALL = MachineSettings(
@@ -61,6 +65,22 @@ def test_a_path_that_is_not_utf_8_is_refused_in_one_line_and_the_settings_stay(f
     with pytest.raises(StoreError, match=r"^'/x/donn.udce9es' is not UTF-8 text, .*: rename the folder$"):
         save_settings(ALL.model_copy(update={name: os.fsdecode(b"/x/donn\xe9es")}))
     assert load_settings() == ALL
+
+
+def test_recent_protocols_are_those_that_still_exist_newest_first(tmp_path):
+    files = [tmp_path / f"{name}.toml" for name in "abc"]
+    for file in files:
+        file.touch()
+        remember_protocol(file)
+    files[1].unlink()
+    assert recent_protocols() == (str(files[2]), str(files[0]))
+
+
+def test_a_chosen_workspace_is_created_and_kept_with_the_other_settings(tmp_path):
+    save_settings(ALL)
+    keep_workspace(Workspace(tmp_path / "new"))
+    assert load_settings() == ALL.model_copy(update={"workspace": str(tmp_path / "new")})
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["protocols", "results"]
 
 
 def _full(_descriptor):

@@ -11,12 +11,22 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.columns import TRIALS
-from study_app.store.csv_files import MISSING, Column, csv_bytes, guard_formula, has_same_cells, header, read_table
+from study_app.store.csv_files import (
+    MISSING,
+    Column,
+    csv_bytes,
+    guard_formula,
+    has_same_cells,
+    header,
+    read_table,
+    table_problems,
+)
 from study_app.store.folders import SessionFolder
 from study_app.store.tables.session_tables import _MEASURED, SessionRows, latest_attempts
 from study_app.store.tables.study_files import row_of
 from tests.store.tables.test_transcripts import Lines
 
+NUMBER = (Column("first", "number", "One."),)
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
 
 
@@ -41,6 +51,17 @@ def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]
 )
 def test_what_is_not_known_or_not_a_text_has_one_spelling(value: Any, cell: str) -> None:
     assert csv_bytes(TEXT[:1], [{"first": value}]) == f"first\n{cell}\n".encode()
+
+
+def test_numbers_are_written_again_as_they_were_read() -> None:
+    content = b"first\n7\n-12\n0.5\n123456789012345678901\n"
+    assert csv_bytes(NUMBER, read_table(content, NUMBER)) == content.replace(
+        b"123456789012345678901", b"1.2345678901234568e+20"
+    )
+
+
+def test_rows_that_are_shorter_than_the_head_are_a_problem() -> None:
+    assert list(table_problems(b"first,second\n1\n2\n", TEXT)) == ["row 2 has 1 cells, not 2"]
 
 
 def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str, Any]) -> None:
