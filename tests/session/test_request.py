@@ -8,7 +8,7 @@ from study_app import app
 from study_app.app.session import live_session
 from study_app.errors import StoreError
 from study_app.protocol.source.files import source_bytes
-from study_app.session.start import NewSession, resumed_choices
+from study_app.session.start import NewSession, draw_seed, resumed_choices
 from study_app.store.sessions.open_session import SessionStore
 from tests import studies
 
@@ -36,6 +36,12 @@ def test_a_session_that_can_go_on_is_chosen_as_it_was_begun(begun: SessionStore,
     assert (chosen.source, chosen.results, chosen.resumes) == ("demo", begun.place.study_folder.path, begun.folder.path)
 
 
+def test_a_drawn_seed_is_from_1_to_the_largest_that_a_person_would_copy(monkeypatch: pytest.MonkeyPatch) -> None:
+    for drawn, seed in ((lambda _: 0, 1), (lambda below: below - 1, 999_999)):
+        monkeypatch.setattr("secrets.randbelow", drawn)
+        assert draw_seed() == seed
+
+
 def test_a_session_that_is_open_is_refused_before_any_window(begun: SessionStore, windows: list[NewSession]) -> None:
     with begun, pytest.raises(StoreError, match="is open in another program"):
         app.resume(begun.folder.path)
@@ -45,7 +51,7 @@ def test_a_session_that_is_open_is_refused_before_any_window(begun: SessionStore
 def test_a_finished_session_is_refused_before_any_window(begun: SessionStore, windows: list[NewSession]) -> None:
     begun.finish("completed")
     with pytest.raises(StoreError, match="is finished"):
-        app.resume(begun.folder.path)
+        app.resume(begun.folder.path, protocol="a file that is gone")
     assert windows == []
 
 

@@ -117,13 +117,18 @@ class FakeVideo:
 
 class Recorded:
     def __init__(self) -> None:
-        self.frames: list[Any] = []
+        self.clear()
 
-    def start(self, *_: Any) -> None:
-        """Do nothing."""
+    def clear(self) -> None:
+        self.frames: list[Any] = []
+        self.started: list[Any] = []
+        self.samples: list[Any] = []
+
+    def start(self, *told: Any) -> None:
+        self.started.append(told)
 
     def append(self, samples: Any) -> None:
-        """Do nothing."""
+        self.samples += list(samples)
 
     def frame(self, painted_ns: int, sample_ns: int, video: VideoFrame | None = None) -> None:
         self.frames.append((painted_ns, sample_ns, video))
@@ -152,6 +157,24 @@ def test_the_video_is_as_late_as_the_ball_and_both_are_recorded() -> None:
     assert (columns["video_frames_late"], columns["video_frames_lost"]) == (0, 0)
     assert 0 <= columns["video_delay_error_max_ms"] <= 1e-6 * PERIOD_NS
     assert columns["video_age_mean_ms"] == 7.0
+
+
+def test_a_recording_begins_with_the_samples_since_the_servo_began_at_most_600() -> None:
+    recorder = Recorded()
+    recording, at = Recording(recorder, 1000.0), iter(range(100_000))
+    for counts, expected in (((1, 7), 8), ((400, 150, 170, 90), 600), ((), 600), ((601,), 600)):
+        for count in (0, *counts):
+            recording.add_samples([next(at) for _ in range(count)])
+        recording.start(3, 2, 1)
+        newest = next(at)
+        recording.add_samples([newest])
+        recording.stop()
+        assert recorder.started == [(3, 2, 1000.0, 1)]
+        assert recorder.samples == [*range(newest - expected, newest + 1)]
+        recorder.clear()
+    recording.forget()
+    recording.start(4, 1)
+    assert recorder.samples == []
 
 
 def test_a_trial_without_a_video_has_no_numbers_of_one() -> None:

@@ -147,6 +147,99 @@ PLAYS = {
 }
 
 
+def words_of(done: Any) -> str:
+    """Return a call, or a line with the values that a step gives it."""
+    if isinstance(done, str):
+        return done
+    name, values = done
+    told = [values[key] for key in TOLD if values.get(key)] if isinstance(values, dict) else values
+    return " ".join(map(str, (name, *told)))
+
+
+TOLD = ("page", "trial", "attempt", "code", "by", "kind", "text", "reason", "what", "status", "device")
+STOP = (
+    "stop_force, stop_force, stop_force, recorder.stop, rest, trial_ended 1 {}, force_stopped operator, paused operator"
+)
+BEGIN = "load, recorder.start 1 {} 1000.0 None, recorder.frame {} {} None"
+FADE_IN = "resumed operator, force_restored operator, fade_in, trial_started 1 {} L1"
+BROKE = "recorder.stop, rest, trial_ended 1 {}, broke the servo stopped: no samples"
+CALLS = {
+    "requests": {
+        "go on": ["page_left welcome, trial_started 1 1 L1"],
+        "shown": [BEGIN.format(attempt, *[at_ns] * 2) for attempt, at_ns in (
+            (1, 2_750_000_000), (2, 5_750_000_000), (3, 6_250_000_000), (4, 7_750_000_000), (5, 8_500_000_000))],
+        "pointer": ["point_to 0.01 0.02 0.03"],
+        "buttons": ["press 2"],
+        "painted": ["recorder.frame 4250000000 5000000 None"],
+        "left": ["operator.bring_forward"],
+        "note": ["note note left-handed", ""],
+        "mark": ["note mark"],
+        "pause": ["recorder.stop, rest, trial_ended 1 1, paused operator"],
+        "resume": ["resumed operator, trial_started 1 2 L1"],
+        "repeat": ["recorder.stop, rest, trial_ended 1 2, repeat 1 phone rang, trial_started 1 3 L1"],
+        "stop": [STOP.format(3)],
+        "fade in": [FADE_IN.format(4), FADE_IN.format(5)],
+        "participant stops": [STOP.format(4).replace("operator", "participant")],
+        "part fails": ["note note part of the operator's window failed: ValueError: no plot"],
+        "diagnose": [f"{STOP.format(5)}, diagnose_asked", "stop_force, diagnose_asked"],
+        "late": [""],
+        "withdraw": ["session_ended felt unwell withdrawn"],
+        "close": ["done"],
+    },
+    "lost device": {
+        "servo stops": ["", ""],
+        "wait": ["", f"stop_force, {BROKE.format(1)}", "note note the program stalled for 4.0 s",
+                 f"stop_force, {BROKE.format(2)}"],
+        "device error": ["stop_force, stop_force, broke no device is plugged in"],
+        "second error": ["stop_force"],
+        "reconnect": ["", "reconnect", ""],
+        "reconnected": ["stop_force, device_reconnected mouse, paused program"],
+        "fade in": [FADE_IN.format(2)],
+        "abort": ["session_ended broken broken"],
+        "close": ["done"],
+    },
+}  # fmt: skip
+
+
+def view_words(view: Any) -> str:
+    """Return what the operator is told of device and disk."""
+    faults = f"{dict(view.device.rows)['Safety faults']} faults"
+    told = {"waits": view.waits, "force on": view.force_on, "device ready": view.device.ready, faults: True,
+            "may reconnect": view.may_reconnect, "reconnects": view.reconnects, view.reconnection: view.reconnection,
+            f"trouble {view.trouble}": view.trouble}  # fmt: skip
+    return ", ".join([view.state, *(words for words, shown in told.items() if shown)])
+
+
+RUNS, OFF = "running, force on, device ready, {} faults", "force off, device ready, {} faults"
+FULL = "trouble, waits, device ready, 0 faults, trouble no space left on the disk: free some"
+LOST = "trouble, {} faults, may reconnect{}, trouble {}"
+VIEWS = {
+    "lost device": [
+        ("wait", RUNS.format(0)),
+        ("servo stops", "trouble, force on, 1 faults, trouble the servo stopped: no samples"),
+        ("wait", LOST.format(1, "", "the servo stopped: no samples")),
+        ("device error", LOST.format(1, "", "no device is plugged in")),
+        ("reconnect", LOST.format(1, ", reconnects, Connecting the device …", "no device is plugged in")),
+        ("line", LOST.format(1, ", reconnects, press the button", "no device is plugged in")),
+        ("not reconnected", LOST.format(1, ", reconnects, Not connected: still none.", "no device is plugged in")),
+        ("reconnected", OFF.format(1)),
+        ("fade in", RUNS.format(1)),
+        ("servo stops", "trouble, force on, 2 faults, trouble the servo stopped: no samples"),
+        ("wait", LOST.format(2, "", "the servo stopped: no samples")),
+        ("abort", "ended, 2 faults, trouble the servo stopped: no samples"),
+    ],
+    "full disk": [
+        ("wait", RUNS.format(0)),
+        ("mark", FULL),
+        ("wait", OFF.format(0)),
+        ("fade in", RUNS.format(0)),
+        ("wait", "paused, force on, device ready, 0 faults"),
+        ("abort", FULL.replace("trouble", "ended", 1)),
+    ],
+}
+"""Where what the operator is told changes: the first ``wait`` is the beginning."""
+
+
 def paged(page: Any) -> list[str]:
     """Return a page's kind and values but for the page that follows, which comes in its turn."""
     return list(value_lines(replace(page, coming=None) if getattr(page, "coming", None) else page, "page"))
@@ -190,12 +283,16 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
     monkeypatch.setattr(bridge.operator, "bring_forward", world.call("operator.bring_forward"))
     monkeypatch.setattr(bridge.participant, "bring_forward", world.call("participant.bring_forward"))
     monkeypatch.setattr(bridge.operator, "show_message", world.call("show_message"))
-    lines, before = [], list[str]()
+    lines, before, calls, views = [], list[str](), dict[str, list[str]](), list[tuple[str, str]]()
     for step in PLAYS[name].split(", "):
         world.now_s += 0.25
         world.done.clear()
         caplog.clear()
         STEPS[step](bridge, world)
+        calls.setdefault(step, []).append(", ".join(map(words_of, world.done)))
+        if isValid(bridge) and not bridge._gone and name in VIEWS:
+            words = view_words(bridge.view())
+            views += [(step, words)] if not views or words != views[-1][1] else []
         lines += [
             f"== {step}",
             *map(str, world.done),
@@ -206,4 +303,6 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
             lines += (f"# {line}" for line in changed(before, after))
             before = after
     caplog.clear()
+    assert {step: calls[step] for step in CALLS.get(name, ())} == CALLS.get(name, {})
+    assert views == VIEWS.get(name, [])
     compare(GOLDEN / f"bridge_{name.replace(' ', '_')}_{blinding}.txt", calls_and_words(lines), pytestconfig)

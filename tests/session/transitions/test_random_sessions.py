@@ -148,10 +148,12 @@ def test_the_page_that_an_event_shows_is_that_of_the_state_after_it() -> None:
     for phase, kind in product(Phase, EVENTS):
         with suppress(SessionError):
             after, commands = advance(state_in(phase), event_of(kind))
+            _check_order(commands)
             if (page := shown(commands)) is not None:
                 assert page == build_page(after), (phase, kind)
                 phases.add(phase)
     assert phases == set(Phase)
+    assert {phase for phase in Phase if state_in(phase).lost_device} == {Phase.TROUBLE}
 
 
 def pages_of_session(shown: Any, language: str) -> list[Any]:
@@ -238,7 +240,9 @@ def test_every_page_of_a_preview_is_that_of_a_session_with_its_seed(name: str, l
     assert {type(page) for page in held} == {TextPage, TaskPage, QuestionnairePage}
     assert [plain(page) for page in previewed] == [plain(page) for page in held]
     intros = {shown.protocol.text(form.intro, language) for form in shown.protocol.questionnaires.values()}
-    assert {page.intro for page in held if isinstance(page, QuestionnairePage)} <= intros
+    forms = [page for page in held if isinstance(page, QuestionnairePage)]
+    assert {page.intro for page in forms} <= intros
+    assert all([item.number for item in page.items] == [*range(1, len(page.items) + 1)] for page in forms)
 
 
 def test_each_time_a_form_is_asked_its_simulated_answers_have_a_stream_of_their_own() -> None:

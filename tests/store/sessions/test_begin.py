@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import platform
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,7 @@ def test_everything_is_there_before_the_first_trial(tmp_path: Path, start: Start
         "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-responses_data.csv",
         "data/sub-P007/ses-01/subject-P007_session-01_task-brackish_description-trials_data.csv",
     }
+    assert not store.folder.recordings.exists()
     store.close()
 
 
@@ -93,7 +95,7 @@ def test_the_receipt_holds_what_reproduces_the_session(start: Start) -> None:
     assert before["device"] == {"name": "scripted", "rate_hz": 1000}
     assert before["screens"]["participant"]["refresh_hz"] == 60.0
     assert "SHA-256 of (seed, name)" in before["generator"]
-    assert before["versions"]["liquid-study"] == __version__
+    assert [before["versions"][name] for name in ("liquid-study", "python")] == [__version__, platform.python_version()]
     store.finish("withdrawn", "tired, went home")
     after = receipt.read(store.folder.receipt)
     ended = journal.read(store.folder.journal)[-1]

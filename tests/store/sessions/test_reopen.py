@@ -130,9 +130,9 @@ def test_a_gap_that_no_session_has_is_unknown_and_locks_nothing(start: Start, ag
 def test_the_receipt_tells_what_it_goes_on_with(start: Start, again: Again) -> None:
     with start() as store:
         before = receipt.read(store.folder.receipt)
-    for _ in range(2):
+    for count in (1, 2):
         with again() as resumed:
-            pass
+            assert len(receipt.read(store.folder.receipt)["resumed"]) == count
     after = receipt.read(store.folder.receipt)
     assert before["resumed"] == []
     assert {name for name in after if after[name] != before[name]} == {"resumed"}
