@@ -5,12 +5,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.session.device_buttons import ANSWERS, DeviceButtons
-from study_app.session.transitions.events import Begin, PauseRequested
+from study_app.haptics.model.layout import LIMITER_NAMES
+from study_app.session.device_buttons import ANSWERS, CONTINUE, DeviceButtons
+from study_app.session.pages import PausePage, QuestionnairePage, TaskPage
+from study_app.session.transitions.events import Begin, Broke, PauseRequested, Reconnected, ResumeRequested
 from study_app.session.transitions.state import Phase
 from tests.golden import compare
 from tests.session.fakes import World, step
-from tests.session.runner.played_worlds import play
+from tests.session.runner.played_worlds import begun, play
 from tests.transcripts import every, played
 
 FILES = every(Path(__file__).parent / "transcripts", "rows runner")
@@ -19,6 +21,68 @@ FILES = every(Path(__file__).parent / "transcripts", "rows runner")
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_the_runner_asks_for_what_it_did(file: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, play), pytestconfig)
+
+
+EMPTY: dict[str, float | None] = {
+    **dict.fromkeys(("targets_reached", "targets", "withheld_share", "device_delay_ticks", "worst_frame_gap_ms")),
+    **dict.fromkeys(("lateness_p99_ms", "overruns", "samples_dropped", "path_length_m", "mean_speed_mps"), 0),
+    **dict.fromkeys(("force_mean_n", "force_peak_n", "loop_delay_ticks", "loop_delay_changes", "frames_late"), 0),
+    **{f"delay_error_{name}_ms": 0.0 for name in ("mean", "p95", "max")},
+    **{f"limiter_{name}": 0 for name in LIMITER_NAMES},
+    **{"duration_s": 3.0, "ticks": 3001, "tick_rate_hz": 1000.0, "worst_gap_ms": 1.0, "frames": 1},
+    "first_frame_gap_ms": 0.0,
+}
+"""The row of 3 s at rest, without a force."""
+REACHED = {"duration_s": 0.55, "targets_reached": 2, "targets": 2, "ticks": 551, "path_length_m": 0.04}
+REACHED |= {"mean_speed_mps": 0.04 / 0.55}
+
+
+@pytest.mark.parametrize(
+    ("commands", "row", "page"),
+    [
+        ('to("seeing"); samples(0.101, LEFT); run(0.199, LEFT); run(0.5, RIGHT)', REACHED, QuestionnairePage),
+        (
+            "go_on(); samples(1.0, device_force_n=(3.0, 0.0, 4.0), limiters=9); "
+            "samples(1.0, (0.03, 0.04, 0.0), device_force_n=(0.0, 0.0, 1.0), lateness_ns=2000000); run(1.2)",
+            {"force_mean_n": (1000 * 5 + 1000 * 1) / 3001, "force_peak_n": 5.0, "path_length_m": 0.05 + 0.05,
+             "mean_speed_mps": 0.1 / 3, "lateness_p99_ms": 2.0, "limiter_slope": 1000, "limiter_norm": 1000},
+            TaskPage,
+        ),
+        (
+            "go_on(); servo_is(scene=0); samples(0.5, permitted_n=9.0, withheld_n=9.0); servo_is(scene=1); "
+            "samples(1.0, permitted_n=4.0, withheld_n=0.5); samples(1.0, permitted_n=2.0); samples(1.001); run(0.2)",
+            {"withheld_share": 0.5 / (4 + 2)},
+            TaskPage,
+        ),
+        (
+            "go_on(); run(0.5, delay_ticks=1); run(0.5, delay_ticks=3); run(0.5, delay_ticks=2); "
+            "run(0.5, delay_ticks=3); run(1.2, delay_ticks=2)",
+            {"loop_delay_ticks": 3, "loop_delay_changes": 4},
+            TaskPage,
+        ),
+        ("go_on(); lose(7); run(3.2)", {"samples_dropped": 7}, TaskPage),
+        (  # 137 ms late, drawn 2 ms later: -137, 2, 7, 12 and 42 ms beyond the delay
+            'to("seeing", delayed=True); samples(0.05, LEFT); paint(0); samples(0.05, LEFT); paint(5); '
+            "samples(0.05, LEFT); paint(10); samples(0.05, LEFT); paint(40); run(0.1, LEFT); run(0.5, RIGHT)",
+            {**REACHED, "frames": 5, "frames_late": 1, "delay_error_mean_ms": -14.8, "delay_error_p95_ms": 36.0,
+             "delay_error_max_ms": 42.0, "worst_frame_gap_ms": 551.0 - 240.0},
+            QuestionnairePage,
+        ),
+        (
+            "go_on(); paint(90, view=False); paint(90, view=False); run(1.0); servo_is(ticks=1150); run(2.2)",
+            {"ticks": 2851, "frames": 3, "frames_late": 2, "delay_error_mean_ms": 60.0, "delay_error_p95_ms": 90.0,
+             "delay_error_max_ms": 90.0, "worst_frame_gap_ms": 2911.0},
+            PausePage,
+        ),
+    ],
+)  # fmt: skip
+def test_the_row_of_a_trial_sums_up_its_samples_and_frames(
+    commands: str, row: dict[str, float], page: type[object]
+) -> None:
+    world = begun(f"1: post(Begin(0.0)); {commands}")
+    ended = world.journal.of("trial_ended")[-1]
+    assert {name: ended[name] for name in EMPTY} == pytest.approx(EMPTY | row, abs=1e-6)
+    assert isinstance(world.pages[-1], page)
 
 
 @pytest.mark.parametrize(("button", "way"), [(ANSWERS[0], -1), (ANSWERS[1], 1)])
@@ -46,6 +110,27 @@ def test_a_stall_of_the_program_is_noted_while_no_task_runs(world: World) -> Non
     world.runner.post(PauseRequested(world.clock(), "operator"))
     world.run(3.1)
     assert [line["text"] for line in world.journal.of("note")] == ["the program stalled for 3.1 s"]
+
+
+def test_a_button_leaves_a_page_unless_it_was_pressed_before_the_page_was_there(world: World) -> None:
+    changes: list[Phase] = []
+    world.runner.on_change(lambda state: changes.append(state.phase))
+    world.runner.post(Begin(0.0))
+    world.run(0.1, buttons=CONTINUE)
+    assert changes == [Phase.READING], "consent is not given with a button"
+    while world.state.phase is not Phase.READING or world.state.page_id != "thanks":
+        step(world)
+    world.run(0.1)
+    world.servo.run(0.05, buttons=CONTINUE)
+    for event in (Broke(world.clock(), "the cable", "device"), Reconnected(world.clock(), {"name": "memory"})):
+        causes = world.runner.cause
+        world.runner.post(event)
+        assert (causes, world.runner.cause) in {("", "the cable"), ("the cable", "")}
+    world.runner.post(ResumeRequested(world.clock(), "operator"))
+    world.run(0.05)
+    assert world.state.phase is Phase.READING, "pressed before the page"
+    world.run(0.05, buttons=CONTINUE)
+    assert world.state.phase is changes[-1] is Phase.COMPLETE
 
 
 def test_no_line_of_a_delayed_trial_names_condition_liquid_or_delay(world: World) -> None:
