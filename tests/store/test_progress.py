@@ -79,6 +79,10 @@ def test_each_step_lasts_from_its_first_page_to_the_next_without_the_time_of_a_g
     assert progress.durations_s == {0: 10.0 - 2.0, 1: 121.5 - 10.0 - 100.0}
     progress.process_line(event_of("session_ended", t_s=125.0, status="completed"))
     assert progress.durations_s[2] == 125.0 - 121.5
+    ends = {status: Progress() for status in ("completed", "incomplete", "aborted", "withdrawn", "broken")}
+    for status, ended in ends.items():
+        ended.process_line(event_of("session_ended", status=status))
+    assert [status for status, ended in ends.items() if ended.reached_end] == ["completed", "incomplete"]
 
 
 def test_choices_that_were_not_confirmed_are_kept_by_trial_and_attempt() -> None:

@@ -14,6 +14,7 @@ from study_app.haptics.model.layout import SAMPLE
 from study_app.store.recordings import (
     SamplesFile,
     Written,
+    crcs,
     read_checks,
     read_facts,
     read_frames,
@@ -33,6 +34,13 @@ def write(path: Path, samples: Any, rate_hz: float = 1000.0) -> Written:
         file.write(samples[first : first + file.group_rows])
     assert file.taken == len(samples)
     return file.finish(dropped=0)
+
+
+def test_each_second_of_forces_and_the_rest_have_a_crc_32() -> None:
+    forces = np.arange(15).reshape(5, 3) / 7
+    assert crcs(forces, 2) == [zlib.crc32(struct.pack("<6d", *forces.flat[at : at + 6])) for at in (0, 6)] + [
+        zlib.crc32(struct.pack("<3d", *forces[4]))
+    ]
 
 
 @pytest.mark.slow

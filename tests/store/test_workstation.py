@@ -17,6 +17,8 @@ from study_app.store.workstation import (
     DisplayOffset,
     MachineSettings,
     load_settings,
+    recent_protocols,
+    remember_protocol,
     save_settings,
 )
 
@@ -61,6 +63,15 @@ def test_a_path_that_is_not_utf_8_is_refused_in_one_line_and_the_settings_stay(f
     with pytest.raises(StoreError, match=r"^'/x/donn.udce9es' is not UTF-8 text, .*: rename the folder$"):
         save_settings(ALL.model_copy(update={name: os.fsdecode(b"/x/donn\xe9es")}))
     assert load_settings() == ALL
+
+
+def test_recent_protocols_are_those_that_still_exist_newest_first(tmp_path):
+    files = [tmp_path / f"{name}.toml" for name in "abc"]
+    for file in files:
+        file.touch()
+        remember_protocol(file)
+    files[1].unlink()
+    assert recent_protocols() == (str(files[2]), str(files[0]))
 
 
 def _full(_descriptor):

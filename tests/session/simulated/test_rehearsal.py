@@ -19,9 +19,10 @@ from study_app.errors import SessionError, StoreError
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.simulated import OBSERVER, Comparison, Observer
+from study_app.session.pages import TextPage
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.session.simulated.observers import RATE_HZ, SensedTrial, exploration
+from study_app.session.simulated.observers import RATE_HZ, SensedTrial, answer_choices, exploration, reading_s
 from study_app.session.simulated.participant import AdjustingObserver
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features, finish_session
 from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_out
@@ -137,6 +138,17 @@ def test_a_setting_begins_with_large_steps_and_ends_after_it_was_crossed_in_smal
         made.append(observer.steps(0.3 + 0.01 * level, 0.3))
         level += made[-1]
     assert made == steps
+
+
+def test_a_page_is_read_word_by_word_and_some_answers_are_changed_from_a_neighbouring_one() -> None:
+    page = TextPage(id="a", kind="break", title="Two words", paragraphs=("three more words", "one"), button="long text")
+    assert reading_s(page) == pytest.approx(1.0 + 6 * 0.12)
+    item: Any = SimpleNamespace(id="thick", nearby=lambda value: value + 1)
+    for draw, changes, values in ((0.0, True, [5, 4]), (0.5, True, [4]), (0.0, False, [4])):
+        chosen = answer_choices([item], {"thick": 4}, lambda draw=draw: draw, changes_mind=changes)
+        assert [(one.item, one.value, one.after_s) for one in chosen] == [
+            ("thick", value, pytest.approx(0.8 + draw * (2.6 - 0.8))) for value in values
+        ]
 
 
 @needs_servo
