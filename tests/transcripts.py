@@ -1,10 +1,12 @@
 """Transcripts: commands, and what each of them does, in files that people review.
 
 A transcript is a name (``=== name``), the state it starts from, commands, and below each command what it did (``>``).
-``--regenerate`` writes the lines with ``>`` anew.
+``--regenerate`` writes the lines with ``>`` anew. Lines with ``!`` are assertions, which it leaves: one for each line
+that the command says, with words in it; " … " stands for the words between.
 """
 
 import ast
+import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
@@ -21,7 +23,23 @@ def played(file: Path, play: Play) -> Iterator[str]:
     for number, part in enumerate(file.read_text(encoding="utf-8").removeprefix("=== ").split("\n=== ")):
         name, start, *lines = part.strip("\n").split("\n")
         yield from ("", f"=== {name}", start) if number else (f"=== {name}", start)
-        yield from play(start.removeprefix("start:").strip(), [line for line in lines if not line.startswith(">")])
+        asserted: list[list[str]] = []
+        for line in lines:
+            if not line.startswith(("!", ">")):
+                asserted.append([])
+            elif line.startswith("!"):
+                asserted[-1].append(line)
+        did: list[tuple[str, list[str]]] = []
+        for line in play(start.removeprefix("start:").strip(), [line for line in lines if line[:1] not in ("!", ">")]):
+            did[-1][1].append(line) if line.startswith(">") else did.append((line, []))
+        for (command, said), words in zip(did, asserted, strict=True):
+            yield command
+            assert not words or [*map(_has_words, words, said)] == [True] * len(said), f"{name}, {command}: {said}"
+            yield from words or said
+
+
+def _has_words(words: str, said: str) -> bool:
+    return re.search(".*".join(map(re.escape, words[2:].split(" … "))), said) is not None
 
 
 def every(folder: Path, names: str) -> list[Path]:
