@@ -157,6 +157,9 @@ def test_both_sides_of_each_limit(pytestconfig: pytest.Config) -> None:
         assert [line.startswith(told) for line in checks].count(True) == 1 if told else "Velocity" not in str(checks), (
             f"{changed} is not told as {told!r}: {checks}"
         )
+        assert bool(refusal_reasons(found)) == told.startswith("failure"), changed
+        shares = {check.name: check for check in found if check.share is not None and check.name != "Scene cost"}
+        assert all((check.share > 1) == (check.verdict == "warning") for check in shares.values()), changed
         usual = {str(check) for check in preflight_checks(small.WELL, known[name])}
         lines.append(f"== {name} {changed}")
         lines += [f"{check} {check.share} {check.entry}" for check in found if str(check) not in usual]
