@@ -1,6 +1,7 @@
 """Where an interrupted session goes on, for every line its journal may end with, and what it then presents."""
 
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -96,6 +97,24 @@ def test_where_it_goes_on_for_every_last_line(pytestconfig: pytest.Config) -> No
 
     lines = golden.each_once(golden.what_comes(told()))
     golden.compare(Path(__file__).parent / "golden" / "resume.txt", lines, pytestconfig)
+
+
+BLOCKS = {1: "practice", 2: "feeling", 3: "feeling", 4: "baseline", 5: "seeing", 6: "seeing"}
+
+
+@pytest.mark.parametrize("resume", ["trial", "block"])
+def test_it_goes_on_with_all_that_is_not_finished(resume: str) -> None:
+    lines = [STARTED, *walked(study("block"), [STARTED])[0]]
+    for count in range(1, len(lines) + 1):
+        begun = Counter(line["trial"] for line in lines[:count] if line["event"] == "trial_started")
+        finished = {line.get("page", line.get("trial")) for line in lines[:count] if line["event"] in {
+            "page_left", "responses"} or (line["event"] == "trial_ended" and line["trial"] in {1, 4})}  # fmt: skip
+        left: list[Any] = [step for step in ("welcome", *BLOCKS, "thanks") if step not in finished]
+        waits = ["waits"] * (left[:1] != [] and left[0] in BLOCKS)
+        if waits and resume == "block":
+            left = [trial for trial in BLOCKS if BLOCKS[trial] == BLOCKS[left[0]] and trial not in left] + left
+        named = [f"{BLOCKS[step]} {step}/{begun[step] + 1}" if step in BLOCKS else step for step in left]
+        assert walked(study(resume), lines[:count])[1] == waits + named, lines[count - 1]
 
 
 def test_a_journal_of_another_order_is_refused() -> None:
