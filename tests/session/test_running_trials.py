@@ -173,8 +173,9 @@ def test_a_recording_begins_with_the_samples_since_the_servo_began_at_most_600()
         assert recorder.samples == [*range(newest - expected, newest + 1)]
         recorder.clear()
     recording.forget()
+    recording.add_samples([7, 8, 9])
     recording.start(4, 1)
-    assert recorder.samples == []
+    assert recorder.samples == [7, 8, 9]
 
 
 def test_a_trial_without_a_video_has_no_numbers_of_one() -> None:

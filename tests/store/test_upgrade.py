@@ -147,6 +147,15 @@ def test_a_changed_table_of_an_earlier_version_is_refused_and_nothing_is_written
     assert contents(results) == before
 
 
+def test_a_table_of_an_unfinished_session_that_is_behind_its_journal_is_completed(results: Path) -> None:
+    table = StudyFolder(results).session("P002", 1).table("rek2024", "responses")
+    whole = table.read_bytes()
+    table.write_bytes(whole[: whole.rstrip(b"\n").rindex(b"\n") + 1])
+    upgrade(results)
+    assert verify_study(results).errors == ()
+    assert len(table.read_bytes().splitlines()) == len(whole.splitlines()) > 2
+
+
 def test_a_session_that_is_open_is_not_upgraded_and_may_be_afterwards(results: Path) -> None:
     before = contents(results)
     with lock_folder(results / "data" / "sub-P001" / "ses-01"), pytest.raises(StoreError, match="is open in another"):

@@ -12,6 +12,9 @@ from study_app.session.simulated import answers_only
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import condition_features, rehearse
 from study_app.store import receipt
+from study_app.store.blinded.blinding import open_events, read_key
+from study_app.store.folders import StudyFolder
+from study_app.store.journals import journal
 from study_app.store.verification.verify_study import verify_study
 from tests.compiled import needs_servo
 from tests.protocol.edited_studies import text_of
@@ -71,6 +74,29 @@ def test_the_same_call_gives_the_same_answers_and_another_seed_others(twelve: Pa
     )
     assert tables(again) == tables(twelve)
     assert tables(other) != tables(twelve)
+
+
+@pytest.mark.parametrize(("name", "block", "task_s"), [("compared", "pairs", 4.0), ("levels", "viscosity", 1.0)])
+def test_who_senses_well_chooses_the_stronger_interval_and_takes_as_long_as_the_tasks(
+    tmp_path: Path, name: str, block: str, task_s: float
+) -> None:
+    text = text_of(name).replace("repetitions = 40", "repetitions = 4")
+    (tmp_path / "study.toml").write_text(text, encoding="utf-8", newline="\n")
+    felt = {where: made for where, made in made_up(tmp_path / "study.toml").items() if where[0] == block}
+    study = rehearse_answers(tmp_path / "study.toml", participants=1, seed=1, results=tmp_path / "s", features=felt)
+    (session,) = StudyFolder(study).sessions()
+    lines = open_events(journal.read(session.journal), read_key(study))
+    told, stronger, right = {line.event: line for line in lines[:1]}, {"SC": "second", "CS": "first"}, list[bool]()
+    for line in lines:
+        if line.event == "responses" and (told["trial_started"].level or 1.0) > 0.3:
+            right.append(line.items[0].value == stronger[told["trial_started"].arrangement])
+        if line.event == "interval_ended":
+            assert line.t_s - told["interval_started"].t_s == pytest.approx(task_s)
+        if line.event == "interval_started" and line.interval == 2:
+            assert line.t_s - told["interval_ended"].t_s == pytest.approx(0.05 + 0.6 + 0.001)
+        told[line.event] = line
+    assert sum(right) >= 0.9 * len(right) > 3
+    assert told["session_ended"].t_s == told["responses"].t_s
 
 
 def test_fewer_participants_answer_as_the_first_of_many(twelve: Path, tmp_path: Path) -> None:

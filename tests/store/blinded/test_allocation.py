@@ -166,7 +166,7 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert errors() == ""
     second.unlink()
     assert "is missing, although participant P002 has entry 2" in errors()
-    with pytest.raises(StoreError, match=r"002\.json is missing, although participant P002 has entry 2"):
+    with pytest.raises(StoreError, match=r"\b002\.json is missing, although participant P002 has entry 2"):
         begun(study.path, "P002", 2)
     second.write_text(held[0].replace('"entry": 1', '"entry": 2'), encoding="utf-8", newline="\n")
     assert "002.json: has been changed" in errors()

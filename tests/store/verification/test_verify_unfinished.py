@@ -7,8 +7,10 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
+from study_app.store.folder_lock import is_open
 from study_app.store.journals import journal_events
 from study_app.store.sessions import recovery
+from study_app.store.verification import verify_session
 from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Start
@@ -81,6 +83,21 @@ def test_what_a_running_session_is_just_recording_is_not_said_to_be_left(study: 
     assert ".trial-002.parquet.0123abcd.tmp: is an incomplete file" in left
     assert "trial-001.parquet: does not appear in the journal; resuming the session adds it" in left
     assert "recordings: trial 1, attempt 1 was not recorded, and the journal does not state why" in left
+
+
+def test_a_session_that_a_program_opens_while_it_is_checked_is_checked_again_as_running(
+    study: Path, start: Start, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    store, asked = start("P009"), list[Path]()
+    store.folder.table("brackish", "responses").write_text("a,b\n1,2\n", encoding="utf-8", newline="\n")
+    monkeypatch.setattr(
+        verify_session, "is_open", lambda path: is_open(path) and (asked.append(path) or len(asked) > 1)
+    )
+    findings = verify_study(study)
+    assert (told(findings), "sub-P009/ses-01: is open in another program" in warned(findings)) == ("", True)
+    monkeypatch.setattr(verify_session, "is_open", lambda _: False)
+    assert "responses_data.csv: has 1 rows, but the journal contains 0" in told(verify_study(study))
+    store.close()
 
 
 @pytest.mark.slow
