@@ -93,11 +93,14 @@ def test_the_task_of_an_interval_begins_with_its_first_sample_that_was_not_rejec
     assert replay_module._interval_samples(samples, 2e-6)["time_ns"].tolist() == [200, 300, 1300, 2300]
 
 
-def comes_out(place: Path, recordings: int) -> Replayed:
+def comes_out(place: Path, count: int) -> Replayed:
     """Replay a session, whose recordings come out to the last bit."""
     found = replay(place)
     assert (found.differences, found.missing, found.uncompared) == ((), (), ())
-    assert (found.recordings, found.proved) == (recordings, True)
+    assert (found.recordings, found.proved) == (count, True)
+    paths = [path for path in place.glob("recordings/*.parquet") if "frames" not in path.name]
+    times_ns = [recordings.read_samples(path, secret_of(path)).time_ns for path in paths]
+    assert found.lasted_s == pytest.approx(sum(float(each[-1] - each[0]) for each in times_ns) / 1e9)
     return found
 
 

@@ -279,6 +279,11 @@ def test_feedback_follows_the_question_of_the_phases_that_have_it(name: str, has
             kinds = [moment.kind for moment in pages_of_step(shown, index) if moment.kind != "tank"]
             asked = [] if name == "matching" else ["questions"]
             assert kinds == asked + ["feedback"] * (step.phase in has_feedback), step
+            tanks = [moment for moment in pages_of_step(shown, index) if moment.kind == "tank"]
+            for moment in tanks:
+                page = previewed_page(shown, index, moment, "en")
+                assert page.adjusts == (name == "matching" and moment == tanks[-1])
+                assert page.said == (page.question if page.adjusts else page.instruction) != ""
             phases.add(step.phase)
     assert phases >= has_feedback
 
