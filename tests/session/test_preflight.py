@@ -95,6 +95,7 @@ FACTS: tuple[tuple[str, dict[str, Any], str], ...] = (
     ("small", {"free_bytes": None}, "warning Free space: not known; a session needs about 64 MB"),
     *(("small", {"free_bytes": count}, f"{verdict} Free space: {count / 1e6:.0f} MB free; a session needs about 64 MB")
       for count, verdict in ((19_000_000, "failure"), (60_500_000, "failure"), (10**8, "ok"), (3 * 10**8, "ok"))),
+    ("small", {"free_bytes": 1_234_567_890_000}, "ok Free space: 1 234 568 MB free"),
     *(("small", {"free_bytes": count, "recordings": False}, f"{verdict} Free space: {count / 1e6:.0f} MB free; a "
        "session needs about 60 MB")
       for count, verdict in ((19_000_000, "failure"), (59_000_000, "failure"), (60_500_000, "ok"))),

@@ -28,6 +28,11 @@ GOLDEN = Path(__file__).parent / "golden"
 class Recorded(World):
     """A world with a serial servo that may fault, whose calls of parts are kept too."""
 
+    tables_written = 0
+
+    def write_tables(self) -> None:
+        self.tables_written += 1
+
     def call(self, name: str, result: Any = None) -> Any:
         def called(*values: Any) -> Any:
             self.done.append((name, values))
@@ -237,6 +242,13 @@ VIEWS = {
         ("abort", FULL.replace("trouble", "ended", 1)),
     ],
 }
+LOGGED = {
+    "full disk": [
+        *("the session waits: no space left on the disk: free some", "the disk accepts data again"),
+        "the session waits: no space left on the disk: free some",
+    ],
+    "lost device": ["the session failed: no device is plugged in", "the device was not reconnected: still none"],
+}
 """Where what the operator is told changes: the first ``wait`` is the beginning."""
 
 
@@ -284,11 +296,13 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
     monkeypatch.setattr(bridge.participant, "bring_forward", world.call("participant.bring_forward"))
     monkeypatch.setattr(bridge.operator, "show_message", world.call("show_message"))
     lines, before, calls, views = [], list[str](), dict[str, list[str]](), list[tuple[str, str]]()
+    logged: list[str] = []
     for step in PLAYS[name].split(", "):
         world.now_s += 0.25
         world.done.clear()
         caplog.clear()
         STEPS[step](bridge, world)
+        logged += [one.getMessage() for one in caplog.records if one.levelno >= logging.WARNING]
         calls.setdefault(step, []).append(", ".join(map(words_of, world.done)))
         if isValid(bridge) and not bridge._gone and name in VIEWS:
             words = view_words(bridge.view())
@@ -303,6 +317,8 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
             lines += (f"# {line}" for line in changed(before, after))
             before = after
     caplog.clear()
+    assert world.tables_written > 0
+    assert logged == LOGGED.get(name, logged)
     assert {step: calls[step] for step in CALLS.get(name, ())} == CALLS.get(name, {})
     assert views == VIEWS.get(name, [])
     compare(GOLDEN / f"bridge_{name.replace(' ', '_')}_{blinding}.txt", calls_and_words(lines), pytestconfig)

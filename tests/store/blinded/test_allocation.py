@@ -175,6 +175,8 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert "has been changed" in errors()
     with pytest.raises(StoreError, match="restore it from a backup"):
         begun(study.path, "P003", 2)
+    third.write_text(re.sub('"sealed": "[^"]*"', '"group": "first_thin"', held[2]), encoding="utf-8", newline="\n")
+    assert "003.json: has been changed" in errors()
     third.write_text(held[2], encoding="utf-8", newline="\n")
     first.write_text(re.sub(r'(..)"}', '00"}', held[0]), encoding="utf-8", newline="\n")
     with pytest.raises(StoreError, match="has been changed: restore it from a backup"):

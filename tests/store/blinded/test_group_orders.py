@@ -14,7 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.durations import own_protocol
 from study_app.session.resume import begun_schedule
 from study_app.session.start import resumed_choices
-from study_app.store.blinded.allocation import claims
+from study_app.store.blinded.allocation import allocate, claims
 from study_app.store.blinded.blinding import participant_group, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.journals.journal_events import start_of
@@ -139,6 +139,8 @@ def test_a_preexisting_group_is_recorded_and_never_inferred(tmp_path: Path) -> N
     variables = json.loads(study.description.read_text("utf-8"))["variableMeasured"]
     assert "group" in [variable["name"] for variable in variables]
     assert not verify_study(study.path).errors
+    further = [allocate(study, store.key, who, group=group) for who, group in (("P7", "novices"), ("P8", "experts"))]
+    assert [(made.group, made.entry) for made in further if made is not None] == [("novices", 2), ("experts", 1)]
 
 
 def _written(folder: Path, source: bytes) -> str:

@@ -227,6 +227,11 @@ def test_a_stamp_tells_when_the_study_was_so_and_leaves_by_itself(
         verify_study(study, kept)
 
 
+def test_no_proof_is_written_unless_the_settings_name_a_folder(study: Path) -> None:
+    write_proof(StudyFolder(study), pytest.fail)
+    wait_for_proofs()
+
+
 def test_a_server_that_gives_no_stamp_is_named_and_the_program_goes_on(study: Path, tmp_path: Path) -> None:
     pytest.importorskip("rfc3161_client", reason="the optional extra proofs is not installed")
     workstation.save_settings(workstation.MachineSettings(proofs=str(tmp_path), stamps="http://127.0.0.1:9"))
