@@ -11,7 +11,7 @@ from hypothesis.stateful import RuleBasedStateMachine, rule, run_state_machine_a
 
 from study_app.errors import StoreError
 from study_app.store import unblinding
-from study_app.store.exclusions import Exclusion, exclude, exclusions, include, reversals
+from study_app.store.exclusions import Exclusion, exclude, exclusions, include, keep, reversals
 from study_app.store.unblinding import late_exclusions, unblind
 from study_app.store.verification.verify_study import verify_study
 from tests.platforms import files_up_to
@@ -96,6 +96,13 @@ def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, m
     assert {row.reason for row in found} == {"3 of 4 catch trials; 2 of 2 catch trials"}
     include(folder, "P007", 1, by="AB", reason="the task was understood late")
     assert unblinding.exclude_inattentive(folder) == ()
+    with pytest.raises(StoreError, match="is excluded: include it without --rule"):
+        keep(folder, "P008", 1, rule="fast_answers", by="AB", reason="it counts")
+    for rule in ("fast_answers", "below_chance"):
+        keep(folder, "P007", 1, rule=rule, by="AB", reason="it counts")
+        with pytest.raises(StoreError, match=f"has already been kept, although the rule {rule} applies"):
+            keep(folder, "P007", 1, rule=rule, by="AB", reason="it counts")
+    assert [row.rule_or_person for row in reversals(folder)] == ["catch", "fast_answers", "below_chance"]
 
 
 def test_a_full_disk_leaves_the_list_as_it_was(folder: Path) -> None:

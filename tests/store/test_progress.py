@@ -85,6 +85,20 @@ def test_each_step_lasts_from_its_first_page_to_the_next_without_the_time_of_a_g
     assert [status for status, ended in ends.items() if ended.reached_end] == ["completed", "incomplete"]
 
 
+def test_each_further_attempt_at_a_trial_of_intervals_has_its_reason() -> None:
+    progress = Progress()
+    for attempt, (outcome, between) in enumerate(
+        (("interrupted", {}), ("complete", {"name": "repeat", "reason": "a call"}), ("invalid", {}), ("", {})), start=1
+    ):
+        which = {"trial": 4, "attempt": attempt}
+        progress.process_line(event_of("trial_started", t_s=10.0, phase="main", arrangement="SC", **which))
+        progress.process_line(event_of("trial_ended", t_s=12.0, outcome=outcome, **which))
+        if between:
+            progress.process_line(event_of(t_s=13.0, trial=4, **between))
+    assert progress.repeated == {4: ("interrupted", "a call")}
+    assert progress.invalid == 1
+
+
 def test_choices_that_were_not_confirmed_are_kept_by_trial_and_attempt() -> None:
     progress = Progress()
     lines = [
