@@ -98,10 +98,10 @@ def test_a_rule_excludes_no_session_that_a_person_included_again(folder: Path, m
     assert unblinding.exclude_inattentive(folder) == ()
     with pytest.raises(StoreError, match="is excluded: include it without --rule"):
         keep(folder, "P008", 1, rule="fast_answers", by="AB", reason="it counts")
-    for rule in ("fast_answers", "below_chance"):
-        keep(folder, "P007", 1, rule=rule, by="AB", reason="it counts")
-        with pytest.raises(StoreError, match=f"has already been kept, although the rule {rule} applies"):
-            keep(folder, "P007", 1, rule=rule, by="AB", reason="it counts")
+    for planned in ("fast_answers", "below_chance"):
+        keep(folder, "P007", 1, rule=planned, by="AB", reason="it counts")
+        with pytest.raises(StoreError, match=f"has already been kept, although the rule {planned} applies"):
+            keep(folder, "P007", 1, rule=planned, by="AB", reason="it counts")
     assert [row.rule_or_person for row in reversals(folder)] == ["catch", "fast_answers", "below_chance"]
 
 
