@@ -1,8 +1,8 @@
 """Transcripts: commands, and what each of them does, in files that people review.
 
 A transcript is a name (``=== name``), the state it starts from, commands, and below each command what it did (``>``).
-``--regenerate`` writes the lines with ``>`` anew. Lines with ``!`` are assertions, which it leaves: one for each line
-that the command says, with words in it; " … " stands for the words between.
+``--regenerate`` writes the lines with ``>`` anew. A file may have lines with ``!`` instead, which it leaves: one for
+each line that a command says, with words that it must have; " … " stands for the words between.
 """
 
 import ast
@@ -18,24 +18,23 @@ Play = Callable[[str, list[str]], Iterator[str]]
 """Yields the commands of a transcript, from a start, each with what it does."""
 
 
-def played(file: Path, play: Play) -> Iterator[str]:
-    """Yield the lines of a file of transcripts with what the commands do now."""
-    for number, part in enumerate(file.read_text(encoding="utf-8").removeprefix("=== ").split("\n=== ")):
-        name, start, *lines = part.strip("\n").split("\n")
-        yield from ("", f"=== {name}", start) if number else (f"=== {name}", start)
-        asserted: list[list[str]] = []
-        for line in lines:
-            if not line.startswith(("!", ">")):
-                asserted.append([])
-            elif line.startswith("!"):
-                asserted[-1].append(line)
-        did: list[tuple[str, list[str]]] = []
-        for line in play(start.removeprefix("start:").strip(), [line for line in lines if line[:1] not in ("!", ">")]):
+def played(file: Path, play: Play) -> list[str]:
+    """Return the lines of a file of transcripts with what the commands do now; in a file with `!` all is asserted."""
+    text, lines = file.read_text(encoding="utf-8"), list[str]()
+    for part in text.removeprefix("=== ").split("\n=== "):
+        name, start, *told = part.strip("\n").split("\n")
+        lines += [*[""] * bool(lines), f"=== {name}", start]
+        asserted, did = list[list[str]](), list[tuple[str, list[str]]]()
+        for line in told:
+            asserted[-1].append(line) if line.startswith((">", "!")) else asserted.append([])
+        commands = [line for line in told if not line.startswith((">", "!"))]
+        for line in play(start.removeprefix("start:").strip(), commands):
             did[-1][1].append(line) if line.startswith(">") else did.append((line, []))
         for (command, said), words in zip(did, asserted, strict=True):
-            yield command
-            assert not words or [*map(_has_words, words, said)] == [True] * len(said), f"{name}, {command}: {said}"
-            yield from words or said
+            if "\n! " in text:
+                assert [*map(_has_words, words, said)] == [True] * max(len(said), len(words)), (name, command, said)
+            lines += [command, *(words if "\n! " in text else said)]
+    return lines
 
 
 def _has_words(words: str, said: str) -> bool:

@@ -26,7 +26,7 @@ def test_what_is_said(
     def made(start: str) -> Path:
         return once(tmp_path_factory, f"replayed-{start}", STARTS[start])
 
-    lines = list(played(file, player(made, tmp_path)))
+    lines = played(file, player(made, tmp_path))
     compare(file, lines, pytestconfig)
     assert not [line for line in lines if line.startswith("> ") and SECRET.search(line)], (
         "no sentence tells a condition"
