@@ -51,6 +51,8 @@ def test_the_unit_of_every_column_is_the_one_at_the_end_of_its_name() -> None:
 )
 def test_a_heading_is_followed_by_file_and_meaning_of_a_row(title: str, file: str, meaning: str) -> None:
     assert f"## {title}\n\n`{file}`: {meaning}\n\n" in dictionary_markdown()
+    heads = re.findall(r"(?:^|\n)(.*)\n(\|.*\|)\n\| ?---", dictionary_markdown())
+    assert {(before, len(head.split("|"))) for before, head in heads} == {("", 5)}
 
 
 def test_the_column_of_kinds_names_every_kind_of_question() -> None:
