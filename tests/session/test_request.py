@@ -1,6 +1,7 @@
 """What is chosen before a session, and what is refused before any window opens for it."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -8,8 +9,10 @@ from study_app import app
 from study_app.app.session import live_session
 from study_app.errors import StoreError
 from study_app.protocol.source.files import source_bytes
+from study_app.session import start
 from study_app.session.start import NewSession, draw_seed, resumed_choices
 from study_app.store.sessions.open_session import SessionStore
+from study_app.store.workstation import MachineSettings
 from tests import studies
 
 
@@ -40,6 +43,21 @@ def test_a_drawn_seed_is_from_1_to_the_largest_that_a_person_would_copy(monkeypa
     for drawn, seed in ((lambda _: 0, 1), (lambda below: below - 1, 999_999)):
         monkeypatch.setattr("secrets.randbelow", drawn)
         assert draw_seed() == seed
+
+
+def test_outlets_are_opened_for_markers_or_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[tuple[object, ...]] = []
+    servo: Any = object()
+    monkeypatch.setattr(start, "Outlets", lambda *told: opened.append(told))
+    for settings in (
+        {},
+        {"triggers": "udp:lab:9"},
+        {"lsl_markers": True, "triggers": "usb:1"},
+        {"lsl_samples": "always"},
+    ):
+        start.open_outlets(MachineSettings(**settings), servo, "single")
+    addresses = (("udp:lab:9",), "off"), (("lsl", "usb:1"), "off"), ((), "always")
+    assert opened == [(*told, servo, "single") for told in addresses]
 
 
 def test_a_session_that_is_open_is_refused_before_any_window(begun: SessionStore, windows: list[NewSession]) -> None:

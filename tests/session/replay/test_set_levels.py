@@ -102,6 +102,7 @@ def test_other_numbers_are_set_and_proved(edits: tuple[tuple[str, str], ...], tm
     unblind(tmp_path / "study", by="AK", reason="a test")
     begun = [line for line in lines if line["event"] == "interval_started" and line["trial"] == 1][-1]
     shown = read_watched(session, 1, interval=begun["interval"])
+    assert shown.ends_s == max(shown.times_s[-1], shown.marks[-1].at_s)
     zero_s = shown.samples["time_ns"][0] * 1e-9 - shown.times_s[0]
     origin_ns = read(session / "receipt.json")["clock"]["origin_ns"]
     assert zero_s - origin_ns * 1e-9 == pytest.approx(begun["t_s"], abs=0.005)
