@@ -3,9 +3,11 @@
 import json
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import pytest
 from click.testing import CliRunner
@@ -17,12 +19,15 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule
 from study_app.protocol.source.files import protocol_hash, source_bytes
+from study_app.session import preflight_measurements
 from study_app.session.pages import PausePage
+from study_app.session.preflight import Masking, Screen
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule, find_protocol, is_rehearsal, resume_at
-from study_app.session.start import NewSession, check_choices, open_store, resumed_choices
+from study_app.session.start import MEASURED_S, NewSession, check_choices, measure_rig, open_store, resumed_choices
 from study_app.session.transitions.events import Begin, ResumeRequested, ShowPage, StartTrial, Write
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import advance, initial_state
+from study_app.store import receipt
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
@@ -235,6 +240,32 @@ def test_receipt_keeps_the_row_and_reproduce_uses_it(square: Path, row_of: str, 
     assert any(
         "differs from the journal in row_of" in str(one) for one in verify_study(square.parent / "results").errors
     )
+
+
+def test_a_session_is_measured_and_begun_with_what_was_chosen(square: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = mock.Mock(return_value=small.WELL)
+    monkeypatch.setattr(preflight_measurements, "measure_servo_and_disk", asked)
+    videos: Any = SimpleNamespace(open=lambda: "opened", describe=lambda: {"camera": "left"})
+    rig: Any = SimpleNamespace(device=SimpleNamespace(name="mouse"), **vars(RIG))
+    chosen = chosen_for(square, "P025", "P002")
+    played = replace(chosen, row_of=None, played=True, recordings=True)
+    for given, participant, lasts_s in ((chosen, "P002", MEASURED_S), (played, "P025", 0.5)):
+        facts = measure_rig(rig, given, videos, sleep=str)
+        told = {"device": "mouse", "screen": Screen(0.0, 1.0), "participant": participant, "sleep": str}
+        asked.assert_called_with(rig.servo, chosen.results, recordings=given.recordings, lasts_s=lasts_s, **told)
+        assert (facts.video, facts.ran_otherwise, facts.untranslated, facts.late_device) == ("opened", "", (), "")
+    outlets: Any = Collector()
+    outlets.described = {"markers": ["usb:1"]}
+    source = square.read_bytes()
+    more = Masking("noise", 61), outlets, videos
+    with open_store(chosen, parse(source, str(square)), source, RIG, {"one": {"width": 9}}, *more) as store:
+        held, first = receipt.read(store.folder.receipt), start_of(store.lines)
+    told = {"participant": "P025", "session": 1, "seed": SEED, "operator": "AK", "language": "en", "device": "mouse"}
+    told |= {"simulated": False, "pilot": False, "recordings": False, "row_of": "P002"}
+    assert {name: getattr(first, name) for name in told} == told
+    told = {"device": {"name": "mouse"}, "screens": {"one": {"width": 9}}, "outlets": {"markers": ["usb:1"]}}
+    told |= {"motors_masked": {"means": "noise", "noise_db": 61}, "video": {"camera": "left"}}
+    assert {name: held[name] for name in told} == told
 
 
 def test_resumed_session_keeps_the_row(square: Path) -> None:
