@@ -16,11 +16,13 @@ from study_app.store.workstation import (
     STATEMENT_X_HEIGHT_PX,
     DisplayOffset,
     MachineSettings,
+    keep_workspace,
     load_settings,
     recent_protocols,
     remember_protocol,
     save_settings,
 )
+from study_app.workspace import Workspace
 
 OFFSET = DisplayOffset(mean_ms=23.5, spread_ms=1.2, how="photodiode", measured="2026-11-20", screen="DP-1")
 ALL = MachineSettings(
@@ -72,6 +74,13 @@ def test_recent_protocols_are_those_that_still_exist_newest_first(tmp_path):
         remember_protocol(file)
     files[1].unlink()
     assert recent_protocols() == (str(files[2]), str(files[0]))
+
+
+def test_a_chosen_workspace_is_created_and_kept_with_the_other_settings(tmp_path):
+    save_settings(ALL)
+    keep_workspace(Workspace(tmp_path / "new"))
+    assert load_settings() == ALL.model_copy(update={"workspace": str(tmp_path / "new")})
+    assert sorted(path.name for path in (tmp_path / "new").iterdir()) == ["protocols", "results"]
 
 
 def _full(_descriptor):

@@ -124,7 +124,7 @@ def one_screen(make, qtbot):
     return bridge
 
 
-def test_the_strip_covers_no_page_and_stops_the_force_at_the_first_touch(one_screen, world, qtbot):
+def test_the_strip_covers_no_page_and_stops_the_force_at_the_first_touch(one_screen, world, qtbot, monkeypatch):
     strip, participant = one_screen.strip, one_screen.participant
     for page in ("text", "tank"):
         assert strip.isVisible(), page
@@ -134,6 +134,10 @@ def test_the_strip_covers_no_page_and_stops_the_force_at_the_first_touch(one_scr
     assert (strip.state.word, world.force_is_on) == ("Running", True)
     qtbot.mousePress(strip.stop, LEFT)
     assert (strip.state.word, world.force_is_on) == ("Paused, force is off", False)
+    raised = []
+    monkeypatch.setattr(participant, "bring_forward", lambda: raised.append(strip.state.word))
+    one_screen.operator.ask("resume")
+    assert (raised, world.force_is_on) == (["Running"], True)
 
 
 def test_the_strip_stops_the_force_though_nothing_can_be_recorded(one_screen, world, qtbot, monkeypatch, caplog):

@@ -43,6 +43,9 @@ def test_after_its_end_a_session_takes_nothing(start: Start) -> None:
         with pytest.raises(StoreError, match="occurred after the end of the session"):
             late()
     assert receipt.read(store.folder.receipt)["status"] == "completed"
+    (left := start("P008")).close()
+    with pytest.raises(StoreError, match="occurred after the end of the session"):
+        left.append(journal_events.Note(kind="note", text="late"))
 
 
 def trial_of(number: int, **changes: Any) -> dict[str, Any]:
