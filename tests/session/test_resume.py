@@ -2,7 +2,6 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -33,7 +32,6 @@ from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduce_session
 from study_app.store.verification.verify_study import verify_study
-from tests import golden
 from tests.journal_lines import event_from, event_of
 from tests.outlets.collector import Collector
 from tests.session import small
@@ -74,52 +72,38 @@ def walked(protocol: Protocol, lines: list[dict[str, Any]]) -> tuple[list[dict[s
         event = ResumeRequested(at_s, "participant") if paused else small.next_event(state, at_s)
 
 
-def where(lines: list[dict[str, Any]], first: int, *, breaks: bool = False) -> Iterator[str]:
-    """Yield each line of a journal and, where it has changed, what is presented if the journal ends there."""
-    before = None
-    for count in range(first, len(lines) + 1):
-        line = lines[count - 1]
-        said = (str(line[name]) for name in ("event", "page", "trial", "item") if line.get(name) is not None)
-        yield " ".join(said)
-        found = [walked(study(resume, breaks=breaks), lines[:count])[1] for resume in ("trial", "block")]
-        if found != before:
-            for resume, then in zip(("trial", "block"), found, strict=True):
-                yield f"    by {resume}: {', '.join(then) or 'nothing'}"
-        before = found
+BLOCKS: dict[int | str, str] = {1: "practice", 2: "feeling", 3: "feeling", 4: "baseline", 5: "seeing", 6: "seeing"}
+UNASKED = (1, 4)
+"""Trials without questions."""
 
 
-def test_where_it_goes_on_for_every_last_line(pytestconfig: pytest.Config) -> None:
-    def told() -> Iterator[str]:
-        lines = [STARTED, *walked(study("block"), [STARTED])[0]]
-        yield "=== a session"
-        yield from where(lines, 1)
-        yield "=== a session with breaks within a block"
-        yield from where([STARTED, *walked(study("block", breaks=True), [STARTED])[0]], 1, breaks=True)
-        yield "=== a session that went on by block after the first choice about its third trial"
-        cut = next(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
-        again = [*lines[: cut + 1], {"event": "session_resumed", "t_s": 100.0}]
-        yield from where([*again, *walked(study("block"), again)[0]], len(again))
-
-    lines = golden.each_once(golden.what_comes(told()))
-    golden.compare(Path(__file__).parent / "golden" / "resume.txt", lines, pytestconfig)
-
-
-BLOCKS = {1: "practice", 2: "feeling", 3: "feeling", 4: "baseline", 5: "seeing", 6: "seeing"}
+def presented_after(lines: list[dict[str, Any]], resume: str, *, breaks: bool) -> list[str]:
+    """Return what is presented after these lines: from the first step that is not finished, or its block's first."""
+    steps: list[Any] = ["welcome", 1, 2, *["rest"] * breaks, *range(3, 7), "thanks"]
+    begun, at = Counter(line["trial"] for line in lines if line["event"] == "trial_started"), 0
+    for line in lines:
+        name = line.get("page", line.get("trial"))
+        if line["event"] in {"page_shown", "trial_started"}:
+            at = steps.index(name)
+        if line["event"] in {"page_left", "responses"} or (line["event"] == "trial_ended" and name in UNASKED):
+            at = steps.index(name) + 1
+    block = (BLOCKS | {"rest": "feeling"}).get(steps[at]) if at < len(steps) else None
+    if block is not None and resume == "block":
+        at = steps.index(next(trial for trial, its_block in BLOCKS.items() if its_block == block))
+    left = [f"{BLOCKS[step]} {step}/{begun[step] + 1}" if step in BLOCKS else step for step in steps[at:]]
+    return [*["waits"] * (steps[at : at + 1] != [] and steps[at] in BLOCKS), *left]
 
 
 @pytest.mark.parametrize("resume", ["trial", "block"])
-def test_it_goes_on_with_all_that_is_not_finished(resume: str) -> None:
-    lines = [STARTED, *walked(study("block"), [STARTED])[0]]
-    for count in range(1, len(lines) + 1):
-        begun = Counter(line["trial"] for line in lines[:count] if line["event"] == "trial_started")
-        finished = {line.get("page", line.get("trial")) for line in lines[:count] if line["event"] in {
-            "page_left", "responses"} or (line["event"] == "trial_ended" and line["trial"] in {1, 4})}  # fmt: skip
-        left: list[Any] = [step for step in ("welcome", *BLOCKS, "thanks") if step not in finished]
-        waits = ["waits"] * (left[:1] != [] and left[0] in BLOCKS)
-        if waits and resume == "block":
-            left = [trial for trial in BLOCKS if BLOCKS[trial] == BLOCKS[left[0]] and trial not in left] + left
-        named = [f"{BLOCKS[step]} {step}/{begun[step] + 1}" if step in BLOCKS else step for step in left]
-        assert walked(study(resume), lines[:count])[1] == waits + named, lines[count - 1]
+@pytest.mark.parametrize("breaks", [False, True])
+def test_it_goes_on_with_what_is_not_finished(resume: str, breaks: bool) -> None:
+    lines = [STARTED, *walked(study("block", breaks=breaks), [STARTED])[0]]
+    cut = next(n for n, line in enumerate(lines) if line["event"] == "choice" and line["trial"] == 3)
+    again = [*lines[: cut + 1], {"event": "session_resumed", "t_s": 100.0}]
+    for told in (lines, [*again, *walked(study("block", breaks=breaks), again)[0]]):
+        for count in range(1, len(told) + 1):
+            found = walked(study(resume, breaks=breaks), told[:count])[1]
+            assert found == presented_after(told[:count], resume, breaks=breaks), told[count - 1]
 
 
 def test_a_journal_of_another_order_is_refused() -> None:

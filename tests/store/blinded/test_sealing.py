@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.blinded.blinding import Key, open_events, seal_event
+from study_app.store.blinded.sealing import MARK, open_file, recording_bytes, samples_bytes, seal_file
 from study_app.store.columns import SEALED, TRIALS
 from tests.journal_lines import event_of
 
@@ -70,6 +71,18 @@ def test_all_texts_are_equally_long_and_every_number_comes_back(measured: dict[s
     if measured:
         assert len(line["sealed"]) == len(ended(MEASURED)["sealed"])
     assert found_in(line) == {**WHICH, **measured}
+
+
+def test_a_file_has_the_room_of_its_kind_doubled_until_it_fits_and_opens_unless_it_was_changed() -> None:
+    head, secret = len(MARK) + 16, bytes(range(32))
+    rooms = {count: len(seal_file(bytes(count), 100, secret)) - head for count in (0, 92, 93, 192, 193)}
+    assert rooms == {0: 100, 92: 100, 93: 200, 192: 200, 193: 400}
+    seconds = {0.1: 1, 1.0: 1, 1.1: 2, 2.0: 2, 3.0: 4, 5.0: 8}
+    assert [samples_bytes(each, 500.0) for each in seconds] == [16_384 + 64 * 500 * room for room in seconds.values()]
+    assert recording_bytes(3.0, 500.0) == 2 * 16_384 + 4 * (64 * 500 + 6_000)
+    sealed = seal_file(b"what was felt", 100, secret)
+    assert open_file(bytes(sealed), secret) == b"what was felt"
+    assert open_file(bytes(sealed), bytes(32)) is open_file(bytes(sealed[:-1]) + b"!", secret) is None
 
 
 def test_equal_numbers_of_two_trials_look_different() -> None:
