@@ -138,6 +138,8 @@ def test_the_strip_covers_no_page_and_stops_the_force_at_the_first_touch(one_scr
     monkeypatch.setattr(participant, "bring_forward", lambda: raised.append(strip.state.word))
     one_screen.operator.ask("resume")
     assert (raised, world.force_is_on) == (["Running"], True)
+    one_screen.leave_without_asking()
+    assert (world.done[-1], world.force_is_on) == (("paused", {"by": "program"}), False)
 
 
 def test_the_strip_stops_the_force_though_nothing_can_be_recorded(one_screen, world, qtbot, monkeypatch, caplog):

@@ -17,6 +17,7 @@ from study_app.store.tables.session_tables import _MEASURED, SessionRows, latest
 from study_app.store.tables.study_files import row_of
 from tests.store.tables.test_transcripts import Lines
 
+NUMBER = (Column("first", "number", "One."),)
 TEXT = (Column("first", "text", "One."), Column("second", "text", "Two."))
 
 
@@ -41,6 +42,13 @@ def test_any_text_comes_back_through_the_csv_module(texts: list[tuple[str, str]]
 )
 def test_what_is_not_known_or_not_a_text_has_one_spelling(value: Any, cell: str) -> None:
     assert csv_bytes(TEXT[:1], [{"first": value}]) == f"first\n{cell}\n".encode()
+
+
+def test_numbers_are_written_again_as_they_were_read() -> None:
+    content = b"first\n7\n-12\n0.5\n123456789012345678901\n"
+    assert csv_bytes(NUMBER, read_table(content, NUMBER)) == content.replace(
+        b"123456789012345678901", b"1.2345678901234568e+20"
+    )
 
 
 def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str, Any]) -> None:
