@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from PySide6.QtCore import QEvent
 from PySide6.QtWidgets import QApplication
 from shiboken6 import isValid
 
+from study_app.app.session import bridge as bridge_module
 from study_app.errors import DeviceNotFound, ServoFault, VideoError
 from study_app.gui.operator.session_panels import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
@@ -279,8 +281,11 @@ def calls_and_words(lines: list[str]) -> Iterator[str]:
     ],
 )
 def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, caplog: Any, monkeypatch: Any) -> None:
-    world = Recorded()
-
+    world, computer = Recorded(), mock.Mock()
+    for part in ("Awake", "ThreadPriority"):
+        monkeypatch.setattr(bridge_module, part, lambda: computer)
+    for call in ("freeze_garbage", "unfreeze_garbage"):
+        monkeypatch.setattr(bridge_module, call, getattr(computer, call))
     recorder = SimpleNamespace(
         start=world.call("recorder.start"), append=lambda *_: None, frame=world.call("recorder.frame"),
         stop=world.call("recorder.stop"), end_without_waiting=lambda: True, lost=(), dropped=2,
@@ -318,6 +323,8 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
             before = after
     caplog.clear()
     assert world.tables_written > 0
+    began, left = ["freeze_garbage", "raise_priority", "begin"], ["restore", "end", "unfreeze_garbage"]
+    assert [call for call, *_ in computer.method_calls] == began + left
     assert logged == LOGGED.get(name, logged)
     assert {step: calls[step] for step in CALLS.get(name, ())} == CALLS.get(name, {})
     assert views == VIEWS.get(name, [])
