@@ -16,9 +16,7 @@ from study_app.session.transitions.events import (
     Begin,
     Chosen,
     Continue,
-    EndRequested,
     FadeIn,
-    Finish,
     ForceStopped,
     ItemShown,
     LanguageChosen,
@@ -89,23 +87,6 @@ def test_who_may_resume_after_a_pause_and_a_stop(paused_by: Any, stopped_by: Any
             advance(state, ResumeRequested(3.0, "participant"))
     state, commands = advance(state, ResumeRequested(4.0, "operator" if refusal else "participant"))
     assert (state.phase, state.force_off, FadeIn() in commands) == (Phase.READING, False, True)
-
-
-@pytest.mark.parametrize(
-    ("phase", "asked", "status"),
-    [
-        (Phase.TROUBLE, "aborted", "broken"),
-        (Phase.TROUBLE, "withdrawn", "withdrawn"),
-        (Phase.TASK, "aborted", "aborted"),
-        (Phase.TASK, "withdrawn", "withdrawn"),
-    ],
-)
-def test_a_session_that_is_ended_after_a_failure_is_broken_unless_the_participant_withdrew(
-    phase: Phase, asked: Any, status: str
-) -> None:
-    state, commands = advance(state_in(phase), EndRequested(9.0, asked, "tired"))
-    assert [command for command in commands if isinstance(command, Finish)] == [Finish(status, "tired")]
-    assert (state.phase, state.interrupted) == (Phase.ENDED, None)
 
 
 def test_the_operator_takes_over_a_pause_once_and_the_tables_are_written() -> None:
