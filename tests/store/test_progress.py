@@ -99,6 +99,21 @@ def test_each_further_attempt_at_a_trial_of_intervals_has_its_reason() -> None:
     assert progress.invalid == 1
 
 
+@pytest.mark.parametrize(
+    ("limits", "invalid", "missing"), [({"attempts": 3.0}, 2, 0), ({"attempts": 3.0}, 3, 1), ({}, 1, 1)]
+)
+def test_a_trial_is_missing_once_it_is_not_presented_again(
+    limits: dict[str, float], invalid: int, missing: int
+) -> None:
+    progress = Progress()
+    progress.process_line(event_of("session_started", limits=limits))
+    for attempt in range(1, invalid + 1):
+        which = {"trial": 4, "attempt": attempt}
+        progress.process_line(event_of("trial_started", phase="main", arrangement="SC", block="b", code="V1", **which))
+        progress.process_line(event_of("trial_ended", outcome="invalid", **which))
+    assert (progress.missing_trials.count, progress.missing_trials.asked) == (missing, missing)
+
+
 def test_choices_that_were_not_confirmed_are_kept_by_trial_and_attempt() -> None:
     progress = Progress()
     lines = [
