@@ -154,7 +154,7 @@ def test_both_sides_of_each_limit(pytestconfig: pytest.Config) -> None:
         lines += [f"== {name}", *(f"{check} {check.share}" for check in preflight_checks(small.WELL, study))]
     for name, changed, told in FACTS:
         found = preflight_checks(replace(small.WELL, **changed), known[name])
-        checks = [f"{check.verdict} {check.name}: {check.value}; {check.about}" for check in found]
+        checks = ["{verdict} {name}: {value}; {about}".format(**check.entry) for check in found]
         assert [line.startswith(told) for line in checks].count(True) == 1 if told else "Velocity" not in str(checks), (
             f"{changed} is not told as {told!r}: {checks}"
         )
