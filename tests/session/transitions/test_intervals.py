@@ -7,14 +7,17 @@ from typing import Any
 import pytest
 
 from study_app.errors import SessionError
+from study_app.protocol.load import parse
+from study_app.session.pages import FeedbackPage
 from study_app.session.resume import resume_at
-from study_app.session.transitions.events import Begin, Finish, ResumeRequested, TaskDone, TimeUp, Write
+from study_app.session.transitions.events import Begin, Finish, ResumeRequested, StartTrial, TaskDone, TimeUp, Write
 from study_app.session.transitions.state import FINAL, Phase, SessionState
 from study_app.session.transitions.table import advance
 from tests.journal_lines import event_from
+from tests.protocol.trials.level_studies import text_of
 from tests.session import pairs
-from tests.session.transitions.states import written
-from tests.session.transitions.transcribed import to_trial
+from tests.session.transitions.states import shown, written
+from tests.session.transitions.transcribed import opened, to_trial
 
 DONE = TaskDone(10.0, "complete", {})
 
@@ -158,3 +161,32 @@ def answers(lines: list[dict[str, Any]]) -> dict[int, list[Any]]:
         if line["event"] == "responses":
             found[line["trial"]] = [item["value"] for item in line["items"]]
     return found
+
+
+def test_intervals_rests_and_feedback_last_as_long_as_the_design_says() -> None:
+    text = text_of(*pairs.EDITS, more=pairs.PRACTICE).replace('design = "2ifc"', 'design = "pairs"')
+    text += '\n[designs.pairs]\nkind = "2ifc"\npause_s = 0.75\nbetween_s = 2.5\nfeedback_s = 1.5\n'
+    state, at_s, phases = opened(parse(text.encode(), "study.toml")), 1.0, set()
+    while state.phase not in FINAL:
+        event = pairs.next_event(state, at_s)
+        if isinstance(event, TimeUp) and state.until_s is not None:
+            assert advance(state, TimeUp(state.until_s - 1e-6))[1] == (), "before its end"
+            event = TimeUp(state.until_s)
+        state, commands = advance(state, event)
+        page = shown(commands)
+        if state.phase is Phase.RESTING:
+            assert state.until_s == pytest.approx(event.at_s + (2.5 if state.interval == 1 else 0.05 + 0.75))
+            assert state.interval == 2 or state.plan.schedule.steps[state.index - 1].block == state.trial.block
+        if state.phase is Phase.TASK:
+            (start,) = (command for command in commands if isinstance(command, StartTrial))
+            assert state.due is not None
+            assert start.presented == state.due.intervals[state.interval - 1]
+            assert start.task == page.task == state.plan.protocol.tasks["stir"]
+        if state.phase in {Phase.RESTING, Phase.TASK}:
+            resting = state.phase is Phase.RESTING
+            assert (page.interval.number, page.interval.of, page.interval.resting) == (state.interval, 2, resting)
+        if isinstance(page, FeedbackPage):
+            assert (state.until_s, page.right) == (event.at_s + 1.5, True)
+        phases.add(state.phase)
+        at_s = event.at_s + 1.25
+    assert {Phase.RESTING, Phase.TASK, Phase.FEEDBACK, Phase.ANSWERING} <= phases
