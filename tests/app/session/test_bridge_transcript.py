@@ -270,6 +270,36 @@ def calls_and_words(lines: list[str]) -> Iterator[str]:
             yield f"  {text}"
 
 
+def test_a_place_is_the_newest_one_or_a_simulated_hands_aim() -> None:
+    at_ns: Any = SimpleNamespace(position_at=lambda time_ns: (np.array((1.0, 2.0, 3.0)) * time_ns, time_ns))
+    servo: Any = SimpleNamespace(now_ns=lambda: 7, telemetry=at_ns)
+    hand: Any = SimpleNamespace(aim_m=(4.0, 5.0, 6.0))
+    assert bridge_module._make_position_reader(None, servo)() == (7.0, 14.0, 21.0)
+    assert bridge_module._make_position_reader(hand, servo)() == (4.0, 5.0, 6.0)
+
+
+@pytest.mark.parametrize(("has_videos", "fault", "called"), [
+    (False, None, ["rig"]), (False, "lost", ["rig"]), (True, None, ["videos"]), (True, "lost", ["rig", "videos"])
+])  # fmt: skip
+def test_what_failed_is_reconnected(has_videos: bool, fault: str | None, called: list[str]) -> None:
+    done: list[str] = []
+    rig: Any = SimpleNamespace(
+        servo=SimpleNamespace(fault=fault), reconnect=lambda: done.append("rig"), described={"name": "mouse"}
+    )
+    videos: Any = SimpleNamespace(reopen=lambda: done.append("videos")) if has_videos else None
+    assert bridge_module._make_reconnect(rig, videos)() == {"name": "mouse"}
+    assert done == called
+
+
+@pytest.mark.parametrize(("described", "rows"), [
+    ({}, ()), ({"calibration": {"measured": "2026-11-20"}}, (("Calibration", "of 2026-11-20"),)),
+    ({"calibration": "factory"}, (("Calibration", "none"),)),
+])  # fmt: skip
+def test_the_calibration_of_a_device_is_shown_with_its_day(described: dict[str, Any], rows: Any) -> None:
+    device: Any = SimpleNamespace(describe=lambda: described)
+    assert bridge_module._calibration_rows(device) == rows
+
+
 @pytest.mark.parametrize(
     ("name", "blinding"),
     [

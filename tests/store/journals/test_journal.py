@@ -15,7 +15,7 @@ from jsonschema import Draft7Validator
 
 from study_app.errors import StoreError
 from study_app.store.journals import journal_events
-from study_app.store.journals.journal import Journal, SessionClock, read, scan
+from study_app.store.journals.journal import Journal, SessionClock, count_events, read, scan
 from study_app.store.journals.journal_events import journal_schema, line_problem, unknown_events
 from tests.journal_lines import event_of, raw
 from tests.platforms import needs_links, needs_posix
@@ -70,6 +70,8 @@ def test_a_broken_a_missing_and_a_doubled_line_are_damage_and_a_torn_tail_is_non
     path = three_answers(tmp_path / "journal.jsonl")
     whole = path.read_bytes()
     lines = whole.splitlines(keepends=True)
+    assert count_events(path, "counted", "began", "count") == (3, 1, 0)
+    assert count_events(tmp_path / "none", "counted", "began") == (0, 0)
     for tail in (b"\0" * 4096, b'{"n":5,"event"', b"\xff\xfe\0\0", b'{"n":5}', b"7"):
         path.write_bytes(whole + tail)
         contents = scan(path)
