@@ -47,8 +47,9 @@ def test_a_bug_while_it_measures_is_a_sentence_and_leaves_no_window(
 
     monkeypatch.setattr(ComputerCheck, "_run_checks", fail)
     visit.check_computer()
-    check = visit.check
+    check, shown_on = visit.check, visit.window.screen()
     assert check is not None
+    assert (check._screen.refresh_hz, check._screen.scaling) == (shown_on.refreshRate(), shown_on.devicePixelRatio())
     if closed:
         check.window.go_on.click()
     else:
