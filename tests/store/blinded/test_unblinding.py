@@ -105,7 +105,9 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     monkeypatch.undo()
     monkeypatch.setattr("os.fsync", lambda _: None)
     assert not verify_study(folder).is_sound
+    assert not module.is_unblinded(folder)
     assert unblind(folder, "AB", "again").left == ()
+    assert module.is_unblinded(folder)
     assert sound(folder)
     held = tables_in(folder)
     assert unblind(folder, "AB", "once more").left == ()
