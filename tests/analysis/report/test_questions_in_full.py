@@ -53,7 +53,7 @@ def test_the_first_session_of_each_version_and_who_saved_it_are_read_from_receip
     ((after, sentences),) = content_changes(contents)
     assert after.participant == "P002"
     assert len(sentences) == 1
-    assert sentences[0].index(OLD) < sentences[0].index(NEW)
+    assert sentences[0].index("previously") < sentences[0].index(OLD) < sentences[0].index("now")
     shutil.rmtree(results / "data" / "sub-P001")  # sites must have the same version
     merge_sites({"North": results}, tmp_path / "pooled")
     assert recorded_contents(tmp_path / "pooled") == (replace(contents[1], participant="North-P002"),)
