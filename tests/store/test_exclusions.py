@@ -74,7 +74,6 @@ def test_a_decision_after_unblinding_is_late_although_the_clock_was_set_back(fol
 
 def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path) -> None:
     path = folder / "exclusions.csv"
-    unblind(folder, "CD", "to analyse")
     later = (datetime.now().astimezone() + timedelta(hours=1)).isoformat(timespec="milliseconds")
     path.write_text(
         "participant,session,trial,rule_or_person,reason,excluded_at\n"
@@ -82,6 +81,8 @@ def test_in_a_list_of_an_earlier_version_times_decide_what_is_late(folder: Path)
         encoding="utf-8",
         newline="\n",
     )
+    assert late_exclusions(folder, exclusions(folder)) == (), "the key is sealed"
+    unblind(folder, "CD", "to analyse")
     assert [row.fields().get("key_open", "not a key") for row in exclusions(folder)] == ["not a key"] * 2
     assert [row.participant for row in late_exclusions(folder, exclusions(folder))] == ["P007"]
     assert verify_study(folder).is_sound

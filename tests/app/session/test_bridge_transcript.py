@@ -20,6 +20,7 @@ from study_app.errors import DeviceNotFound, ServoFault, VideoError
 from study_app.gui.operator.session_panels import Strip
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_NORM, SAMPLE, records
 from study_app.session.transitions.events import Continue, ForceStopped
+from study_app.store.program_log import DEVICE_FAILED
 from tests.app.world import World
 from tests.golden import compare, masked
 from tests.golden_values import changed, value_lines
@@ -249,7 +250,11 @@ LOGGED = {
         *("the session waits: no space left on the disk: free some", "the disk accepts data again"),
         "the session waits: no space left on the disk: free some",
     ],
-    "lost device": ["the session failed: no device is plugged in", "the device was not reconnected: still none"],
+    "lost device": [
+        DEVICE_FAILED % "the servo stopped: no samples",
+        *("the session failed: no device is plugged in", "the device was not reconnected: still none"),
+        DEVICE_FAILED % "the servo stopped: no samples",
+    ],
 }
 """Where what the operator is told changes: the first ``wait`` is the beginning."""
 
@@ -311,6 +316,7 @@ def test_the_calibration_of_a_device_is_shown_with_its_day(described: dict[str, 
     ],
 )
 def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, caplog: Any, monkeypatch: Any) -> None:
+    caplog.set_level(logging.INFO)
     world, computer = Recorded(), mock.Mock()
     for part in ("Awake", "ThreadPriority"):
         monkeypatch.setattr(bridge_module, part, lambda: computer)
@@ -337,7 +343,9 @@ def test_every_signal(make: Any, name: str, blinding: str, pytestconfig: Any, ca
         world.done.clear()
         caplog.clear()
         STEPS[step](bridge, world)
-        logged += [one.getMessage() for one in caplog.records if one.levelno >= logging.WARNING]
+        logged += [
+            one.getMessage() for one in caplog.records if one.levelno >= logging.WARNING or one.msg == DEVICE_FAILED
+        ]
         calls.setdefault(step, []).append(", ".join(map(words_of, world.done)))
         if isValid(bridge) and not bridge._gone and name in VIEWS:
             words = view_words(bridge.view())

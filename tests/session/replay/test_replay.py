@@ -93,6 +93,11 @@ def test_the_task_of_an_interval_begins_with_its_first_sample_that_was_not_rejec
     assert replay_module._interval_samples(samples, 2e-6)["time_ns"].tolist() == [200, 300, 1300, 2300]
 
 
+def test_at_most_eight_seconds_that_differ_are_listed() -> None:
+    listed = [replay_module._list_seconds([*range(count)]) for count in (1, 8, 9)]
+    assert listed == ["second 0", "second 0, 1, 2, 3, 4, 5, 6, 7", "second 0, 1, 2, 3, 4, 5, 6, 7 … (9 in all)"]
+
+
 def comes_out(place: Path, count: int) -> Replayed:
     """Replay a session, whose recordings come out to the last bit."""
     found = replay(place)
