@@ -2,6 +2,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -49,12 +50,14 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Disk:
     return Disk(monkeypatch)
 
 
-def record(recorder: Recorder, samples: Any, *, trial: int = 3, attempt: int = 1, chunk: int = 17) -> None:
+def record(
+    recorder: Recorder, samples: Any, *, trial: int = 3, attempt: int = 1, chunk: int = 17, video: Any = None
+) -> None:
     recorder.start(trial, attempt, 1000.0)
     for first in range(0, len(samples), chunk):
         recorder.append(samples[first : first + chunk])
     recorder.frame(2_000, 1_000)
-    recorder.frame(3_000, 1_500)
+    recorder.frame(3_000, 1_500, video)
     recorder.stop()
 
 
@@ -62,10 +65,12 @@ def test_a_trial_is_on_the_disk_under_its_name_after_its_end(
     tmp_path: Path, recorder: Recorder, samples_of: Make
 ) -> None:
     samples = samples_of(70_001)
-    record(recorder, samples, chunk=1_234)
+    record(recorder, samples, chunk=1_234, video=SimpleNamespace(number=5, due_ns=1_400, age_ns=70))
     recorder.close()
     (kept,) = recorder.collect_results()
     assert isinstance(kept, Recorded)
+    videos = read_frames(tmp_path / kept.recording_frames)[["video_frame", "video_ns", "video_age_ns"]]
+    assert [tuple(each) for each in videos.tolist()] == [(-1, 0, -1), (5, 1_400, 70)]
     assert (kept.trial, kept.attempt, kept.samples_unrecorded, kept.samples_recorded, kept.frames_recorded) == (
         3,
         1,
