@@ -14,19 +14,15 @@ from study_app.session.pages import EndPage, TroublePage
 from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (
     Begin,
-    Chosen,
     Continue,
     FadeIn,
     ForceStopped,
-    ItemShown,
     LanguageChosen,
     PauseRequested,
     Rest,
     ResumeRequested,
-    Retracted,
     StopForce,
     StopTrial,
-    Submitted,
     Write,
     WriteCompleted,
     WriteFailed,
@@ -36,7 +32,6 @@ from study_app.session.transitions.events import (
 from study_app.session.transitions.page_builder import preview
 from study_app.session.transitions.state import FINAL, Phase
 from study_app.session.transitions.table import advance, initial_state
-from study_app.store.journals.journal_events import Answer
 from tests.golden import compare
 from tests.session import small
 from tests.session.transitions.states import LEFT, shown, state_in, written
@@ -94,27 +89,6 @@ def test_the_operator_takes_over_a_pause_once_and_the_tables_are_written() -> No
     state, commands = advance(state, PauseRequested(2.0, "operator"))
     assert (written(commands), WriteTables() in commands) == (["paused"], True)
     assert advance(state, PauseRequested(3.0, "operator")) == (state, ())
-
-
-def test_each_answer_is_on_the_disk_before_the_session_goes_on() -> None:
-    state = state_in(Phase.ANSWERING)
-    item = state.trial.items[0]
-    for event, line in (
-        (Chosen(10.0, item, 4), "choice"),
-        (Retracted(10.0, item), "answer_removed"),
-        (Submitted(10.0), "responses"),
-    ):
-        _, commands = advance(state, event)
-        writes = [command for command in commands if isinstance(command, Write)]
-        assert [(write.line.event, write.waits) for write in writes][:1] == [(line, True)]
-
-
-def test_a_removed_answer_keeps_the_time_at_which_its_question_was_shown() -> None:
-    state = small.walk(small.opened(), Phase.ANSWERING)
-    item = state.trial.items[0]
-    for event in (ItemShown(9.0, item), Chosen(10.0, item, 4), Chosen(11.0, item, 5), Retracted(12.0, item)):
-        state, _ = advance(state, event)
-    assert state.answers[item] == Answer(onset_s=9.0)
 
 
 def test_a_chosen_language_is_that_of_the_page_and_of_all_after_it() -> None:

@@ -111,6 +111,7 @@ def test_opening_again_changes_no_table_and_finishes_what_was_broken_off(
     assert sound(folder)
     held = tables_in(folder)
     assert unblind(folder, "AB", "once more").left == ()
+    assert [row["reason"] for row in module.reveals_of(folder)] == ["done", "again", "once more"]
     assert tables_in(folder) == held
 
 

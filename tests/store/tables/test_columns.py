@@ -1,16 +1,20 @@
 import json
 import re
+from contextlib import nullcontext
 from pathlib import Path
+from unittest import mock
 
 import pytest
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import KINDS
+from study_app.store.atomic import cannot_write
 from study_app.store.blinded.blinding import open_or_draw_key, reveal
 from study_app.store.columns import PARTICIPANTS, RESPONSES, TRIALS_MISSING, every_column
 from study_app.store.csv_files import Row
 from study_app.store.folders import StudyFolder
+from study_app.store.tables import study_files
 from study_app.store.tables.column_dictionary import dictionary_markdown
 from study_app.store.tables.study_files import check_study, columns_of, description_bytes, write_description
 
@@ -101,6 +105,21 @@ def test_only_sessions_with_trials_of_intervals_can_be_incomplete(
     rows: list[Row] = [{TRIALS_MISSING.name: 3}] if intervals else []
     names = [column.name for column in columns_of(folder, rows)]
     assert names == [*(column.name for column in PARTICIPANTS), *(["trials_missing"] if intervals else [])]
+
+
+@pytest.mark.parametrize("cause", [OSError(28, "no space"), PermissionError(13, "open in another program")])
+def test_only_a_table_that_another_program_has_open_may_stay_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, cause: OSError
+) -> None:
+    study = StudyFolder(tmp_path)
+    study.data.mkdir()
+    study.participants("brackish").touch()
+    monkeypatch.setattr(study_files, "write_file", mock.Mock(side_effect=cannot_write(tmp_path, cause)))
+    study_files.write_file.side_effect.__cause__ = cause
+    with nullcontext() if isinstance(cause, PermissionError) else pytest.raises(StoreError, match="no space"):
+        study_files.update_participants(study, "brackish")
+    assert len(caplog.records) == isinstance(cause, PermissionError)
+    caplog.clear()
 
 
 def test_no_study_is_begun_around_or_within_others(tmp_path: Path, protocol: Protocol) -> None:

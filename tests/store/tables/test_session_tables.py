@@ -11,7 +11,16 @@ from hypothesis import strategies as st
 
 from study_app.errors import StoreError
 from study_app.store.columns import TRIALS
-from study_app.store.csv_files import MISSING, Column, csv_bytes, guard_formula, has_same_cells, header, read_table
+from study_app.store.csv_files import (
+    MISSING,
+    Column,
+    csv_bytes,
+    guard_formula,
+    has_same_cells,
+    header,
+    read_table,
+    table_problems,
+)
 from study_app.store.folders import SessionFolder
 from study_app.store.tables.session_tables import _MEASURED, SessionRows, latest_attempts
 from study_app.store.tables.study_files import row_of
@@ -49,6 +58,10 @@ def test_numbers_are_written_again_as_they_were_read() -> None:
     assert csv_bytes(NUMBER, read_table(content, NUMBER)) == content.replace(
         b"123456789012345678901", b"1.2345678901234568e+20"
     )
+
+
+def test_rows_that_are_shorter_than_the_head_are_a_problem() -> None:
+    assert list(table_problems(b"first,second\n1\n2\n", TEXT)) == ["row 2 has 1 cells, not 2"]
 
 
 def test_every_column_of_trials_reads_back_as_what_was_written(summary: dict[str, Any]) -> None:
