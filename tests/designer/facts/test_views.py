@@ -1,6 +1,5 @@
 """What the designer shows of a study: each element once, repairs that repair, and the words of measures."""
 
-import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path as File
@@ -18,7 +17,7 @@ from study_app.designer.outline import outline_rows
 from study_app.designer.problems import fault_rows
 from tests.designer.document.grown import PROTOCOLS
 from tests.designer.document.test_commands import edited, elements, studies
-from tests.golden import compare, each_once
+from tests.golden import check_kept, compare, each_once
 from tests.golden_values import one_line, value_lines
 from tests.protocol.edited_studies import CASES, cases_of
 
@@ -92,9 +91,8 @@ def card_lines() -> Iterator[str]:
 
 
 @pytest.mark.slow
-def test_what_measures_say(pytestconfig: pytest.Config) -> None:
-    words = (line.strip() for line in card_lines() if not re.search(r"icon:|path:", line))
-    compare(GOLDEN / "measures.txt", each_once(words), pytestconfig)
+def test_what_measures_say() -> None:
+    check_kept(File(__file__).with_name("measures.txt"), card_lines())
 
 
 FAULTS = ("designs", "formats", "adjustment", "groups", "impossible", "methods", "pace", "questions", "sound")

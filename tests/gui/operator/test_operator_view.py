@@ -17,7 +17,7 @@ from study_app.store.columns import TRIALS
 from study_app.store.csv_files import header
 from study_app.store.delivered import beyond_limits
 from study_app.store.missing_trials import MISSING_PERCENT, REASONS
-from tests.golden import compare, each_once, what_comes
+from tests.golden import check_kept, compare, each_once, what_comes
 from tests.golden_values import changed, value_lines
 from tests.gui.operator.session import ticks
 from tests.protocol.trials.level_studies import study
@@ -77,10 +77,8 @@ STORY = (
 )
 
 
-def check_kept(name, lines):
-    """Compare what an event changes with a file that people keep: no option regenerates it."""
-    lines = [line.removeprefix("+ ") for line in lines if not line.startswith("- ")]
-    assert lines == (Path(__file__).parent / f"{name}.txt").read_text("utf-8").splitlines()
+def after_changes(lines):
+    return (line.removeprefix("+ ") for line in lines if not line.startswith("- "))
 
 
 def late():
@@ -108,7 +106,7 @@ def test_a_view_after_each_event_is_the_reviewed_one(told, blinding, ended, pyte
         lines += [f"== {number}", *changed(before, after)]
         before = after
     if blinding == "double":
-        check_kept("view", lines)
+        check_kept(Path(__file__).with_name("view.txt"), after_changes(lines))
         return
     compare(Path(__file__).parent / "golden" / "operator_single_blind.txt", each_once(what_comes(lines)), pytestconfig)
 
@@ -168,7 +166,7 @@ def test_tracks_after_each_event_are_the_reviewed_ones(told):
             share, other = (round(100 * count / len(own)) for count in (firsts, len(own) - firsts))
             assert f"First {share} %, Second {other} %" in view.track[1]
             assert f"median response time {sum((at + 1) / 2 for at in own) / len(own):.2f} s" in view.track[3]
-    check_kept("tracks", lines)
+    check_kept(Path(__file__).with_name("tracks.txt"), after_changes(lines))
     assert set(REASONS) == {*Limits.model_fields, "force_limit_n"} - {"attempts", MISSING_PERCENT}
 
 
