@@ -22,7 +22,7 @@ PARTS = [
 REQUESTS = {kind.__name__: kind for kind in steps.Request.__subclasses__()}
 STUDIES = {"demo": read_study(DEMO.encode()), "jnd": template("viscosity-jnd")}
 PLAIN = Step("", ())
-MOST = 12
+MOST, WIDE = 12, 64
 
 
 def told(line: str) -> list[str]:
@@ -40,7 +40,7 @@ def told(line: str) -> list[str]:
     }
     after = study.with_edits(*step.edits)[0].text if step.text is None else step.text
     changes = difflib.unified_diff(study.text.split("\n"), after.split("\n"), n=0, lineterm="")
-    lines = [line.partition("  #")[0].rstrip() for line in changes if line[:1] in "+-" and line.strip("+- ")]
+    lines = [line[:WIDE].rstrip() for line in changes if line[:1] in "+-" and line.strip("+- ")]
     more = [f"and {len(lines) - MOST} more"] * (len(lines) > MOST)
     return [step.words, *(f"{key}: {value}" for key, value in facts.items()), *lines[:MOST], *more]
 
