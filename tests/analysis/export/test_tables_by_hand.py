@@ -352,6 +352,6 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         ("b", '[study]\nname = "wax"', False),
         ("c", "[", False),
     ):
-        (tmp_path / name).write_text(text, encoding="utf-8")
+        (tmp_path / name).write_bytes(text.encode())
         assert psychds_dataset._is_of("oil", tmp_path / name) == is_of
     assert not psychds_dataset._is_of("oil", tmp_path / "nowhere")
