@@ -13,8 +13,9 @@ import pandas as pd
 import pytest
 
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.report import methods, sections
-from study_app.analysis.results import BlockResult, Delivered
+from study_app.analysis.figures.summary_figures import Numbers
+from study_app.analysis.report import first_page, methods, sections
+from study_app.analysis.results import BlockResult, Delivered, GroupAnswers, LevelsResult, QuestionResult
 from study_app.store.exclusions import Exclusion
 from study_app.store.missing_trials import MISSING_PERCENT
 from study_app.store.withdrawals import Tombstone
@@ -46,7 +47,15 @@ def result_of(of: Study) -> BlockResult:
 
 def results(of: Study, **values: Any) -> Any:
     """Return results with one block."""
-    held = {"blocks": [result_of(of)], "contrasts": (), "questions": (), "levels": (), "delivered": (), "orders": {}}
+    held = {
+        "blocks": [result_of(of)],
+        "contrasts": (),
+        "questions": (),
+        "levels": (),
+        "delivered": (),
+        "orders": {},
+        "scores": (),
+    }
     return SimpleNamespace(decided=of.decided, **(held | values))
 
 
@@ -220,7 +229,100 @@ def replace_decided(shown: Study, decided: Any) -> Any:
     return found
 
 
-PARTS = (conduct, delivered, lost_trials, groups, methods_of_a_study, planned, motion, limits)
+def first_page_of_questions() -> Iterator[str]:
+    yield from first_page.presented_sentences(LIQUIDS).values()
+    yield from first_page.presented_sentences(DELAYS).values()
+    groups = [
+        GroupAnswers(code, name, {"n": n, "counts": {"left": n - 2, "right": 2}})
+        for code, name, n in (("L1", "Water", 9), ("L2", "Honey", 7), ("L3", "Oil", 0))
+    ]
+    asked = [
+        QuestionResult(
+            where=where, title=title, is_form=is_form, item=item, text="Which hand?", short=f"Hand {item}", kind="choice",
+            measure=measure, figure=None, groups=tuple(groups[:count]),
+        )
+        for where, title, is_form, item, measure, count in (
+            ("b", "Stirring", False, "i1", "counts", 2), ("end", "Goodbye", True, "i2", "counts", 1),
+            ("end", "Goodbye", True, "i3", "quartiles", 1),
+        )
+    ]  # fmt: skip
+    held = {"P1": 2.0, "P2": 5.0, "P3": 3.5}
+    numbers = {
+        "b": (
+            Numbers("Warm", (1.0, 7.0), False, (("Water", held), ("Honey", {"P1": 1.0, "P2": 3.0, "P3": 1.0}))),
+            Numbers("SUS", None, True, (("", held),)),
+        ),
+        "end": (Numbers("Age", None, False, (("", {"P1": 20.0, "P2": 31.0}),)),),
+    }
+    found = results(LIQUIDS, questions=asked, blocks=[])
+    yield from map(str, first_page.cards(found, numbers))
+    yield from (first_page._setting_words(name) for name in ("Water", "After Stirring"))
+    lines = ["Oils: too few", "Waxes: too few", "sealed", "Oils: late"]
+    yield from first_page._limits_once(lines)
+
+
+def first_page_of_levels() -> Iterator[str]:
+    group = [SimpleNamespace(standard=at, threshold=at / 40, low=0.1, high=0.1 * at, n=int(at)) for at in (8.0, 12.0)]
+    of_pse = [SimpleNamespace(standard=None, pse=9.5, low=None, high=None, n=5)]
+    level = LevelsResult(
+        block="b", title="Thickness", design="pair", revealed=True, times=(), summary="share", counts="correct",
+        unit="N·s/m", level_kind="weber",
+    )  # fmt: skip
+    for shown, attribute, words, rows in (
+        (level, "threshold", "threshold", group), (replace(level, level_kind="value"), "pse", "PSE", of_pse),
+        (replace(level, revealed=False), "pse", "PSE", of_pse),
+    ):  # fmt: skip
+        with pytest.MonkeyPatch.context() as patch:
+            estimates = SimpleNamespace(attribute=attribute, words=words, group=rows)
+            patch.setattr(first_page, "estimates_of", lambda _level, estimates=estimates: estimates)
+            patch.setattr(first_page, "place_of", lambda one: one.standard)
+            found = results(LIQUIDS, blocks=[], levels=[shown])
+            yield from map(str, first_page.cards(found, presented={"b": "With oil."}))
+
+
+def hypotheses() -> Iterator[str]:
+    def side(name: str, low: float, high: float, n: int, sd: float) -> Any:
+        return SimpleNamespace(name=name, low=low, high=high, values=dict.fromkeys(range(n), 1.0), sd=sd)
+
+    def hypothesis(measure: str, sides: tuple[Any, ...], **changes: Any) -> Any:
+        contrast = SimpleNamespace(measure=measure, groups=None, expected=None, is_interaction=False, blocks=("b",))
+        given = {"p_adjusted": 0.3, "verdict": "inconclusive", "members": 2, "n": 12, "sd": 1.5, "ratio": False}
+        of_contrast = {name: changes.pop(name) for name in ("groups", "expected") if name in changes}
+        return SimpleNamespace(
+            contrast=SimpleNamespace(**(vars(contrast) | of_contrast)), sides=sides, **(given | changes)
+        )
+
+    two = side("water", -0.5, 0.5, 12, 0.8), side("oil", 0.1, 0.9, 12, 1.1)
+    groups = side("old", -1.0, 0.0, 9, 0.8), side("new", 0.2, 0.9, 14, 1.1)
+    for rows in (
+        [hypothesis("d_prime", two), hypothesis("item", two, expected="higher", n=9)],
+        [hypothesis("item", groups, groups=("old", "new"), ratio=True)],
+        [hypothesis("d_prime", groups, verdict="equivalent")],
+        [hypothesis("item", (side("a", 0, 1, 3, 5.0), side("b", 0, 1, 3, 5.0)), sd=40.0)],
+    ):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(sections, "equality_limits", lambda *_values, **_kinds: (None, 6.0))
+            yield from sections._low_power(results(LIQUIDS, contrasts=rows))
+            yield from sections._near_chance(results(LIQUIDS, contrasts=rows))
+    trials = LIQUIDS.trials.assign(worst_gap_ms=[31.0, 5.0, 40.0, *[3.0] * 6], lateness_p99_ms=[9.0, *[1.0] * 8])
+    kept = {"worst_gap_ms": 20.0, "lateness_ms": 2.0}
+    yield sections._violated_limits(replace(LIQUIDS, trials=trials), kept)
+    yield sections._violated_limits(replace(LIQUIDS, trials=trials[3:]), kept) + "none"
+
+
+PARTS = (
+    first_page_of_questions,
+    first_page_of_levels,
+    hypotheses,
+    conduct,
+    delivered,
+    lost_trials,
+    groups,
+    methods_of_a_study,
+    planned,
+    motion,
+    limits,
+)
 
 
 def test_each_sentence_and_table_has_its_own_values() -> None:
