@@ -238,8 +238,8 @@ def first_page_of_questions() -> Iterator[str]:
     ]
     asked = [
         QuestionResult(
-            where=where, title=title, is_form=is_form, item=item, text="Which hand?", short=f"Hand {item}", kind="choice",
-            measure=measure, figure=None, groups=tuple(groups[:count]),
+            where=where, title=title, is_form=is_form, item=item, text="Which hand?", short=f"Hand {item}",
+            kind="choice", measure=measure, figure=None, groups=tuple(groups[:count]),
         )
         for where, title, is_form, item, measure, count in (
             ("b", "Stirring", False, "i1", "counts", 2), ("end", "Goodbye", True, "i2", "counts", 1),
