@@ -272,6 +272,10 @@ def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
         "Licence: ",
         "How to cite: ",
     ]
+    greek = replace(made, title="Ölε", sites=())
+    text = codebook_bytes(greek, {}).decode()
+    assert text.startswith('{\n  "study": {\n    "name": "made_up",\n    "title": "Ölε",\n')
+    assert not [one.name for one in (*exported_tables(greek), wide_table(greek)[0]) if "site" in one.frame]
     table = Delivered("trials", COLUMNS, pd.DataFrame())
     assert file_name(made, table, "sav") == "study-made_up_description-trials_data.sav"
 

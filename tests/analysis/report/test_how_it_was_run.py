@@ -99,7 +99,7 @@ def delivered() -> Iterator[str]:
     )  # fmt: skip
     rows: list[tuple[Any, ...]] = [
         ("b", "D1", 50.0, 9, 8, 7, 6, 1.24, -3.5, 53.06), ("b", "D2", 10.5, 5, 5, 0, 0, None, None, None),
-        ("b", None, None, 14, 13, 7, 5, -0.5, 2.26, None),
+        ("b", None, None, 14, 13, 7, 5, -0.5, 2.26, None), ("b", "D2", 0.0, 5, 5, 5, 4, 0.5, 1.0, 2.0),
     ]  # fmt: skip
     found = results(shown, delivered=[Delivered(**dict(zip(fields, row, strict=True))) for row in rows])
     yield text_of(sections._delivered(shown, found))
@@ -256,6 +256,15 @@ def first_page_of_questions() -> Iterator[str]:
     }
     found = results(LIQUIDS, questions=asked, blocks=[])
     yield from map(str, first_page.cards(found, numbers))
+    levels = [
+        SimpleNamespace(block=block, revealed=revealed, vary=vary)
+        for block, revealed, vary in (("end", True, None), ("c", False, None), ("b", True, "delay_ms"))
+    ]
+    for shown in (levels, levels[1:2], [SimpleNamespace(block="b", revealed=True, vary=None)]):
+        yield str(sections.places(results(LIQUIDS, questions=asked, blocks=[], levels=shown)))
+    repeated = replace(asked[1], groups=(replace(groups[0], code="b"), replace(groups[1], code="c")))
+    for main in (levels[1:], levels[2:]):
+        yield sections.place_title(repeated, results(LIQUIDS, questions=asked[:1], levels=main, blocks=[]))
     yield from (first_page._setting_words(name) for name in ("Water", "After Stirring"))
     lines = ["Oils: too few", "Waxes: too few", "sealed", "Oils: late"]
     yield from first_page._limits_once(lines)

@@ -20,7 +20,11 @@ PARTS = [
     part.split("\n") for part in Path(__file__).with_name("requests.txt").read_text("utf-8").strip("\n").split("\n\n")
 ]
 REQUESTS = {kind.__name__: kind for kind in steps.Request.__subclasses__()}
-STUDIES = {"demo": read_study(DEMO.encode()), "jnd": template("viscosity-jnd")}
+STUDIES = {
+    "demo": read_study(DEMO.encode()),
+    "jnd": template("viscosity-jnd"),
+    "two": read_study(DEMO.replace('languages = ["en"]', 'languages = ["en", "nl"]\ncredits = {}').encode()),
+}
 PLAIN = Step("", ())
 MOST, WIDE = 12, 64
 
