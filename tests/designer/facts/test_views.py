@@ -134,6 +134,9 @@ def shown_lines() -> Iterator[str]:
     ):
         yield f"== {name}"
         yield from map(one_line, lines)
+    for path in (("liquids", "thick"), ("conditions", "late"), ("blocks", "delays"), ("study",)):
+        yield f"== measures of {path[-1]}"
+        yield from value_lines(measures_view(demo, facts(demo), path, Simulated()).cards)
     for study, paths in ((broken, FORMS), (jnd, FORMS_OF_LEVELS)):
         for path in paths:
             yield f"== {'.'.join(map(str, path))}"
