@@ -18,8 +18,9 @@ from study_app.analysis.data.blocks import Item, Setting
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import psychds_dataset, spss
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name, table_files
-from study_app.analysis.export.tables import Delivered, exported_tables, wide_table
-from study_app.store.csv_files import Column, optional
+from study_app.analysis.export.tables import Delivered, exported_tables, names_of_sealed, wide_table
+from study_app.store.columns import INTERVALS
+from study_app.store.csv_files import Column, header, optional, unsealed_columns
 from tests.analysis.made_up import ITEMS, study
 
 SETTINGS = tuple(
@@ -276,6 +277,10 @@ def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
     text = codebook_bytes(greek, {}).decode()
     assert text.startswith('{\n  "study": {\n    "name": "made_up",\n    "title": "Ölε",\n')
     assert not [one.name for one in (*exported_tables(greek), wide_table(greek)[0]) if "site" in one.frame]
+    of_levels: Any = replace(made, levels=(made.blocks[0],))
+    sealed = names_of_sealed(of_levels)
+    assert sealed == {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))} != set()
+    assert names_of_sealed(made) == set()
     table = Delivered("trials", COLUMNS, pd.DataFrame())
     assert file_name(made, table, "sav") == "study-made_up_description-trials_data.sav"
 

@@ -148,11 +148,16 @@ def shown_lines() -> Iterator[str]:
                 yield one_line({"title": section.title, "absent": absent, "faults": section.faults})
                 for row in section.rows:
                     chosen: Any = tuple(choice.value for choice in row.choices)
-                    yield f"  {one_line(replace(row, help='', choices=chosen))[:400]}"
+                    yield f"  {one_line(replace(row, help='', choices=chosen, bounds=(), facts=None))[:400]}"
+                    if row.facts is not None:
+                        yield f"    {one_line(row.facts)[:600]}"
 
 
-FORMS = (("blocks", "liquids"), ("tasks", "reach"), ("questionnaires", "liquid", "items", 1), ("conditions", "late"))
-FORMS_OF_LEVELS = (("stimuli", "damping"), ("designs", "pair"))
+FORMS = (
+    ("blocks", "liquids"), ("tasks", "reach"), ("questionnaires", "liquid"), ("questionnaires", "liquid", "items", 1),
+    ("conditions", "late"), ("scales", "agreement"), ("study",),
+)  # fmt: skip
+FORMS_OF_LEVELS = (("stimuli", "damping"), ("designs", "pair"), ("blocks", "viscosity"), ("methods", "adaptive"))
 
 
 def test_outline_and_forms_show_each_element_with_its_words() -> None:
