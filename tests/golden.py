@@ -85,6 +85,11 @@ def compare(
         pytest.fail("\n".join([f"{kept}: review, then --regenerate", *different[:SHOWN], *more]), pytrace=False)
 
 
+def check_kept(kept: Path, lines: Iterable[str]) -> None:
+    """Compare lines, with their numbers, with a file that people change: no option writes it."""
+    assert list(lines) == kept.read_text(encoding="utf-8").splitlines()
+
+
 def _alike(expected: str, found: str, rel: float, abs_: float) -> bool:
     """Return whether lines are equal but for the last digits of numbers, which depend on libraries and processors."""
     if expected == found:

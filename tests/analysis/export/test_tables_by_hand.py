@@ -1,10 +1,12 @@
 """The exported tables, codebook and .sav file of a study in memory, against a few lines of its own answers."""
 
+import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,9 +16,11 @@ import pytest
 
 from study_app.analysis.data.blocks import Item, Setting
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.export import spss
-from study_app.analysis.export.table_files import table_files
-from study_app.analysis.export.tables import exported_tables, wide_table
+from study_app.analysis.export import psychds_dataset, spss
+from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name, table_files
+from study_app.analysis.export.tables import Delivered, exported_tables, names_of_sealed, wide_table
+from study_app.store.columns import INTERVALS
+from study_app.store.csv_files import Column, header, optional, unsealed_columns
 from tests.analysis.made_up import ITEMS, study
 
 SETTINGS = tuple(
@@ -183,3 +187,180 @@ def test_names_in_sav_are_valid_and_differ_without_case() -> None:
     names = ["a b", "A_b", "all", "1st", "x" * 70, "x" * 71, "é"]
     short = list(spss._names_of(names).values())
     assert short == ["a_b", "A_b_2", "v_all", "v_1st", "x" * 64, f"{'x' * 62}_2", "v"]
+
+
+COLUMNS = (
+    Column("a_text", "text", "Words.", unit="m"),
+    optional("a_flag", "flag", "Whether."),
+    Column("a_whole", "integer", "Count.", minimum=1, maximum=7, levels=(("1", "low"), ("7", "high"))),
+    optional("a_number", "number", "Length.", unit="mm", minimum=0),
+    Column("a time", "time", "When."),
+)
+
+
+def test_each_column_of_sav_has_its_label_format_measure_and_values(made: Study, tmp_path: Path) -> None:
+    rows = {
+        "a_text": ["x", None],
+        "a_flag": [True, None],
+        "a_whole": [3, 4711],
+        "a_number": [0.5, None],
+        "a time": ["z", "y"],
+    }
+    types = {"a_text": "string", "a_flag": "boolean", "a_whole": "Int64", "a_number": "Float64", "a time": "string"}
+    frame = pd.DataFrame({name: pd.array(values, dtype=types[name]) for name, values in rows.items()})
+    path = tmp_path / "x.sav"
+    labels = {1: "low", 97: "Excluded", 99: "No answer"}
+    path.write_bytes(spss.sav(replace(made, version="2.5"), Delivered("t", COLUMNS, frame), {"a_whole": labels}))
+    found, about = pyreadstat.read_sav(path, user_missing=True)
+    assert about.file_label == "Made up (made_up 2.5)"
+    assert about.column_names_to_labels == {
+        "a_text": "Words. [m]", "a_flag": "Whether.", "a_whole": "Count.", "a_number": "Length. [mm]",
+        "a_time": "a time: When.",
+    }  # fmt: skip
+    assert about.variable_value_labels == {"a_flag": {0: "false", 1: "true"}, "a_whole": labels}
+    measure = {"a_text": "nominal", "a_flag": "nominal", "a_whole": "ordinal", "a_number": "scale", "a_time": "nominal"}
+    assert about.variable_measure == measure
+    assert about.missing_ranges == {"a_whole": [{"lo": code, "hi": code} for code in (97, 99)]}
+    formats = {"a_flag": "F1.0", "a_whole": "F4.0"}
+    assert {name: about.original_variable_types[name] for name in formats} == formats
+    assert found.astype(object).where(found.notna(), None).to_numpy().tolist() == [
+        ["x", 1, 3, 0.5, "z"], ["", None, 4711, None, "y"],
+    ]  # fmt: skip
+
+
+CREDITS = {
+    "authors": ["A. Kox", "B. Lam"], "license": "CC0", "citation": "Kox\n(2026)", "funder": "NWO", "url": "https://x.org",
+}  # fmt: skip
+STATED = {
+    "author": ["A. Kox", "B. Lam"],
+    "license": "CC0",
+    "citation": "Kox\n(2026)",
+    "funder": "NWO",
+    "url": "https://x.org",
+}
+
+
+def test_the_codebook_describes_columns_doubts_and_credits(made: Study) -> None:
+    changed: Any = SimpleNamespace(path=made.folder / "data" / "x.csv", what="differs")
+    credited = replace(made, doubts=(changed,), protocol={**made.protocol, "study": {"credits": CREDITS}}, settings={})
+    book = json.loads(codebook_bytes(credited, {"a.csv": COLUMNS}))
+    assert {name: book["study"][name] for name in STATED} == STATED
+    assert (book["study"]["name"], book["study"]["title"], book["study"]["version"]) == ("made_up", "Made up", "1")
+    assert (book["blinded"], book["missing"], book["doubts"]) == (
+        True,
+        "n/a",
+        [{"file": "data/x.csv", "what": "differs"}],
+    )
+    assert book["measures"]["agree_percent"] == "percentage of valid answers at levels 5 to 7"
+    assert book["files"] == {
+        "a.csv": [
+            {"name": "a_text", "type": "text", "description": "Words.", "unit": "m", "may_miss": False},
+            {"name": "a_flag", "type": "flag", "description": "Whether.", "may_miss": True},
+            {
+                "name": "a_whole", "type": "integer", "description": "Count.", "levels": {"1": "low", "7": "high"},
+                "minimum": 1, "maximum": 7, "may_miss": False,
+            },
+            {
+                "name": "a_number", "type": "number", "description": "Length.", "unit": "mm", "minimum": 0,
+                "may_miss": True,
+            },
+            {"name": "a time", "type": "time", "description": "When.", "may_miss": False},
+        ]
+    }  # fmt: skip
+    assert credit_lines(credited) == ("Authors: A. Kox, B. Lam.", "Licence: CC0.", "How to cite: Kox (2026).")
+    assert [line.partition("not stated")[0] for line in credit_lines(made)] == [
+        "Authors: ",
+        "Licence: ",
+        "How to cite: ",
+    ]
+    greek = replace(made, title="Ölε", sites=())
+    text = codebook_bytes(greek, {}).decode()
+    assert text.startswith('{\n  "study": {\n    "name": "made_up",\n    "title": "Ölε",\n')
+    assert not [one.name for one in (*exported_tables(greek), wide_table(greek)[0]) if "site" in one.frame]
+    of_levels: Any = replace(made, levels=(made.blocks[0],))
+    sealed = names_of_sealed(of_levels)
+    assert sealed == {*header(INTERVALS)} - {*header(unsealed_columns(INTERVALS))} != set()
+    assert names_of_sealed(made) == set()
+    table = Delivered("trials", COLUMNS, pd.DataFrame())
+    assert file_name(made, table, "sav") == "study-made_up_description-trials_data.sav"
+
+
+def test_the_folder_to_share_has_each_file_in_its_place(made: Study, monkeypatch: pytest.MonkeyPatch) -> None:
+    missing, held = ("waves.mp4",), {"kitchen.toml": b"k"}
+    monkeypatch.setattr(psychds_dataset, "materials", lambda _study: psychds_dataset.Materials(held, missing))
+    head = {"languages": ["nl", "en"], "description": {"nl": "Olie", "en": "Oil"}, "credits": CREDITS}
+    shared = replace(made, protocol={"study": head, "analysis": {"alpha": 0.04}}, version="2.5")
+    tables = {f"study-made_up_description-{name}_data.csv": name.encode() for name in ("trials", "wide")}
+    columns = {name: COLUMNS[:2] if "trials" in name else COLUMNS[1:3] for name in tables}
+    report = {**dict.fromkeys(tables, b"older"), "report.R": b"R", "report.html": b"page", "codebook.json": b"book"}
+    files = psychds_dataset.dataset_files(shared, tables, columns, report)
+    contents = {name.removeprefix("psych-ds/"): content for name, content in files.items()}
+    described, metadata, wide, settings, protocol = (
+        json.loads(contents.pop(name))
+        for name in (
+            "dataset_description.json", "data/file_metadata.json", "data/study-made_up_description-wide_data.json",
+            "analysis/settings.json", "materials/protocol.json",
+        )
+    )  # fmt: skip
+    assert contents.pop("CHANGES.md").startswith(b"# Changes\n\n- 2.5: exported by liquid-study ")
+    assert b"missing from `materials`: waves.mp4." in contents.pop("README.md")
+    assert json.loads(contents.pop("documentation/codebook.json"))["files"].keys() == tables.keys()
+    del contents["data/study-made_up_description-trials_data.json"]
+    assert contents == {
+        ".psychds-ignore": b".psychds-ignore\n", "analysis/report.R": b"R", "results/report.html": b"page",
+        "materials/kitchen.toml": b"k", **{f"data/{name}": content for name, content in tables.items()},
+    }  # fmt: skip
+    assert {name: described.pop(name) for name in ("name", "alternateName", "description", "version")} == {
+        "name": "made_up", "alternateName": "Made up", "description": "Oil", "version": "2.5",
+    }  # fmt: skip
+    assert [one["name"] for one in described.pop("variableMeasured")] == ["a_text", "a_flag", "a_whole"]
+    assert metadata == {
+        **described,
+        **{name: metadata[name] for name in ("name", "alternateName", "description", "version")},
+    }
+    assert described["keywords"][-1] == "simulated"
+    assert {name: described[name] for name in STATED} == {name: wide[name] for name in STATED} == STATED
+    assert (wide["name"], [one["name"] for one in wide["variableMeasured"]]) == (
+        "study-made_up_description-wide_data", ["a_flag", "a_whole"],
+    )  # fmt: skip
+    assert (settings["name"], settings["version"], settings["license"]) == ("made_up", "2.5", "CC0")
+    assert settings["analysis"]["alpha"] == 0.04
+    assert settings["analysis"].keys() >= {"equivalence_bound", "rising", "looks"}
+    assert not settings["analysis"].keys() & {"made", "changed"}
+    assert protocol == shared.protocol
+    untold = replace(shared, protocol={"study": {"description": " Oil. "}})
+    assert psychds_dataset._description(untold, columns)["description"] == "Oil."
+    assert psychds_dataset._description(replace(untold, protocol={}), columns)["description"] == "Made up"
+
+
+def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
+    made: Study, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    file, digests = tmp_path / "kitchen.toml", {}
+    for name in ("in.mp4", "other.mp4"):
+        (tmp_path / name).write_bytes(name.encode())
+        digests[name] = hashlib.sha256(b"in.mp4").hexdigest()
+    digests |= {"../out.mp4": "1f", "/abs.mp4": "2e", "gone.mp4": "3d"}
+    monkeypatch.setattr(psychds_dataset, "_footage", lambda _study: digests)
+    found = file, b"text", {"oil.toml": "oil", "../no.toml": "no"}
+    monkeypatch.setattr(psychds_dataset, "_study_file", lambda *_: found)
+    own = psychds_dataset.materials(made)
+    copy = psychds_dataset.FileCopy(tmp_path / "in.mp4", digests["in.mp4"])
+    assert own.files == {"kitchen.toml": b"text", "oil.toml": b"oil", "in.mp4": copy}
+    outside = "the file is outside the study's folder"
+    assert own.missing == (
+        f"other.mp4 (SHA-256 {digests['in.mp4']}; the file with this name has a different SHA-256)",
+        f"../out.mp4 (SHA-256 1f; {outside})", f"/abs.mp4 (SHA-256 2e; {outside})",
+        "gone.mp4 (SHA-256 3d; the file cannot be read: No such file or directory)",
+    )  # fmt: skip
+    monkeypatch.setattr(psychds_dataset, "_study_file", lambda *_: None)
+    assert psychds_dataset.materials(made).missing[:2] == ("the study file", f"in.mp4 (SHA-256 {digests['in.mp4']})")
+    assert psychds_dataset.materials(replace(made, settings={})) == ({}, ())
+    for name, text, is_of in (
+        ("a", '[study]\nname = "oil"', True),
+        ("b", '[study]\nname = "wax"', False),
+        ("c", "[", False),
+    ):
+        (tmp_path / name).write_bytes(text.encode())
+        assert psychds_dataset._is_of("oil", tmp_path / name) == is_of
+    assert not psychds_dataset._is_of("oil", tmp_path / "nowhere")

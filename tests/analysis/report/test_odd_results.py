@@ -46,22 +46,6 @@ def test_methods_distinguish_primary_and_exploratory_statements(tmp_path: Path) 
     assert "and 90 % confidence intervals" in told, "two one-sided tests at 5 %"
 
 
-def test_methods_state_the_devices_and_their_force_if_they_give_one() -> None:
-    study = load_study(SAMPLE.path)
-    results = evaluate(study)
-    said = {}
-    for device in ("mouse", "falcon:12", "answers-only"):
-        told = methods(replace(study, participants=study.participants.assign(device=device)), results)
-        said[device] = told.partition("Participants used a ")[2].partition(
-            " A virtual ball with a diameter of 68 mm moved 10 times"
-        )[0]
-    assert said == {
-        "mouse": "device without force feedback (mouse).",
-        "falcon:12": "haptic device (falcon); forces were computed at 1000 Hz and limited to 8 N.",
-        "answers-only": "",
-    }
-
-
 def test_limits_count_the_trials_in_which_the_device_answered_late() -> None:
     study = load_study(SAMPLE.path)
     results, trials = evaluate(study), study.trials.assign(loop_delay_ticks=1.0, device_delay_ticks=np.nan)

@@ -108,6 +108,7 @@ def check_report(made: Study) -> None:
     check(results.decided.look_words(len(results.people)), told)
     check(empty_studies(made.n), told)
     check(methods(made, results), told)
+    assert "  " not in methods(made, results)
     shown = cards(replace(results, contrasts=()))  # theirs are checked one by one
     for card in shown:
         for sentence in card.sentences:

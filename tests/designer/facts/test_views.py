@@ -3,23 +3,28 @@
 import re
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import fields, replace
 from pathlib import Path as File
+from typing import Any
 
 import pytest
 
 from study_app.designer.document.additions import additions_for, repairs
+from study_app.designer.document.document import template
 from study_app.designer.document.elements import CHOSEN, LABEL, OTHER, found_fields
 from study_app.designer.document.study import read_study
 from study_app.designer.document.toml_edits import Set
+from study_app.designer.form.form import form_of
 from study_app.designer.measures.cards import Lines
 from study_app.designer.measures.measures_view import measures_view
 from study_app.designer.measures.simulation import Simulated
 from study_app.designer.measures.study_facts import facts
-from study_app.designer.outline import outline_rows
+from study_app.designer.outline import addable_elements, outline_rows
 from study_app.designer.problems import fault_rows
 from tests.designer.document.grown import PROTOCOLS
 from tests.designer.document.test_commands import edited, elements, studies
-from tests.golden import compare, each_once
+from tests.designer.support.designer import DEMO
+from tests.golden import check_kept, compare, each_once
 from tests.golden_values import one_line, value_lines
 from tests.protocol.edited_studies import CASES, cases_of
 
@@ -133,3 +138,44 @@ def test_each_repair_removes_its_problem_and_undo_gives_the_text_back(name: str,
                 words.append(repair.words)
     assert words
     compare(GOLDEN / f"repairs_in_{name}.txt", each_once(words), pytestconfig)
+
+
+def shown_lines() -> Iterator[str]:
+    """Yield the outline, a search, what can be added, and forms with most kinds of rows, without their help."""
+    demo, jnd = read_study(DEMO.encode()), template("viscosity-jnd")
+    broken, _ = demo.with_edits(Set(("blocks", "liquids", "task"), "gone"), Set(("tasks", "reach", "count"), 0))
+    for name, lines in (
+        ("outline", outline_rows(broken, facts(demo).steps_s, session_s=190.0)),
+        ("found", outline_rows(demo, facts(demo).steps_s, "honey")),
+        ("addable", addable_elements(demo, ("pages", "welcome"))[:12]),
+    ):
+        yield f"== {name}"
+        yield from map(one_line, lines)
+    for path in (("liquids", "thick"), ("conditions", "late"), ("blocks", "delays"), ("study",)):
+        yield f"== measures of {path[-1]}"
+        yield from value_lines(measures_view(demo, facts(demo), path, Simulated()).cards)
+    for study, paths in ((broken, FORMS), (jnd, FORMS_OF_LEVELS)):
+        for path in paths:
+            yield f"== {'.'.join(map(str, path))}"
+            form = form_of(study, path)
+            parts = {field.name: getattr(form, field.name) for field in fields(form) if field.name != "sections"}
+            yield one_line(parts)
+            for section in form.sections:
+                absent = [row.label for row in section.absent]
+                yield one_line({"title": section.title, "absent": absent, "faults": section.faults})
+                for row in section.rows:
+                    chosen: Any = tuple(choice.value for choice in row.choices)
+                    yield f"  {one_line(replace(row, help='', choices=chosen, bounds=(), facts=None))[:400]}"
+                    if row.facts is not None:
+                        yield f"    {one_line(row.facts)[:600]}"
+
+
+FORMS = (
+    ("blocks", "liquids"), ("tasks", "reach"), ("questionnaires", "liquid"), ("questionnaires", "liquid", "items", 1),
+    ("conditions", "late"), ("scales", "agreement"), ("study",),
+)  # fmt: skip
+FORMS_OF_LEVELS = (("stimuli", "damping"), ("designs", "pair"), ("blocks", "viscosity"), ("methods", "adaptive"))
+
+
+def test_outline_and_forms_show_each_element_with_its_words() -> None:
+    check_kept(File(__file__).with_name("shown.txt"), shown_lines())

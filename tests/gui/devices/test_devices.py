@@ -12,7 +12,7 @@ from study_app.devices.registry import backends, list_devices
 from study_app.gui.devices.view import DevicesPlace
 from study_app.gui.kit.devices import device_before_look, device_named, devices_shown
 from study_app.store.workstation import DEFAULTS
-from tests.golden import compare, each_once
+from tests.golden import check_kept
 from tests.golden_values import value_lines
 
 MOUSE = Backend("mouse", "the window", state=READY, can="seen, not felt")
@@ -47,8 +47,8 @@ def told() -> Iterator[str]:
     yield from value_lines(device_before_look("falcon"), "before anybody looked")
 
 
-def test_devices_are_told_as_reviewed(pytestconfig: pytest.Config) -> None:
-    compare(Path(__file__).parent / "golden" / "devices.txt", each_once(told()), pytestconfig)
+def test_devices_are_told_as_reviewed() -> None:
+    check_kept(Path(__file__).with_name("devices.txt"), told())
 
 
 def test_every_device_is_shown_once_and_those_that_people_feel_with_first() -> None:

@@ -20,7 +20,7 @@ from study_app.haptics.model.layout import (
     SAMPLE,
     records,
 )
-from tests.golden import compare, each_once
+from tests.golden import check_kept
 from tests.golden_values import value_lines
 
 MS = 1_000_000
@@ -131,8 +131,8 @@ def frame_times() -> Iterator[str]:
 
 
 @pytest.mark.parametrize("of", [healths, forces, frame_times], ids=lambda of: of.__name__)
-def test_figures_are_the_reviewed_ones(of: Any, pytestconfig: pytest.Config) -> None:
-    compare(Path(__file__).parent / "golden" / f"figures_of_{of.__name__}.txt", each_once(of()), pytestconfig)
+def test_figures_are_the_reviewed_ones(of: Any) -> None:
+    check_kept(Path(__file__).with_name(f"figures_of_{of.__name__}.txt"), of())
 
 
 def test_a_peak_of_one_tick_is_not_missed_however_it_came_in() -> None:

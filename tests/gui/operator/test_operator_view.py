@@ -17,7 +17,7 @@ from study_app.store.columns import TRIALS
 from study_app.store.csv_files import header
 from study_app.store.delivered import beyond_limits
 from study_app.store.missing_trials import MISSING_PERCENT, REASONS
-from tests.golden import compare, each_once, what_comes
+from tests.golden import check_kept, compare, each_once, what_comes
 from tests.golden_values import changed, value_lines
 from tests.gui.operator.session import ticks
 from tests.protocol.trials.level_studies import study
@@ -77,6 +77,10 @@ STORY = (
 )
 
 
+def after_changes(lines):
+    return (line.removeprefix("+ ") for line in lines if not line.startswith("- "))
+
+
 def late():
     """Return the health of a servo that is late, with a device that answers later than at the start."""
     measured = ServoHealth(1000.0)
@@ -101,8 +105,10 @@ def test_a_view_after_each_event_is_the_reviewed_one(told, blinding, ended, pyte
         after = [*value_lines(view), f"trials: {view.trials_line}", f"time: {time}"]
         lines += [f"== {number}", *changed(before, after)]
         before = after
-    kept = Path(__file__).parent / "golden" / f"operator_{blinding}_{ended}.txt"
-    compare(kept, each_once(what_comes(lines)), pytestconfig)
+    if blinding == "double":
+        check_kept(Path(__file__).with_name("view.txt"), after_changes(lines))
+        return
+    compare(Path(__file__).parent / "golden" / "operator_single_blind.txt", each_once(what_comes(lines)), pytestconfig)
 
 
 def pair(told, number, answer, seconds=1.0, attempt=1):
@@ -142,7 +148,7 @@ PAIRS = (
 )
 
 
-def test_tracks_after_each_event_are_the_reviewed_ones(told, pytestconfig):
+def test_tracks_after_each_event_are_the_reviewed_ones(told):
     protocol = study()
     schedule = build_schedule(protocol, "P001", 1)
     session = dataclasses.replace(told.session, protocol=protocol, schedule=schedule, stages=stages(protocol, schedule))
@@ -160,7 +166,7 @@ def test_tracks_after_each_event_are_the_reviewed_ones(told, pytestconfig):
             share, other = (round(100 * count / len(own)) for count in (firsts, len(own) - firsts))
             assert f"First {share} %, Second {other} %" in view.track[1]
             assert f"median response time {sum((at + 1) / 2 for at in own) / len(own):.2f} s" in view.track[3]
-    compare(Path(__file__).parent / "golden" / "operator_tracks.txt", each_once(what_comes(lines)), pytestconfig)
+    check_kept(Path(__file__).with_name("tracks.txt"), after_changes(lines))
     assert set(REASONS) == {*Limits.model_fields, "force_limit_n"} - {"attempts", MISSING_PERCENT}
 
 

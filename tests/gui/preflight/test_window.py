@@ -44,6 +44,8 @@ def test_enter_begins_once_and_accepts_what_the_button_names(window, qtbot, key,
     said = begun(window)
     window.show_view(checked(facts))
     assert (window.chip.word, window.start.text()) == (passed, words)
+    look = {"Start": ("ok", "check"), "Cannot start": ("bad", "cross")}.get(words, ("warn", "warning"))
+    assert (window.chip.tone, window.chip.icon, window.who.text()) == (*look, "rek2024  ·  Participant P007")
     qtbot.keyClick(window, key)
     qtbot.keyClick(window, key)
     assert said == (["begun"] if window.start.isEnabled() else [])
@@ -96,7 +98,12 @@ def test_a_session_that_goes_on_says_where_and_what_is_kept(window):
     assert rows == (("Continues at", "Liquid setting 2, attempt\u00a02"), ("Kept", "2 of 8 answers"))
     window.show_view(checked(WELL, goes_on=rows))
     assert {value.text() for value in window.values()} >= {"Liquid setting 2, attempt\u00a02", "2 of 8 answers"}
-    assert "Kept" not in dict(checked(WELL).rows)
+    assert checked(WELL).rows == (
+        ("Parts", "2"), ("Settings", "10"), ("Answers", "62"), ("Expected time", "18 min"), ("Force limit", "8 N"),
+        ("Expected force error", "measuring …"), ("Ends about", "14:37"),
+    )  # fmt: skip
+    errors = [dict(checked(WELL, error_n=error_n).rows)["Expected force error"] for error_n in (0.0099, 0.01, 0.256)]
+    assert errors == ["< 0.01 N", "0.01 N", "0.26 N"]
 
 
 def test_the_checks_of_devices_and_of_compiled_code() -> None:

@@ -1,0 +1,339 @@
+"""The sentences and tables about how a study was run, for values that all differ.
+
+People change ``how_it_was_run.txt``; no option regenerates it.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from study_app.analysis.data.study_tables import Study
+from study_app.analysis.figures.summary_figures import Numbers
+from study_app.analysis.report import first_page, methods, sections
+from study_app.analysis.results import BlockResult, Delivered, GroupAnswers, LevelsResult, QuestionResult
+from study_app.store.exclusions import Exclusion
+from study_app.store.missing_trials import MISSING_PERCENT
+from study_app.store.withdrawals import Tombstone
+from tests.analysis.made_up import delays, everybody, liquids, study
+from tests.analysis.report.read_report import seen
+from tests.golden import check_kept
+
+LIQUIDS = study(liquids(3), list(everybody(liquids(3), 3, lambda *_: 4)))
+DELAYS = study(delays([50, 10.5]), list(everybody(delays([50, 10.5]), 2, lambda *_: 4)))
+GROUPS = {"old": {"share": 2, "sequence": ["c", "b"]}, "new": {"share": 1, "sequence": ["b", "c"]}}
+
+
+def exclusion(participant: str, trial: int | None = None, by: str = "AK") -> Exclusion:
+    """Return an exclusion whose reason names its participant."""
+    return Exclusion(
+        participant=participant, session=2, trial=trial, rule_or_person=by, reason=f"{participant} spoke",
+        excluded_at="2026-03-02T09:00:00+00:00",
+    )  # fmt: skip
+
+
+def result_of(of: Study) -> BlockResult:
+    """Return the result of a study's block without answers."""
+    (block,) = of.blocks[:1]
+    return BlockResult(
+        id="b", title="Stirring", kind=block.kind, revealed=True, n=3, settings=block.settings,
+        names=tuple(f"Name {setting.code}" for setting in block.settings), items=block.items, labels=(), measures=(),
+    )  # fmt: skip
+
+
+def results(of: Study, **values: Any) -> Any:
+    """Return results with one block."""
+    held = {
+        "blocks": [result_of(of)],
+        "contrasts": (),
+        "questions": (),
+        "levels": (),
+        "delivered": (),
+        "orders": {},
+        "scores": (),
+    }
+    return SimpleNamespace(decided=of.decided, **(held | values))
+
+
+def text_of(parts: Iterable[Any]) -> str:
+    """Return the text of parts of a page without its tags."""
+    return seen("".join(map(str, parts))).strip()
+
+
+def conduct() -> Iterator[str]:
+    people = LIQUIDS.participants.assign(
+        participant=["A-P1", "A-P2", "B-P1"], status=["completed", "aborted", "completed"],
+        counted=[True, False, True], excluded=[False, False, False], motors_masked=["no", "with noise", "no"],
+    )  # fmt: skip
+    gone = Tombstone(participant="A-P9", at="2026-02-03T10:00:00", by="BL", reason="asked", sessions=())
+    out = exclusion("B-P1", 7), exclusion("A-P1")
+    changed: Any = SimpleNamespace(path=Path("nowhere/data/x.csv"), what="differs")
+    shown = replace(
+        LIQUIDS,
+        participants=people,
+        sites=("A", "B"),
+        withdrawn=(gone,),
+        exclusions=out,
+        late=out[1:],
+        doubts=(changed,),
+    )
+    yield text_of(sections.conduct(shown, results(shown, blocks=())))
+    yield methods.late_exclusions(shown)
+    yield methods.late_exclusions(replace(shown, exclusions=out[:1]))
+    yield methods._exclusions(shown)
+    yield methods._exclusions(replace(LIQUIDS, exclusions=out))
+    yield methods._exclusions(replace(LIQUIDS, exclusions=(exclusion("P1", by="fast_answers"),), settings={}))
+    yield from (" ".join(sections._first([*map(str, range(count))])) for count in (20, 23))
+
+
+def delivered() -> Iterator[str]:
+    limits = {"delay_error_p95_ms": 4.0, "withheld_percent": 2.5}
+    shown = replace(DELAYS, protocol={**DELAYS.protocol, "limits": limits})
+    fields = (
+        "block", "code", "delay_ms", "trials", "measured", "judged", "valid", "error_mean_ms", "error_worst_ms",
+        "achieved_ms",
+    )  # fmt: skip
+    rows: list[tuple[Any, ...]] = [
+        ("b", "D1", 50.0, 9, 8, 7, 6, 1.24, -3.5, 53.06), ("b", "D2", 10.5, 5, 5, 0, 0, None, None, None),
+        ("b", None, None, 14, 13, 7, 5, -0.5, 2.26, None), ("b", "D2", 0.0, 5, 5, 5, 4, 0.5, 1.0, 2.0),
+    ]  # fmt: skip
+    found = results(shown, delivered=[Delivered(**dict(zip(fields, row, strict=True))) for row in rows])
+    yield text_of(sections._delivered(shown, found))
+    yield text_of(sections._delivered(replace(shown, settings={}), found)).rpartition("Trials that exceed")[2]
+    yield text_of(sections._delivered(replace(shown, settings={}), found)).partition("Delay error is")[0]
+    yield "; ".join(sections._limit(what, 7.0) for what in ("frame_gap_ms", "hz", "withheld_percent"))
+    yield "; ".join(sections._signed_ms(value) for value in (None, 0.0, 1.5, -1.5))
+    yield from methods._delays(shown, found)
+    found.delivered = [replace(one, achieved_ms=None) for one in found.delivered]
+    yield from methods._delays(shown, found)
+
+
+def lost_trials() -> Iterator[str]:
+    lost = [SimpleNamespace(count=n, asked=40, tracks={("b", "D1"): n}, reason_texts=["late"]) for n in (3, 0)]
+    people = DELAYS.participants.assign(missing=lost, counted=[False, True])
+    levels: Any = (SimpleNamespace(id="b", title="Tracks"),)
+    some = replace(DELAYS, levels=levels, participants=people, protocol={"limits": {MISSING_PERCENT: 12.5}})
+    none = replace(some, participants=people[1:], protocol={})
+    yield from (text_of(sections._missing(one)) for one in (some, none, replace(none, levels=())))
+    yield methods._missing_trials(none)
+
+
+def groups() -> Iterator[str]:
+    ids = {f"P00{number}": f"{'BBA'[number]}-P00{number}" for number in range(3)}
+    renamed = {
+        name: getattr(LIQUIDS, name).assign(participant=getattr(LIQUIDS, name)["participant"].map(ids))
+        for name in ("participants", "responses", "trials")
+    }
+    shown = replace(LIQUIDS, sites=("A", "B"), **renamed)
+    values = shown.responses["participant"].map({"B-P000": 1, "B-P001": 3, "A-P002": 6}).astype("Int64")
+    people = shown.participants.assign(group=pd.array(["zoo", "zoo", "art"], "string"))
+    shown = replace(shown, participants=people, responses=shown.responses.assign(response=values))
+    by: Any
+    for by, group in (("group", "randomised"), ("group", "pre-existing"), ("site", "pre-existing")):
+        of = {**shown.protocol, "groups": {"zoo": {}}, "study": {"group_assignment": group}}
+        yield text_of(sections.groups(replace(shown, protocol=of), results(shown), by))
+    yield text_of(sections.groups(LIQUIDS, results(LIQUIDS)))
+
+
+def methods_of_a_study() -> Iterator[str]:
+    base = replace(LIQUIDS, title="Oils", estimator="kalman")
+    people = base.participants.assign(protocol_version=["1.2", "1.1", "1.1"], protocol_hash=["h", "i", "k"])
+    for shown in (base.participants, people, people.assign(counted=[False, True, True])):
+        yield methods.version_words(replace(base, participants=shown))
+    scene = {"scale": 4.0, "body": {"diameter_m": 0.068}}
+    device = replace(base, protocol={"device": {"rate_hz": 2000.0, "force_limit_n": 3.5}, "scene": scene})
+    used = base.participants.assign(device=["falcon:2", "mouse", None])
+    yield methods._apparatus(replace(device, participants=used))
+    yield methods._apparatus(replace(device, participants=used[1:], estimator="device"))
+    yield methods._apparatus(replace(device, participants=used.assign(device="answers-only"), estimator=None))
+    tables = {
+        f"liquid{number}": {"density_kg_m3": 900 + number, "drag": {"damping_nspm": None}, "effects": ()}
+        for number in (1, 2)
+    }
+    yield methods._liquids(replace(base, liquids=tables))
+    yield methods._liquids(replace(base, liquids={"liquid2": tables["liquid2"]}))
+    two = replace(base, blocks=(base.blocks[0], replace(base.blocks[0], id="c", title="Second")))
+    for order in ("fixed", "random", "balanced"):
+        yield methods._block_order(replace(two, protocol={"study": {"block_order": order}, "groups": GROUPS}))
+    yield methods._block_order(replace(two, protocol={}))
+    members = base.participants.assign(group=["new", "new", "old"])
+    yield methods._groups(replace(base, protocol={"study": {}, "groups": GROUPS}))
+    existing = {"study": {"group_assignment": "pre-existing"}, "groups": GROUPS}
+    yield methods._groups(replace(base, protocol=existing, participants=members))
+    yield f"{methods._block_order(base)}{methods._groups(base)}none"
+    for order in ("fixed", "shuffled", "constrained", "williams", "latin"):
+        for of in (LIQUIDS, DELAYS):
+            shown_in = replace(of, protocol={"blocks": {"b": {"order": order}}})
+            yield methods._presented(shown_in, of.blocks[0], replace(result_of(of), revealed=order != "latin"))
+
+
+def planned() -> Iterator[str]:
+    kept, out = SimpleNamespace(name="kept"), SimpleNamespace(name="out")
+    told = {
+        "kept": [("Liquids", "Same?", "shown", "yes")],
+        "out": [("Liquids", "Same?", "open", "no"), ("Delays", "When?", "shown", "50")],
+    }
+    row = SimpleNamespace(
+        participant="P7", session=3, rule="fast_answers", why="too fast", decision="excluded", by="AK"
+    )
+    rules: Any = SimpleNamespace(proposals=(row,), included=kept, left_out=out)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sections, "conclusions", lambda results: told[results.name])
+        patch.setattr(sections, "of_levels", lambda results: (f"Track: {results.name}",))
+        yield text_of(sections.planned_section(rules))
+        rules.left_out = kept
+        yield text_of(sections.planned_section(rules)).rpartition("AK ")[2]
+    yield f"{[*sections.planned_section(None)]}"
+
+
+def motion() -> Iterator[str]:
+    measures = ("L1", "duration_s", 3), ("L1", "path_mm", 2), ("L3", "path_mm", 4), ("L2", "path_mm", 0)
+    moved = [
+        SimpleNamespace(block="b", code=code, measure=what, n=n, median=at + 0.26, q1=at - 1.5, q3=at + 2.0)
+        for at, (code, what, n) in enumerate(measures, start=7)
+    ]
+    measured: Any = SimpleNamespace(
+        moved=moved, reaching=("b",), recorded_in=lambda _block: True, trials=9, recorded=8, unread=(), judged=0,
+        invalid=0,
+    )  # fmt: skip
+    rows = [SimpleNamespace(block="b", code=f"L{at}", valid=at, judged=9) for at in (1, 2, 3)]
+    found = results(LIQUIDS, performance=measured, delivered=rows)
+    yield text_of(sections.motion(found)).partition("duration, s: from")[0]
+    found.performance = None
+    yield text_of(sections.motion(found))
+
+
+def limits() -> Iterator[str]:
+    cases: list[dict[str, Any]] = [
+        {}, {"settings": {}}, {"settings": {}, "protocol": {"study": {"codes": "participant"}}},
+        {"settings": {}, "sites": ("A",)}, {"simulated": True}, {"pilot": True}, {"made": False}, {"changed": True},
+        {"people": 1}, {"people": 2},
+    ]  # fmt: skip
+    for case in cases:
+        changes = dict(case)
+        shown = study(liquids(2), list(everybody(liquids(2), changes.pop("people", 12), lambda *_: 4)))
+        decided = replace(shown.decided, **{name: changes.pop(name) for name in ("made", "changed") if name in changes})
+        flags = {name: changes.pop(name, False) for name in ("simulated", "pilot")}
+        shown = replace(shown, participants=shown.participants.assign(**flags, protocol_hash="h"), **changes)
+        yield f"-- {case}"
+        yield from (line[:90] for line in sections._in_general(shown, replace_decided(shown, decided)))
+
+
+def replace_decided(shown: Study, decided: Any) -> Any:
+    found = results(shown)
+    found.decided = decided
+    return found
+
+
+def first_page_of_questions() -> Iterator[str]:
+    yield from first_page.presented_sentences(LIQUIDS).values()
+    yield from first_page.presented_sentences(DELAYS).values()
+    groups = [
+        GroupAnswers(code, name, {"n": n, "counts": {"left": n - 2, "right": 2}})
+        for code, name, n in (("L1", "Water", 9), ("L2", "Honey", 7), ("L3", "Oil", 0))
+    ]
+    asked = [
+        QuestionResult(
+            where=where, title=title, is_form=is_form, item=item, text="Which hand?", short=f"Hand {item}",
+            kind="choice", measure=measure, figure=None, groups=tuple(groups[:count]),
+        )
+        for where, title, is_form, item, measure, count in (
+            ("b", "Stirring", False, "i1", "counts", 2), ("end", "Goodbye", True, "i2", "counts", 1),
+            ("end", "Goodbye", True, "i3", "quartiles", 1),
+        )
+    ]  # fmt: skip
+    held = {"P1": 2.0, "P2": 5.0, "P3": 3.5}
+    numbers = {
+        "b": (
+            Numbers("Warm", (1.0, 7.0), False, (("Water", held), ("Honey", {"P1": 1.0, "P2": 3.0, "P3": 1.0}))),
+            Numbers("SUS", None, True, (("", held),)),
+        ),
+        "end": (Numbers("Age", None, False, (("", {"P1": 20.0, "P2": 31.0}),)),),
+    }
+    found = results(LIQUIDS, questions=asked, blocks=[])
+    yield from map(str, first_page.cards(found, numbers))
+    levels = [
+        SimpleNamespace(block=block, revealed=revealed, vary=vary)
+        for block, revealed, vary in (("end", True, None), ("c", False, None), ("b", True, "delay_ms"))
+    ]
+    for shown in (levels, levels[1:2], [SimpleNamespace(block="b", revealed=True, vary=None)]):
+        yield str(sections.places(results(LIQUIDS, questions=asked, blocks=[], levels=shown)))
+    repeated = replace(asked[1], groups=(replace(groups[0], code="b"), replace(groups[1], code="c")))
+    for main in (levels[1:], levels[2:]):
+        yield sections.place_title(repeated, results(LIQUIDS, questions=asked[:1], levels=main, blocks=[]))
+    yield from (first_page._setting_words(name) for name in ("Water", "After Stirring"))
+    lines = ["Oils: too few", "Waxes: too few", "sealed", "Oils: late"]
+    yield from first_page._limits_once(lines)
+
+
+def first_page_of_levels() -> Iterator[str]:
+    group = [SimpleNamespace(standard=at, threshold=at / 40, low=0.1, high=0.1 * at, n=int(at)) for at in (8.0, 12.0)]
+    of_pse = [SimpleNamespace(standard=None, pse=9.5, low=None, high=None, n=5)]
+    level = LevelsResult(
+        block="b", title="Thickness", design="pair", revealed=True, times=(), summary="share", counts="correct",
+        unit="N·s/m", level_kind="weber",
+    )  # fmt: skip
+    for shown, attribute, words, rows in (
+        (level, "threshold", "threshold", group), (replace(level, level_kind="value"), "pse", "PSE", of_pse),
+        (replace(level, revealed=False), "pse", "PSE", of_pse),
+    ):  # fmt: skip
+        with pytest.MonkeyPatch.context() as patch:
+            estimates = SimpleNamespace(attribute=attribute, words=words, group=rows)
+            patch.setattr(first_page, "estimates_of", lambda _level, estimates=estimates: estimates)
+            patch.setattr(first_page, "place_of", lambda one: one.standard)
+            found = results(LIQUIDS, blocks=[], levels=[shown])
+            yield from map(str, first_page.cards(found, presented={"b": "With oil."}))
+
+
+def hypotheses() -> Iterator[str]:
+    def side(name: str, low: float, high: float, n: int, sd: float) -> Any:
+        return SimpleNamespace(name=name, low=low, high=high, values=dict.fromkeys(range(n), 1.0), sd=sd)
+
+    def hypothesis(measure: str, sides: tuple[Any, ...], **changes: Any) -> Any:
+        contrast = SimpleNamespace(measure=measure, groups=None, expected=None, is_interaction=False, blocks=("b",))
+        given = {"p_adjusted": 0.3, "verdict": "inconclusive", "members": 2, "n": 12, "sd": 1.5, "ratio": False}
+        of_contrast = {name: changes.pop(name) for name in ("groups", "expected") if name in changes}
+        return SimpleNamespace(
+            contrast=SimpleNamespace(**(vars(contrast) | of_contrast)), sides=sides, **(given | changes)
+        )
+
+    two = side("water", -0.5, 0.5, 12, 0.8), side("oil", 0.1, 0.9, 12, 1.1)
+    groups = side("old", -1.0, 0.0, 9, 0.8), side("new", 0.2, 0.9, 14, 1.1)
+    for rows in (
+        [hypothesis("d_prime", two), hypothesis("item", two, expected="higher", n=9)],
+        [hypothesis("item", groups, groups=("old", "new"), ratio=True)],
+        [hypothesis("d_prime", groups, verdict="equivalent")],
+        [hypothesis("item", (side("a", 0, 1, 3, 5.0), side("b", 0, 1, 3, 5.0)), sd=40.0)],
+    ):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(sections, "equality_limits", lambda *_values, **_kinds: (None, 6.0))
+            yield from sections._low_power(results(LIQUIDS, contrasts=rows))
+            yield from sections._near_chance(results(LIQUIDS, contrasts=rows))
+    trials = LIQUIDS.trials.assign(worst_gap_ms=[31.0, 5.0, 40.0, *[3.0] * 6], lateness_p99_ms=[9.0, *[1.0] * 8])
+    kept = {"worst_gap_ms": 20.0, "lateness_ms": 2.0}
+    yield sections._violated_limits(replace(LIQUIDS, trials=trials), kept)
+    yield sections._violated_limits(replace(LIQUIDS, trials=trials[3:]), kept) + "none"
+
+
+PARTS = (
+    first_page_of_questions,
+    first_page_of_levels,
+    hypotheses,
+    conduct,
+    delivered,
+    lost_trials,
+    groups,
+    methods_of_a_study,
+    planned,
+    motion,
+    limits,
+)
+
+
+def test_each_sentence_and_table_has_its_own_values() -> None:
+    lines = (line for part in PARTS for line in (f"== {part.__name__}", *part()))
+    check_kept(Path(__file__).with_name("how_it_was_run.txt"), lines)
