@@ -92,7 +92,7 @@ def test_a_free_id_is_suggested(opened, results):
     assert made.editors["windowed"].control.isChecked(), "there is one screen for both windows"
     assert made.editors["participant"].control.text() == "P005"
     assert made.begin.isEnabled()
-    assert "is available" in made.verdict.text()
+    assert made.verdict.text() == "The ID P005 can be used for session 1"
 
 
 def test_a_falcon_by_its_serial_number_can_be_preferred_and_an_unknown_device_is_the_mouse(opened):
