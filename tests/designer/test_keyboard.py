@@ -146,16 +146,16 @@ def test_three_actions_lead_to_a_second_abx_block_at_another_delay(designer: Any
     designer.key("Return")
     assert designer.actions - before == 3
     blocks, conditions = designer.value("blocks"), designer.value("conditions")
-    copy = blocks["liquids_80"]
+    copy = blocks["liquids_2"]
     assert (copy["conditions"], copy["standard"]) == (("thin_80", "thick_80"), "thin_80")
-    assert copy["title"] == f"{blocks['liquids']['title']}, 80 ms"
+    assert copy["title"] == f"{blocks['liquids']['title']} 2"
     assert [conditions[name] for name in copy["conditions"]] == [
         {"liquid": "thin", "delay_ms": 80}, {"liquid": "thick", "delay_ms": 80},
     ]  # fmt: skip
-    assert (designer.study.faults, designer.editing.selected) == ((), ("blocks", "liquids_80"))
+    assert (designer.study.faults, designer.editing.selected) == ((), ("blocks", "liquids_2"))
     assert blocks["liquids"]["conditions"] == ("thin", "thick")
     assert designer.field("analysis", "contrasts").why.text() == ""
-    assert revealing_texts(designer.study, designer.study.protocol) == (), "participants do not read its title"
+    assert revealing_texts(designer.study, designer.study.protocol) == (), "results show its title before unblinding"
 
 
 def test_a_copy_of_an_abx_block_can_have_the_same_conditions(designer: Any) -> None:

@@ -549,18 +549,28 @@ def check_values(document: Mapping[str, Any], row: Row, values: Sequence[float])
 
 
 def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:
-    """Return the edits that copy an element with another number in its id and titles, and the path of the copy.
+    """Return the edits that copy an element with another number, and the path of the copy.
 
-    If it is a number of a block's conditions, these are copied too.
+    The number is a part of the copy's ID and titles. If it is a number of a block's conditions, these are copied, too,
+    and the title of the block is numbered, because results show it before unblinding.
     """
+    if row.path[:2] != path:
+        return _edits_to_copy_block(study, path, row, value)
     word = _number_in_id(value)
     stem = str(path[1]).removesuffix("" if row.value is None else f"_{_number_in_id(row.value)}")
     name = f"{stem[: MAX_ID - len(word) - 1]}_{word}"
     edits, copy = edits_to_duplicate(study, path, free_id(names(study.document, str(path[0])), name))
-    edits += tuple(Set((*copy, *place), text) for place, text in _titles_of_copy(study.document, path, row, value))
-    if row.path[:2] == path:
-        return (*edits, Set((*copy, *row.path[2:]), value)), copy
+    titles = (Set((*copy, *place), text) for place, text in _titles_of_copy(study.document, path, row, value))
+    return (*edits, Set((*copy, *row.path[2:]), value), *titles), copy
+
+
+def _edits_to_copy_block(study: Study, path: Path, row: Row, value: float) -> tuple[tuple[Edit, ...], Path]:
+    """Return the edits that copy a block and its conditions with another number, and the path of the copy."""
+    edits, copy = edits_to_duplicate(study, path)
     block, own = value_at(study.document, path), dict[str, str]()
+    number = 1 + sum(_compared_conditions(other) != () for other in study.document["blocks"].values())
+    for place, text in _titles(study.document, path):
+        edits = (*edits, Set((*copy, *place), f"{re.sub(r' [0-9]+$', '', text)} {number}"))
     for condition in dict.fromkeys(_compared_conditions(block)):
         after, _ = study.with_edits(*edits)
         made, own_path = edits_to_copy_with(after, condition, number_row(after.document, condition, row.path), value)
@@ -572,13 +582,19 @@ def edits_to_copy_with(study: Study, path: Path, row: Row, value: float) -> tupl
 def _titles_of_copy(document: Mapping[str, Any], path: Path, row: Row, value: float) -> Iterator[tuple[Path, str]]:
     """Yield the titles of a copy: the number at their end is replaced, or the new number is added."""
     number = re.compile(rf"(?:(?<!\w)[-{MINUS}])?\d+(?:[.,]\d+)?(?=\s*(?:{re.escape(row.unit)})?\s*$)")
+    for place, text in _titles(document, path):
+        last = number.search(text)
+        replaces = last is not None and number_of(last[0]) == row.value
+        new = number.sub(exact_text(value), text) if replaces else f"{text}, {exact_text(value)} {row.unit}"
+        yield place, new.rstrip()
+
+
+def _titles(document: Mapping[str, Any], path: Path) -> Iterator[tuple[Path, str]]:
+    """Yield the title of an element in each language, with its place in the element."""
     title = value_at(document, (*path, "title"))
     for language, text in title.items() if isinstance(title, Mapping) else (("", title),):
         if isinstance(text, str) and text.strip():
-            last = number.search(text)
-            replaces = last is not None and number_of(last[0]) == row.value
-            new = number.sub(exact_text(value), text) if replaces else f"{text}, {exact_text(value)} {row.unit}"
-            yield ("title", *filter(None, [language])), new.rstrip()
+            yield ("title", *filter(None, [language])), text
 
 
 def _number_in_id(value: float) -> str:

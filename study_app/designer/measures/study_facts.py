@@ -86,8 +86,7 @@ def revealing_texts(study: Study, protocol: Protocol) -> tuple[Revealing, ...]:
     debriefs = {name for name, page in protocol.pages.items() if page.kind == "debrief"}
     revealing = []
     for path, value in texts_of(study):
-        of_operator = path[::2] == ("blocks", "title")  # and the same for all conditions of the block
-        if path[0] not in READ or (path[0] == "pages" and path[1] in debriefs) or of_operator:
+        if path[0] not in READ or (path[0] == "pages" and path[1] in debriefs):
             continue
         texts = value.values() if isinstance(value, Mapping) else (value,)
         words_there = [word for text in texts if isinstance(text, str) for word in telltales.in_text(text.casefold())]
