@@ -165,8 +165,9 @@ def _means(plan: MeanPlan, sizes: Sequence[int], rng: np.random.Generator) -> Pr
     for own, true in zip(estimates, truth, strict=True):
         halves = []
         for n in sizes:
-            low, high = student_interval(own[:n])
-            halves.append(math.nan if low is None or high is None else (high - low) / 2 / abs(own[:n].mean()))
+            (low, high), mean = student_interval(own[:n]), abs(float(own[:n].mean()))
+            half = math.nan if low is None or high is None else (high - low) / 2
+            halves.append(half / mean if mean else math.inf)
         precision.errors.append((own - true)[:, None] / plan.value)
         precision.halves.append(np.array(halves))
     return precision

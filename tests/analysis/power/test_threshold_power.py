@@ -2,6 +2,7 @@
 
 import math
 from concurrent.futures import Executor, Future
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from study_app.analysis.planning.threshold_studies import (
     PrecisionResult,
     Precisions,
     plans,
+    study_batch,
     sweep,
     threshold_markdown,
 )
@@ -54,6 +56,12 @@ def swept(
 ) -> Precisions:
     *_, (done, found) = sweep(plans(protocol, trials), sizes, studies, seed, Here())
     return Precisions(protocol=protocol, sizes=sizes, studies=done, asked=studies, seed=seed, found=found)
+
+
+def test_a_mean_of_zero_has_no_relative_precision() -> None:
+    plan = SimpleNamespace(value=1.0, estimates=lambda truth, _rng: np.tile([-0.7, 0.7], len(truth) // 2))
+    found = study_batch(SimpleNamespace(plan=plan, seed=3), (2, 4))
+    assert all((halves == math.inf).all() for halves in found.halves)
 
 
 @pytest.mark.slow
