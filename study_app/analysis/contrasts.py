@@ -495,9 +495,10 @@ def answer(contrast: ContrastResult) -> str:
             if contrast.contrast.groups is None
             else "of a group belong to a minority that the sample does not include"
         )
+        p = "" if contrast.p_equivalent is None else f", {p_equals(contrast.p_equivalent)}"
         sentences.append(
-            f"The mean {kind} lies within the equivalence bounds (equivalent). However, the data do not rule out the "
-            f"possibility that up to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
+            f"The mean {kind} lies within the equivalence bounds (equivalent{p}). However, the data do not rule out "
+            f"the possibility that up to {100 * (contrast.not_excluded or 0.0):.0f} % {people}."
         )
     elif contrast.equivalent is not None:
         sentences.append(f"The tests do not show that the mean {kind} lies within the equivalence bounds.")

@@ -239,8 +239,8 @@ def draw_threshold(
     axes.plot(levels[there], shares, "o", **dots)
     sheet.text(MARGIN_PT, 28, "Proportion of answers expressing agreement", size=SMALL, colour=style.TEXT_SOFT)
     below = (
-        "Added delay in ms.   Small points: individual participants; circles: all participants; diamond: threshold "
-        "with 95 % interval" + ("." if lowest_ms is None else "; dashed: shortest delay with a trend.")
+        "Added delay in ms.   Points: participants; circles: all participants; diamond: threshold with 95 % interval"
+        + ("" if lowest_ms is None else "; dashed: shortest delay with a trend")
     )
     sheet.text(MARGIN_PT, sheet.height_pt - 5, below, size=SMALL, colour=style.TEXT_SOFT)
     return sheet

@@ -251,9 +251,10 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             )
         open_ones = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
         if open_ones:
+            verdicts = " or ".join(sorted({tested.verdict for tested in open_ones}))
             yield (
                 f"{lead_phrase(result)}: {len(open_ones)} of {number_text.counted(len(against), 'comparison')} with "
-                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} inconclusive: neither "
+                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} {verdicts}: neither "
                 "equivalence nor a mean difference beyond the bounds can be concluded."
             )
 
@@ -521,7 +522,7 @@ class _NoticedFrom(Finding[None]):
         return (
             f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
             f"{listed(rated)}. They may also notice shorter delays. The test "
-            "uses ranks; the mean ratings may be equal."
+            "compares ranks, not mean ratings."
         )
 
     def _threshold_words(self) -> str:

@@ -23,7 +23,7 @@ from study_app.analysis.results import BADGES, BlockResult, ContrastResult, Leve
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, ms, number, significant
 from study_app.protocol.model import quoted_title
-from study_app.protocol.quantities import quantity_words
+from study_app.protocol.quantities import quantity, quantity_words
 
 _BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] |\b(?:d_z|g) (?=[−\d])")
 """Where a line must not break: in an interval, before a percent sign, in "n = 12" and "p < .001"."""
@@ -78,7 +78,8 @@ def presented_sentences(study: Study) -> dict[str, str]:
         delay = f"visual delays of {listed([f'{delay_ms:g}' for delay_ms in delays])} ms"
         if len(delays) < 2:
             delay = "a varied visual delay" if not delays else f"a visual delay of {ms(delays[0])}"
-        varied = "" if stimulus is None or not delays else f"varied {quantity_words(stimulus.vary)} and "
+        standards = _standards(block)
+        varied = "" if stimulus is None or not delays else f"varied {quantity_words(stimulus.vary)}{standards} and "
         displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
         sentences[block.id] = (
             f"In {quoted_title(block.title)}, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}, "
@@ -86,6 +87,16 @@ def presented_sentences(study: Study) -> dict[str, str]:
             f"{''.join(f', {words}' for words in displays)}."
         )
     return sentences
+
+
+def _standards(block: Block | LevelBlock) -> str:
+    """Return the standards of a block of levels, with a leading space; "" if it has none."""
+    if not isinstance(block, LevelBlock) or block.stimulus is None:
+        return ""
+    standards = sorted({float(setting.standard) for setting in block.settings if setting.standard is not None})
+    values = listed([f"{standard:g}" for standard in standards])
+    unit = quantity(block.stimulus.vary).unit
+    return f" (standard{'s' * (len(standards) > 1)}: {values} {unit})" if standards else ""
 
 
 def cards(

@@ -52,6 +52,7 @@ from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
 from study_app.protocol.model import RULES, quoted_title
 from study_app.protocol.orders.balance import Evenness
+from study_app.protocol.orders.block_orders import session_steps_of
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of
@@ -143,6 +144,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
         yield "No hypothesis tests an interaction between groups and blocks or conditions."
     yield from _low_power(results)
     yield from _near_chance(results)
+    yield from _fixed_orders(study, results)
     if any(one.groups for one in hypotheses) and group_assignment(study) == "pre-existing":
         yield (
             "Participants were not assigned to groups at random, so a difference between groups may have other causes."
@@ -197,6 +199,8 @@ def _low_power(results: Results) -> Iterator[str]:
             continue
         sizes, freedom = [n for n, _ in sides], sum(n - 1 for n, _ in sides)
         sd = math.sqrt(sum((n - 1) * (own or 0.0) ** 2 for n, own in sides) / freedom) if grouped else result.sd
+        if sd and result.standard_error is not None and not grouped:
+            sd = result.standard_error * math.sqrt(result.n)  # that of the test, which may weight the participants
         if not sd:
             continue
         tail = results.decided.alpha / result.members / (2 if result.contrast.expected is None else 1)
@@ -219,7 +223,7 @@ def _low_power(results: Results) -> Iterator[str]:
 def _near_chance(results: Results) -> Iterator[str]:
     """Yield the sides of hypotheses about d′ at which participants may have guessed."""
     for place, result in enumerate(results.contrasts, start=1):
-        if result.contrast.measure != "d_prime" or result.contrast.is_interaction:
+        if result.contrast.measure != "d_prime" or result.contrast.is_interaction or result.verdict in FOUND:
             continue
         sides = [
             quoted_title(side.name)
@@ -231,6 +235,24 @@ def _near_chance(results: Results) -> Iterator[str]:
             yield (
                 f"{lead}: the interval of the mean d′ in {listed(sides)} includes 0 (chance). If participants guess, "
                 "a difference in d′ cannot be detected."
+            )
+
+
+def _fixed_orders(study: Study, results: Results) -> Iterator[str]:
+    """Yield the hypotheses that compare two blocks which all participants completed in the same order."""
+    if study.protocol["study"].get("block_order", "fixed") != "fixed":
+        return
+    sessions = [*session_steps_of(study.protocol)]
+    for place, result in enumerate(results.contrasts, start=1):
+        blocks = result.contrast.blocks
+        orders = {tuple(step for step in steps if step in blocks) for steps in sessions}
+        if len(blocks) == 2 and result.contrast.groups is None and len(orders) == 1 and len(order := orders.pop()) == 2:
+            names = dict(zip(blocks, result.compared, strict=True))
+            lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
+            yield (
+                f"{lead}: all participants completed {quoted_title(names[order[0]])} before "
+                f"{quoted_title(names[order[1]])}, so the difference cannot be distinguished from effects of the "
+                "order, such as practice."
             )
 
 

@@ -51,6 +51,7 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.wording import counted, listed, with_d_z
 from study_app.errors import AnalysisError
+from study_app.number_text import capitalised
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
 from study_app.store.columns import TRIALS_MISSING
@@ -455,7 +456,12 @@ def _facts(study: Study) -> str:
     )
     groups = listed([f"{count} {group}" for group, count in group_counts(study).items()])
     of_groups = f" ({groups})" if groups else ""
-    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}. {when}"
+    took_part = rows["participant"].nunique()
+    planned = (study.protocol.get("analysis") or {}).get("participants")
+    differing = [f"{took_part - study.n} of {took_part} were not included"] if took_part > study.n else []
+    differing += [f"{planned} were planned"] if planned not in (None, study.n) else []
+    others = f" {capitalised('; '.join(differing))}." if differing else ""
+    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}.{others} {when}"
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:
@@ -473,7 +479,7 @@ def _reproduction_sentences(study: Study, results: Results) -> Iterator[str]:
     rows = [
         ("Decided before the first session", "yes" if decided.binding else "no; all results are exploratory"),
         ("Alpha", decided.alpha_words()),
-        ("Equivalence bound", "none" if bound is None else f"±{bound:g}"),
+        ("Equivalence bound of statements", "none" if bound is None else f"±{bound:g}"),
         ("Primary statements", (", ".join(decided.primary) or "all") if decided.binding else "none"),
         ("Seed of the analysis", str(results.seed)),
         *((f"Version of {library}", version) for library, version in versions().items()),

@@ -756,7 +756,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # First page: delays
     (rf"Over delays of {R} to {R} ms, participants tended to rate longer delays (.*)\.", trend_is_shown),
     (r"They may also notice shorter delays\.", always),
-    (r"The test uses ranks; the mean ratings may be equal\.", always),
+    (r"The test compares ranks, not mean ratings\.", always),
     (r"Agreement increases with the delay, but we could not show that participants noticed any particular delay\.",
      when(lambda told: told.block["threshold"]["effect"] is not None)),
     (r"We could not show that participants noticed any delay\.", nothing_noticed),
@@ -873,7 +873,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf"population; if the answers of such a minority differ by {R} points, they shift the mean by as much as the "
      r"bound\.", missed_minority),
     (rf"This study has {N} participants?\.", lambda match, told: count(match[1]) == told.block["n"]),
-    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) inconclusive: neither equivalence nor a mean "
+    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) (?:inconclusive|out of reach)(?: or out of reach)?: "
+     r"neither equivalence nor a mean "
      r"difference beyond the bounds can be concluded\.", nobody_is_left),
     # Methods
     (rf"{N} participants?(?: \(SIMULATED, not people\))? took part in “Made up” \(protocol made_up, version 1\)(, "
