@@ -240,13 +240,14 @@ def _near_chance(results: Results) -> Iterator[str]:
 
 def _fixed_orders(study: Study, results: Results) -> Iterator[str]:
     """Yield the hypotheses that compare two blocks which all participants completed in the same order."""
-    if study.protocol["study"].get("block_order", "fixed") != "fixed":
+    if study.protocol.get("study", {}).get("block_order", "fixed") != "fixed":
         return
-    sessions = [*session_steps_of(study.protocol)]
     for place, result in enumerate(results.contrasts, start=1):
         blocks = result.contrast.blocks
-        orders = {tuple(step for step in steps if step in blocks) for steps in sessions}
-        if len(blocks) == 2 and result.contrast.groups is None and len(orders) == 1 and len(order := orders.pop()) == 2:
+        if len(blocks) < 2 or result.contrast.groups is not None:
+            continue
+        orders = {tuple(step for step in steps if step in blocks) for steps in session_steps_of(study.protocol)}
+        if len(orders) == 1 and len(order := orders.pop()) == 2:
             names = dict(zip(blocks, result.compared, strict=True))
             lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
             yield (

@@ -440,8 +440,10 @@ def contrast_values(told: Told, one: Mapping[str, Any]) -> np.ndarray:
 def bound_of_a_contrast(where: str) -> Callable[[re.Match[str], Told], bool]:
     """Return the check that a hypothesis with a bound lies there: its interval, or the difference of all."""
 
-    def check_bound(_match: re.Match[str], told: Told) -> bool:
+    def check_bound(match: re.Match[str], told: Told) -> bool:
         found = set()
+        if match[0].startswith("The mean difference lies within"):
+            assert any(one["equivalent"] and is_p(match[1], one["p_equivalent"]) for one in told.contrasts)
         for one in told.contrasts:
             if (bound := one["contrast"]["bound"]) is not None and one["effect"] is not None:
                 ends = one["interval"] or {"low": one["effect"], "high": one["effect"]}
@@ -810,7 +812,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Between groups, Cliff's delta is the probability that an answer in the first group is larger than one in the "
      r"second, minus the probability that it is smaller\.", when(lambda told: bool(told.contrasts))),
     (r"Within participants, it is the proportion of .*\.", when(lambda told: bool(told.contrasts))),
-    (r"The mean difference lies within the equivalence bounds \(equivalent\)\.", bound_of_a_contrast("within")),
+    (rf"The mean difference lies within the equivalence bounds \(equivalent, {P}\)\.", bound_of_a_contrast("within")),
     (r"However, the data do not rule out the possibility that up to (\d+) % of (people show a difference larger than "
      r"the bound|a group belong to a minority that the sample does not include)\.",
      bound_of_a_contrast("within")),

@@ -296,6 +296,7 @@ def hypotheses() -> Iterator[str]:
     def hypothesis(measure: str, sides: tuple[Any, ...], **changes: Any) -> Any:
         contrast = SimpleNamespace(measure=measure, groups=None, expected=None, is_interaction=False, blocks=("b",))
         given = {"p_adjusted": 0.3, "verdict": "inconclusive", "members": 2, "n": 12, "sd": 1.5, "ratio": False}
+        given["standard_error"] = None
         of_contrast = {name: changes.pop(name) for name in ("groups", "expected") if name in changes}
         return SimpleNamespace(
             contrast=SimpleNamespace(**(vars(contrast) | of_contrast)), sides=sides, **(given | changes)

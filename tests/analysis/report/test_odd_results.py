@@ -55,8 +55,8 @@ def test_limits_count_the_trials_in_which_the_device_answered_late() -> None:
     trials.loc[main[:3], "device_delay_ticks"] = 3.0, 4.0, 3.0
     (told,) = [line for line in limits(replace(study, trials=trials), results) if "device responded" in line]
     assert told.startswith(
-        f"In 3 of {len(main)} trials in the main blocks, the device responded later than the servo assumed: after at "
-        "least 4 ticks in one of them, instead of 1. "
+        f"In 3 of {len(main)} trials in the main blocks, the device responded later than the servo assumed: in the "
+        "worst case after at least 4 ticks instead of 1. "
     )
 
 
