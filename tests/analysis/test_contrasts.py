@@ -15,6 +15,7 @@ from scipy.stats import ttest_ind, ttest_rel
 from study_app.analysis.contrasts import answer
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
+from study_app.analysis.figures.level_figures import level_pictures
 from study_app.analysis.levels.thresholds import Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.planning.power_curves import (
@@ -700,6 +701,13 @@ def test_a_mean_d_prime_that_may_be_chance_is_a_limit(
     ] * bool(named)
     shown = limits(made, replace(results, contrasts=(replace(contrast, sides=sides, verdict="shown"),)))
     assert not [line for line in shown if "(chance)" in line], "it has been detected"
+
+
+def test_a_single_comparison_shows_participants_as_points(guessed: tuple[Study, Results]) -> None:
+    made, results = guessed
+    captions = [picture.caption for picture in level_pictures(made, results.levels, forms=())]
+    assert len(captions) == 2
+    assert all("; small points show individual participants. Other panels" in caption for caption in captions)
 
 
 def test_an_order_that_is_the_same_for_all_is_a_limit_of_a_comparison_of_blocks(guessed: tuple[Study, Results]) -> None:

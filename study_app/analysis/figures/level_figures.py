@@ -174,8 +174,9 @@ def _panels(result: LevelsResult, banded: bool) -> str:
             f"to the number of answers){crosses}. First panel: all participants."
         )
     units = " after removing differences between participants' units" if result.own_units else ""
+    own = "thin lines" if len(_places(result)) > 1 else "small points"
     return (
-        f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); thin lines show "
+        f"First panel: {mean_words(result)} across participants with its 95 % interval (Student's t); {own} show "
         f"individual participants{units}. Other panels: one participant each, with 95 % intervals for the "
         f"answers{crosses}."
     )
@@ -249,7 +250,8 @@ def _line(
             np.mean([_height(result, answers.value) for answers in shown if answers.participant is None])
             - heights.mean()
         )
-    axes.plot([places[_where(point)] for point in points], heights, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
+    xs, marker = [places[_where(point)] for point in points], "" if len(places) > 1 else "."
+    axes.plot(xs, heights, marker=marker, markersize=4, color=style.PARTICIPANT, linewidth=0.5, alpha=0.7)
 
 
 def _curve(axes: Axes, result: LevelsResult, estimate: ThresholdEstimate, colour: str) -> None:

@@ -68,6 +68,7 @@ def presented_sentences(study: Study) -> dict[str, str]:
     """Return, by block, a sentence on the liquids and delays of its conditions; sealed blocks have none."""
     sentences: dict[str, str] = {}
     blocks: list[Block | LevelBlock] = [*study.blocks, *study.levels]
+    has_delays = any((setting.of or setting).delay_ms != 0.0 for block in blocks for setting in block.settings)
     for block in blocks:
         stimulus, reference = (block.stimulus, block.reference) if isinstance(block, LevelBlock) else (None, None)
         conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
@@ -78,13 +79,17 @@ def presented_sentences(study: Study) -> dict[str, str]:
         delay = f"visual delays of {listed([f'{delay_ms:g}' for delay_ms in delays])} ms"
         if len(delays) < 2:
             delay = "a varied visual delay" if not delays else f"a visual delay of {ms(delays[0])}"
-        standards = _standards(block)
-        varied = "" if stimulus is None or not delays else f"varied {quantity_words(stimulus.vary)}{standards} and "
+        details = []
+        if stimulus is not None and delays:
+            details.append(f"varied {quantity_words(stimulus.vary)}{_standards(block)}")
+        if delays != [0.0]:
+            details.append(delay)
+        elif has_delays:
+            details.append("no visual delay")
         displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
         sentences[block.id] = (
-            f"In {quoted_title(block.title)}, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}, "
-            f"with {varied}{'no visual delay' if delays == [0.0] else delay}"
-            f"{''.join(f', {words}' for words in displays)}."
+            f"In {quoted_title(block.title)}, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}"
+            f"{f', with {listed(details)}' if details else ''}{''.join(f', {words}' for words in displays)}."
         )
     return sentences
 
