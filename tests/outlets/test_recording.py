@@ -73,7 +73,12 @@ def added(rows: Rows) -> Rows:
             'own.xdf contains 1 marker not recorded in the journal, starting with {"event":"note","t_s":0.5}: ',
             3,
         ),
-        (without(0, 8), list, "markers: 4 before the recording and 0 after it", 0),
+        (
+            without(0, 8),
+            list,
+            "4 of the 32 markers fall outside the recording own.xdf: 4 before the recording and 0 after it",
+            0,
+        ),
         (without(0, 9999), list, "own.xdf: it does not contain markers from this study's sessions", 3),
     ],
 )

@@ -188,7 +188,7 @@ CALLS = {
         "stop": [STOP.format(3)],
         "fade in": [FADE_IN.format(4), FADE_IN.format(5)],
         "participant stops": [STOP.format(4).replace("operator", "participant")],
-        "part fails": ["note note part of the operator's window failed: ValueError: no plot"],
+        "part fails": ["note note part of the operator's window stopped working: ValueError: no plot"],
         "diagnose": [f"{STOP.format(5)}, diagnose_asked", "stop_force, diagnose_asked"],
         "late": [""],
         "withdraw": ["session_ended felt unwell withdrawn"],

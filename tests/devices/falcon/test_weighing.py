@@ -101,7 +101,7 @@ class TestAScale:
                 Grip(device, virtual=True), lambda kind, said: words.append(said) or ask(kind, said)
             )
         assert asked.count("reading") == len(wrong) + len(PLACES_M)
-        assert [said for said in words if "is not a number of grams" in said][1].startswith("'four' is")
+        assert [said for said in words if "is not a weight between" in said][1].startswith("'four' is")
         found = fit(GEOMETRIES["libnifalcon"], notes.counts, notes.forces_n, notes.units)
         assert found.units_per_nm == pytest.approx(6616, rel=0.04)
 
