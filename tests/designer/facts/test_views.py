@@ -75,7 +75,7 @@ def test_what_is_found_has_the_words(words: str) -> None:
         assert words in one_line(row).lower() or any(words in one_line(other).lower() for other in found), row
 
 
-@pytest.mark.parametrize(("words", "rank"), [("repetitions", LABEL), ("double", CHOSEN), ("kalman", OTHER)])
+@pytest.mark.parametrize(("words", "rank"), [("repetitions", LABEL), ("double", CHOSEN), ("ewma", OTHER)])
 def test_other_choices_are_found_only_where_no_label_and_no_chosen_one_is(words: str, rank: int) -> None:
     ((_, study),) = studies(("slime",))
     found = found_fields(study, words)
