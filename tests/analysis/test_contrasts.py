@@ -47,6 +47,7 @@ from study_app.store.unblinding import unblind
 from tests.analysis.made_up import ITEMS, everybody, liquids, study
 from tests.analysis.power.test_power import felt_in
 from tests.analysis.report.read_report import seen
+from tests.golden_values import page_lines
 from tests.protocol.edited_studies import text_of
 from tests.studies import quick_pdfs
 
@@ -119,6 +120,8 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     assert f"; mean ratio {found.effect:.2f}, two-sided 95 % confidence interval" in first
     for side, own in zip(found.sides, (late, prompt), strict=True):
         assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
+    of_ratio = [line.split(" | ") for line in page_lines(page) if line.startswith("Threshold: Late ÷ Prompt | 6 | ")]
+    assert [of_ratio[0][-5], of_ratio[1][-1]] == [f"{error * math.log(10):.2f}"] * 2, "tested, and described"
 
 
 def test_methods_name_all_compared_conditions_with_their_delays(guessed: tuple[Study, Results]) -> None:
@@ -381,7 +384,7 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
     assert (result.statistic, result.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
     assert result.effect == pytest.approx(one.mean() - two.mean())
     assert result.verdict == "shown"
-    difference = f"difference in agreement with “{ITEMS[0].capitalize()}” between c2 and c1 in block b"
+    difference = f"difference in agreement with “{ITEMS[0].capitalize()}” between c2 and c1 in Block"
     assert f"The {difference} was higher in one than in two" in answer(result)
     assert f"the {difference} differs between one and two" in methods(made, evaluate(made))
     assert [len(side.values) for side in result.sides] == [len(one), len(two)]
