@@ -50,7 +50,7 @@ def test_letters_of_figures_are_readable_on_a_narrow_screen_and_figures_fit_on_a
     figures = re.findall(r'<svg role="img".*?</svg>', page, re.DOTALL)
     assert len(drawings) == len(figures) >= 6
     for (least, width), figure in zip(drawings, figures, strict=True):
-        assert min(map(float, re.findall(r"font: (?:\w+ )?([\d.]+)px", figure))) * int(least) / float(width) >= 11
+        assert min(map(float, re.findall(r"font-size: ([\d.]+)px", figure))) * int(least) / float(width) >= 11
     style = page[: page.index("</style>")]
     assert "figure svg { min-width: var(--least); }" in style
     assert "@page { size: A4;" in style
