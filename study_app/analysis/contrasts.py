@@ -74,6 +74,8 @@ _BAYES: Final = (
     "Bayes factors are two-sided JZS Bayes factors (Rouder et al., 2009) that compare the hypothesis of a difference "
     f"with the null hypothesis, using a Cauchy prior with scale {number(PRIOR_SCALE, 3)}."
 )
+_SUBSTANTIAL: Final = 3.0
+"""Smaller Bayes factors are weak evidence (Jeffreys 1961)."""
 _UNADJUSTED: Final = "The confidence intervals are not adjusted for the number of hypotheses. "
 _MOST_NAMED: Final = 20
 
@@ -183,9 +185,11 @@ def _compared(
         if contrast.measure in _STATISTICS
         else f"an answer to {contrast.measure} is missing"
     )
-    names = contrast.within or contrast.blocks * 2
+    names = contrast.conditions or _block_titles(study, contrast)
     left_out = {
-        person: f"{what} in {name}" for side, name in zip(sides[::-1], names[::-1], strict=True) for person in people
+        person: f"{what} in {quoted_title(name)}"
+        for side, name in zip(sides[::-1], names[::-1], strict=True)
+        for person in people
         if person not in side
     }  # fmt: skip
     kept = [person for person in people if person not in left_out]
@@ -230,6 +234,7 @@ def _side(name: str, held: Mapping[str, Measured], *, ratio: bool) -> ContrastSi
         low=low,
         high=high,
         sd=_sd([measured.value for measured in held.values()]),
+        standard_error=None if means is None else float(means.error[0]),
     )
 
 
@@ -403,6 +408,7 @@ def _tested(
             for name, held in zip((within or contrast.within or ()) * 2, compared.cells, strict=False)
         ),
         measure_name=_measure_name(study, contrast),
+        block_title=_block_titles(study, contrast)[0],
         standard_error=error,
         freedom=None if error is None or means is None else means.freedom,
     )
@@ -579,11 +585,11 @@ def _effect_size_words(size: EffectSize | None) -> str:
 def _bayes_words(contrast: ContrastResult) -> str:
     if contrast.bayes_factor is None or contrast.verdict in FOUND:
         return ""
-    more, less = ("a", "none") if contrast.bayes_factor > 1 else ("no", "one")
-    factor = significant(max(contrast.bayes_factor, 1 / contrast.bayes_factor))
+    factor = max(contrast.bayes_factor, 1 / contrast.bayes_factor)
+    sides = "with a difference as without one" if contrast.bayes_factor > 1 else "without a difference as with one"
     return (
-        f" The data are {factor} times as likely if there is {more} difference as if there is {less} (JZS Bayes "
-        f"factor, Cauchy prior with scale {number(PRIOR_SCALE, 3)})."
+        f" The data are {significant(factor)} times as likely {sides} (JZS Bayes factor, Cauchy prior with scale "
+        f"{number(PRIOR_SCALE, 3)}){', which is weak evidence' * (factor < _SUBSTANTIAL)}."
     )
 
 
@@ -714,10 +720,15 @@ def contrast_section(results: Results) -> Iterator[str]:
         ("mean", lambda row: number(row.mean)),
         ("median", lambda row: number(float(np.median(row.values)) if row.values else None)),
         ("SD", lambda row: number(row.sd)),
-        ("SE", lambda row: number(None if row.sd is None else row.sd / math.sqrt(len(row.values)))),
+        ("SE", lambda row: number(row.standard_error)),
     )
-    logs = " If a ratio is tested, they refer to natural logarithms of the values." * ("ratio" in kinds)
-    yield paragraph(f"SD is the standard deviation across participants, and SE is SD/√n.{logs}", "soft")
+    logs = " If a ratio is tested, both refer to natural logarithms of the values." * ("ratio" in kinds)
+    weights = " if participants are weighted equally" * weighted
+    yield paragraph(
+        f"SD is the standard deviation across participants. SE is the standard error of the mean, SD/√n{weights}."
+        f"{logs}",
+        "soft",
+    )
 
 
 def _effect_size_notes(contrasts: Sequence[ContrastResult]) -> str:
@@ -739,14 +750,16 @@ class _Described(NamedTuple):
     values: Sequence[float]
     mean: float | None
     sd: float | None
+    standard_error: float | None
 
 
 def _described(results: Results, contrast: ContrastResult) -> Iterator[_Described]:
     for side in contrast.sides:
-        yield _Described(_row_words(results, contrast, side.name), [*side.values.values()], side.mean, side.sd)
+        name = _row_words(results, contrast, side.name)
+        yield _Described(name, [*side.values.values()], side.mean, side.sd, side.standard_error)
     if differences := [*contrast.differences.values()]:
         name = _row_words(results, contrast, contrast.comparison)
-        yield _Described(name, differences, contrast.effect, contrast.sd)
+        yield _Described(name, differences, contrast.effect, contrast.sd, contrast.standard_error)
 
 
 _DIRECTIONS: Final = {"difference": "differences are first minus second", "ratio": "ratios are first divided by second"}

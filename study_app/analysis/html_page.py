@@ -1,6 +1,7 @@
 """The page and its parts: one HTML file with its style and pictures inside, without scripts."""
 
 import base64
+import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache
@@ -10,7 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from study_app import figure_style as style
-from study_app.analysis.page_layout import Picture
+from study_app.analysis.page_layout import SMALL, Picture
 from study_app.analysis.results import Failure, Failures
 from study_app.analysis.wording import number, with_d_z
 
@@ -29,6 +30,8 @@ _PX_PER_PT = 1.9
 """Pixels of the page for a point of a figure that has the room."""
 _BESIDE_PT = 420
 """Of a figure that fills its place beside an answer; narrower ones do not, so that all texts are equally large."""
+_LEAST_LETTERS_PX = 11
+"""Height of the smallest letters of a figure on a screen; a figure without the room scrolls."""
 
 _VARIABLES = {
     style.TEXT: "text",
@@ -176,7 +179,8 @@ def _inline_svg(svg: str, words: str) -> Markup:
     view = size[0] if size else ""
     root = re.sub(r' (?:width|height)="[^"]*"', "", view, count=2)
     label = Markup.escape(words)
-    look = f"width: {width}px; --share: {share}%"
+    least = math.ceil(_LEAST_LETTERS_PX / SMALL * float(size[1])) if size else 0
+    look = f"width: {width}px; --share: {share}%; --least: {least}px"
     shown = root.replace("<svg ", f'<svg role="img" aria-label="{label}" style="{look}" ', 1)
     return Markup("".join(parts).replace(view, shown, 1))  # noqa: S704 - matplotlib escapes its texts
 

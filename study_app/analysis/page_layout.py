@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -118,13 +118,12 @@ class Sheet:
         places: Sequence[float] | NDArray[np.float64],
         words: Sequence[object] | None = None,
         *,
-        size: float = 6.5,
         lines: bool = False,
     ) -> None:
         """Label positions of an axis, by default with the numbers (empty: no labels); ``lines`` adds grid lines."""
         shown = [f"{place:g}" for place in places] if words is None else [str(word) for word in words]
         if shown:
-            (axes.set_xticks if side == "x" else axes.set_yticks)(places, shown, fontproperties=self.font(size))
+            (axes.set_xticks if side == "x" else axes.set_yticks)(places, shown, fontproperties=self.font(SMALL))
         if lines:
             for place in places:
                 (axes.axvline if side == "x" else axes.axhline)(place, color=style.GRID, linewidth=0.6, zorder=0)
@@ -169,6 +168,33 @@ class Sheet:
         fitting = [words for words in counts if x + 10 + self.text_width(words, 7.5) <= right]
         words = fitting[0] if fitting else counts[-1]
         self.text(right, baseline, words, size=7.5, colour=style.TEXT_SOFT, ha="right")
+
+
+POINT: Final[Style] = {
+    "marker": "o",
+    "linestyle": "none",
+    "color": style.PARTICIPANT,
+    "markersize": 3.0,
+    "markeredgewidth": 0.4,
+    "markeredgecolor": "#ffffff",
+}
+"""Of a participant's number; the edge separates points that touch."""
+
+
+def spread_points(places_pt: Sequence[float] | NDArray[np.float64], most_pt: float) -> NDArray[np.float64]:
+    """Return an offset [pt] across the scale for each point, so that points overlap only if there is no room.
+
+    Offsets lie within ±``most_pt``; points that have room to both sides have none.
+    """
+    places, apart = np.asarray(places_pt, dtype=float), POINT["markersize"] + POINT["markeredgewidth"]
+    lanes = apart * np.array(sorted(range(-int(most_pt / apart), int(most_pt / apart) + 1), key=abs))
+    order, offsets = np.argsort(places, kind="stable"), np.zeros(len(places))
+    for rank, point in enumerate(order):
+        near = order[np.searchsorted(places[order], places[point] - apart) : rank]
+        distances = np.hypot(places[point] - places[near], lanes[:, None] - offsets[near])
+        free = np.minimum(distances.min(axis=1, initial=np.inf), apart - 1e-9)
+        offsets[point] = lanes[np.argmax(free)]
+    return offsets
 
 
 @dataclass(frozen=True, slots=True)

@@ -254,7 +254,7 @@ class ContrastSide:
     """One side of a hypothesis: the number of each participant, and their mean with its interval.
 
     The mean is that of the test: of logarithms for a ratio, with the weights of the group means. ``sd`` is the standard
-    deviation between participants, of logarithms for a ratio.
+    deviation between participants and ``standard_error`` that of the mean, of logarithms for a ratio.
     """
 
     name: str
@@ -263,6 +263,7 @@ class ContrastSide:
     low: float | None
     high: float | None
     sd: float | None
+    standard_error: float | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -278,8 +279,9 @@ class ContrastResult(Outcome):
     differences within participants; ``standardised`` is d_z or g, ``ordinal`` is Cliff's delta of answers to a
     statement, and ``bayes_factor`` the ratio of the likelihoods with and without a difference. ``within_names`` are the
     names of the blocks or conditions of an interaction, ``cells`` the numbers of each group under each of them, group
-    by group, and ``measure_name`` is the measure in words. ``standard_error`` is that of the mean difference, of
-    logarithms for a ratio, and ``freedom`` are the degrees of freedom of t.
+    by group, ``measure_name`` is the measure in words, and ``block_title`` is that of the first block.
+    ``standard_error`` is that of the mean difference, of logarithms for a ratio, and ``freedom`` are the degrees of
+    freedom of t.
     """
 
     contrast: Contrast
@@ -303,6 +305,7 @@ class ContrastResult(Outcome):
     within_names: tuple[str, str] | None = None
     cells: tuple[ContrastSide, ...] = ()
     measure_name: str = ""
+    block_title: str = ""
     standard_error: float | None = None
     freedom: int | None = None
 
@@ -322,12 +325,12 @@ class ContrastResult(Outcome):
     @property
     def effect_words(self) -> str:
         """What the two sides are compared in, with the titles that participants or operators see."""
-        return self.contrast.effect_words(self.within_names, self.measure_name)
+        return self.contrast.effect_words(self.within_names, self.measure_name, self.block_title)
 
     @property
     def hypothesis(self) -> str:
         """The hypothesis as a sentence."""
-        return self.contrast.described(self.compared, self.within_names, self.measure_name)
+        return self.contrast.described(self.compared, self.within_names, self.measure_name, self.block_title)
 
     @property
     def largest_p(self) -> float | None:

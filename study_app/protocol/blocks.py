@@ -1,13 +1,15 @@
 """Blocks: trials that share a task and a questionnaire, and the order in which their conditions come."""
 
-from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias
+from collections import Counter
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
 
 from pydantic import Field, StringConstraints, model_validator
 
 from study_app.haptics.model.ranges import later, within
 from study_app.ids import MAX_ID
 from study_app.protocol.sequences import Constraint
-from study_app.protocol.table import Id, Localised, Table, invalid
+from study_app.protocol.table import Id, Localised, Table, invalid, text_in
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]
@@ -238,3 +240,17 @@ class Block(Table):
                 f"is {self.break_every}, but the block has only {counted}, so there would be no break", "break_every"
             )
         return self
+
+
+def display_language(protocol: Mapping[str, Any]) -> str:
+    """Return the language of figures and tables: English if the study has it, otherwise its first language."""
+    languages = list(protocol["study"]["languages"])
+    return "en" if "en" in languages else str(languages[0])
+
+
+def block_titles(protocol: Mapping[str, Any]) -> dict[str, str]:
+    """Return the title of each block by ID; the ID follows a title that several blocks of one phase share."""
+    language = display_language(protocol)
+    titles = {name: (block["phase"], text_in(block["title"], language)) for name, block in protocol["blocks"].items()}
+    counts = Counter(titles.values())
+    return {name: f"{own[1]} ({name})" if counts[own] > 1 else own[1] for name, own in titles.items()}

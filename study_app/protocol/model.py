@@ -454,15 +454,16 @@ class Contrast(Table):
             words.get(self.measure, self.measure) if self.measure in OF_LEVELS else f"agreement with “{self.measure}”"
         )
 
-    def effect_words(self, within: tuple[str, str] | None = None, measure: str = "") -> str:
+    def effect_words(self, within: tuple[str, str] | None = None, measure: str = "", block: str = "") -> str:
         """Return what the two sides are compared in: the measure, or in an interaction the difference in it.
 
-        ``within`` names the two blocks or conditions and ``measure`` the measure in words; by default their ids.
+        ``within`` names the two blocks or conditions, ``measure`` the measure in words and ``block`` a single block; by
+        default their ids.
         """
         measure = measure or self.measure_words
         if self.groups is None or self.within is None:
             return measure
-        where = "" if len(self.blocks) == 2 else f" in block {self.blocks[0]}"
+        where = "" if len(self.blocks) == 2 else f" in {quoted_title(block) or f'block {self.blocks[0]}'}"
         first, second = map(quoted_title, within or self.within)
         return f"the difference in {measure} between {first} and {second}{where}"
 
@@ -475,16 +476,21 @@ class Contrast(Table):
         return (f"{first} ({of[0]})", f"{second} ({of[1]})") if len(set(of)) > 1 and None not in of else (first, second)
 
     def described(
-        self, names: tuple[str, str] | None = None, within: tuple[str, str] | None = None, measure: str = ""
+        self,
+        names: tuple[str, str] | None = None,
+        within: tuple[str, str] | None = None,
+        measure: str = "",
+        block: str = "",
     ) -> str:
         """Return a sentence with the hypothesis; ``names`` are those of the two sides, others as in `effect_words`."""
         first, second = map(quoted_title, names or self.compared)
-        where = "" if len(self.blocks) == 2 or self.is_interaction else f" in block {self.blocks[0]}"
+        at = quoted_title(block) or f"block {self.blocks[0]}"
+        where = "" if len(self.blocks) == 2 or self.is_interaction else f" in {at}"
         moves = "differs between" if self.expected is None else f"is {self.expected} in"
         joint = "and" if self.expected is None else "than in"
         near = "" if self.bound is None else f", with an equivalence bound of {self.bound:g}"
         kind = " (interaction)" if self.is_interaction else ""
-        return f"{self.effect_words(within, measure)} {moves} {first} {joint} {second}{kind}{where}{near}"
+        return f"{self.effect_words(within, measure, block)} {moves} {first} {joint} {second}{kind}{where}{near}"
 
 
 def quoted_title(name: str) -> str:

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import Final
 
 from study_app.errors import StoreError
+from study_app.protocol.blocks import block_titles
+from study_app.protocol.model import quoted_title
 from study_app.store import receipt
 from study_app.store.atomic import (
     is_there,
@@ -229,7 +231,7 @@ def _missed_catch_trials(session: SessionFolder, key: Key) -> Iterator[str]:
     published = receipt.read(session.receipt)["protocol"]
     if not any("catch" in block for block in published["blocks"].values()):
         return
-    protocol = complete_protocol(published, key)
+    protocol, titles = complete_protocol(published, key), block_titles(published)
     lines = open_events(journal.read(session.journal), key)
     blocks = {line.trial: line.block for line in lines if isinstance(line, TrialStarted)}
     heard = [result for result in trial_results(protocol, lines) if result.catch]
@@ -238,8 +240,8 @@ def _missed_catch_trials(session: SessionFolder, key: Key) -> Iterator[str]:
         wrong = sum(not result.correct for result in answered)
         if block.catch is not None and answered and wrong / len(answered) > block.catch.wrong_most:
             yield (
-                f'block "{block.id}": {wrong} of {len(answered)} catch trials were answered incorrectly; '
-                f"at most {100 * block.catch.wrong_most:g} % are permitted"
+                f"{wrong} of {len(answered)} catch trials in {quoted_title(titles[block.id])} were answered "
+                f"incorrectly (at most {100 * block.catch.wrong_most:g} % are permitted)"
             )
 
 

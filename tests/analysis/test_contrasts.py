@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from scipy.stats import t as student
 from scipy.stats import ttest_ind, ttest_rel
 
-from study_app.analysis.contrasts import answer
+from study_app.analysis.contrasts import answer, contrast_section
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.figures.level_figures import level_pictures
@@ -47,6 +47,7 @@ from study_app.store.unblinding import unblind
 from tests.analysis.made_up import ITEMS, everybody, liquids, study
 from tests.analysis.power.test_power import felt_in
 from tests.analysis.report.read_report import seen
+from tests.golden_values import page_lines
 from tests.protocol.edited_studies import text_of
 from tests.studies import quick_pdfs
 
@@ -119,6 +120,11 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     assert f"; mean ratio {found.effect:.2f}, two-sided 95 % confidence interval" in first
     for side, own in zip(found.sides, (late, prompt), strict=True):
         assert side.values == pytest.approx({person: 10 ** own[person].value for person in study.people})
+        half = math.log(side.high / side.low) / 2
+        assert side.standard_error == pytest.approx(half / student.ppf(0.975, 5)), "of the mean, which is weighted"
+    tables = "".join(contrast_section(replace(results, contrasts=(replace(found, standard_error=4.0),))))
+    of_ratio = [line.split(" | ") for line in page_lines(tables) if line.startswith("Threshold: Late ÷ Prompt | 6 | ")]
+    assert [of_ratio[0][-5], of_ratio[1][-1]] == ["4.00"] * 2, "tested, and described"
 
 
 def test_methods_name_all_compared_conditions_with_their_delays(guessed: tuple[Study, Results]) -> None:
@@ -147,8 +153,8 @@ def test_thresholds_of_a_staircase_leave_nobody_out_and_name_who_did_not_do_a_bl
     assert (found.n, found.dropped, found.left_out) == (8, 0, {})
     gone = study.trials[~((study.trials["participant"] == "P003") & (study.trials["block"] == "late"))]
     (found,) = (results := evaluate(replace(study, trials=gone))).contrasts
-    assert (found.n, found.dropped, found.left_out) == (7, 1, {"P003": "no threshold in late"})
-    assert "Excluded: P003 (no threshold in late)." in first_page(results, ())
+    assert (found.n, found.dropped, found.left_out) == (7, 1, {"P003": "no threshold in Late"})
+    assert "Excluded: P003 (no threshold in Late)." in first_page(results, ())
     words = "Participants are included if both of their values are available, even if a threshold lies outside"
     assert words in preregistration(parse(text.encode(), "delayed.toml"), "0" * 64)
 
@@ -206,7 +212,7 @@ def test_the_methods_state_every_hypothesis_and_its_correction() -> None:
     made = replace(statements(contrast), contrasts=(contrast, other))
     told = methods(made, evaluate(made))
     for place, (stated, item, sides) in enumerate([(contrast, ITEMS[0], "two"), (other, ITEMS[1], "one")], start=1):
-        words = stated.described(measure=f"agreement with “{item.capitalize()}”")
+        words = stated.described(measure=f"agreement with “{item.capitalize()}”", block="Block")
         assert f"Hypothesis {place} ({words}) was tested with a {sides}-sided paired t test." in told
     assert "The reported p value is the largest of the three, Holm-adjusted across 2 hypotheses." in told
     assert "Equivalence was tested with two one-sided t tests" in told
@@ -381,7 +387,7 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
     assert (result.statistic, result.p) == pytest.approx((t, 2 * student.sf(abs(t), min(len(one), len(two)) - 1)))
     assert result.effect == pytest.approx(one.mean() - two.mean())
     assert result.verdict == "shown"
-    difference = f"difference in agreement with “{ITEMS[0].capitalize()}” between c2 and c1 in block b"
+    difference = f"difference in agreement with “{ITEMS[0].capitalize()}” between c2 and c1 in Block"
     assert f"The {difference} was higher in one than in two" in answer(result)
     assert f"the {difference} differs between one and two" in methods(made, evaluate(made))
     assert [len(side.values) for side in result.sides] == [len(one), len(two)]

@@ -4,14 +4,13 @@ While the key is sealed a setting is its code and nothing else. Texts are in Eng
 in its first language.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, Self, TypeAlias, get_args
 
 from study_app.analysis.wording import significant
 from study_app.errors import AnalysisError
-from study_app.protocol.blocks import Compared, Phase
+from study_app.protocol.blocks import Compared, Phase, block_titles, display_language
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import every_step_of, follows_in
 from study_app.protocol.presented.presentation import link_descriptions
@@ -164,20 +163,6 @@ def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ..
 def _statements(protocol: Mapping[str, Any], block: Mapping[str, Any]) -> list[Mapping[str, Any]]:
     """Return the statements of a block's questionnaire, which are the items without a kind."""
     return [item for item in protocol["questionnaires"][block["questionnaire"]]["items"] if "kind" not in item]
-
-
-def display_language(protocol: Mapping[str, Any]) -> str:
-    """Return the language of figures and tables: English if the study has it, otherwise its first language."""
-    languages = list(protocol["study"]["languages"])
-    return "en" if "en" in languages else str(languages[0])
-
-
-def block_titles(protocol: Mapping[str, Any]) -> dict[str, str]:
-    """Return the title of each block by ID; the ID follows a title that several blocks of one phase share."""
-    language = display_language(protocol)
-    titles = {name: (block["phase"], text_in(block["title"], language)) for name, block in protocol["blocks"].items()}
-    counts = Counter(titles.values())
-    return {name: f"{own[1]} ({name})" if counts[own] > 1 else own[1] for name, own in titles.items()}
 
 
 def _block(protocol: Mapping[str, Any], block: Mapping[str, Any], title: str, key: Key | None) -> Block:

@@ -16,12 +16,12 @@ from study_app.analysis.data.blocks import (
     LevelBlock,
     OtherQuestions,
     OwnDynamics,
-    display_language,
     level_blocks,
     main_blocks,
     other_questions,
 )
 from study_app.errors import AnalysisError, StoreError
+from study_app.protocol.blocks import display_language
 from study_app.protocol.table import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key

@@ -9,11 +9,11 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Final, NamedTuple
 
 from study_app import __version__
-from study_app.analysis.data.blocks import display_language
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, stated_credits
 from study_app.errors import ProtocolError
 from study_app.number_text import counted
+from study_app.protocol.blocks import display_language
 from study_app.protocol.source.files import (
     bundle,
     file_hash,

@@ -158,8 +158,8 @@ def _lowest(sheet: Sheet, axes: Axes, lowest_ms: float | None, middle_ms: float)
     dashed: Style = {"linewidth": 0.9, "linestyle": (0, (3, 2)), "zorder": 3, "gid": f"{axes.get_label()}-lowest"}
     axes.axvline(lowest_ms, color=style.TEXT, **dashed)
     across, side = (-2, "right") if lowest_ms > middle_ms else (2, "left")
-    look: Style = {"ha": side, "fontproperties": sheet.font(6, "bold"), "color": style.TEXT}
-    axes.annotate(f"≤ {lowest_ms:g}", (lowest_ms, _TOP), xytext=(across, -6), textcoords="offset points", **look)
+    look: Style = {"ha": side, "fontproperties": sheet.font(SMALL, "bold"), "color": style.TEXT}
+    axes.annotate(f"≤ {lowest_ms:g}", (lowest_ms, _TOP), xytext=(across, -7), textcoords="offset points", **look)
 
 
 def legend(sheet: Sheet) -> None:
@@ -182,7 +182,8 @@ _PERSON_SPREAD: Final = 0.5
 """How far apart the points of participants at one delay are at most, as a share of the distance of delays."""
 _CURVE_LEFT_PT: Final = 30.0
 _CURVE_FOOT_PT: Final = 30.0
-_HEIGHT_PT: Final = 150.0
+_CURVE_LINE_PT: Final = 9.0
+_HEIGHT_PT: Final = 120.0
 _CURVE_TOP_PT: Final = 34.0
 _RIGHT_PT: Final = 26.0
 
@@ -195,8 +196,14 @@ def draw_threshold(
 
     ``shares_of`` are each participant's shares by delay, drawn as small points.
     """
-    sheet = look.sheet(_HEIGHT_PT, WIDTH_PT)
-    room = (sheet.width_pt - _CURVE_LEFT_PT - _RIGHT_PT, sheet.height_pt - _CURVE_TOP_PT - _CURVE_FOOT_PT)
+    below = (
+        "Added delay in ms.   Points: participants; circles: all participants; diamond: threshold with 95 % interval"
+        + ("" if lowest_ms is None else "; dashed: shortest delay with a trend")
+    )
+    lines = Sheet(WIDTH_PT, 72, look.fonts).wrap(below, WIDTH_PT - 2 * MARGIN_PT, SMALL)
+    foot_pt = _CURVE_FOOT_PT + _CURVE_LINE_PT * (len(lines) - 1)
+    sheet = look.sheet(_HEIGHT_PT + foot_pt, WIDTH_PT)
+    room = (sheet.width_pt - _CURVE_LEFT_PT - _RIGHT_PT, _HEIGHT_PT - _CURVE_TOP_PT)
     axes = sheet.axes(MARGIN_PT + _CURVE_LEFT_PT, _CURVE_TOP_PT, *room)
     levels, asked = np.array(threshold.levels), np.array(threshold.asked)
     span = float(np.ptp(levels)) or 1.0
@@ -238,11 +245,8 @@ def draw_threshold(
     dots: Style = {"markersize": 4, "markerfacecolor": "white", "markeredgecolor": style.TEXT, "gid": "shares"}
     axes.plot(levels[there], shares, "o", **dots)
     sheet.text(MARGIN_PT, 28, "Proportion of answers expressing agreement", size=SMALL, colour=style.TEXT_SOFT)
-    below = (
-        "Added delay in ms.   Points: participants; circles: all participants; diamond: threshold with 95 % interval"
-        + ("" if lowest_ms is None else "; dashed: shortest delay with a trend")
-    )
-    sheet.text(MARGIN_PT, sheet.height_pt - 5, below, size=SMALL, colour=style.TEXT_SOFT)
+    middle = sheet.height_pt - 5 - _CURVE_LINE_PT * (len(lines) - 1) / 2
+    sheet.lines(MARGIN_PT, middle, lines, _CURVE_LINE_PT, size=SMALL, colour=style.TEXT_SOFT)
     return sheet
 
 

@@ -16,7 +16,7 @@ from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import Study, group_members
-from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, picture_of
+from study_app.analysis.page_layout import MARGIN_PT, POINT, SMALL, Look, Picture, Sheet, picture_of, spread_points
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.wording import percent
 from study_app.protocol.groups import EACH_GROUP
@@ -43,9 +43,11 @@ _TITLE_PT: Final = 10.0
 _NAME_PT: Final = 8.6
 _HEAD_PT: Final = 38.0
 _SPREAD: Final = 0.16
-"""How far the points of a column are apart at most, as a share of the distance of columns."""
+"""How far joined points of a column are apart at most, as a share of the distance of columns."""
 _SPREAD_OF_ENDS: Final = 0.26
 """The same where each participant has an interval: they stand in the order of their numbers."""
+_SPREAD_ALONE: Final = 0.2
+"""The same where points are not joined: only points that would touch are apart."""
 _GOLDEN: Final = 0.6180339887
 """Steps that put many points evenly apart."""
 _ASIDE: Final = 0.27
@@ -308,7 +310,7 @@ def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
 def _legend(sheet: Sheet, groups: Sequence[str], interval: str) -> None:
     """Draw the legend of points, diamonds and groups at the right."""
     x = sheet.width_pt - MARGIN_PT
-    for words, marker, size in ((f"mean, {interval}", "D", 3.6), ("participant", "o", 2.6)):
+    for words, marker, size in ((f"mean, {interval}", "D", 3.6), ("participant", "o", POINT["markersize"])):
         x -= sheet.text_width(words, SMALL)
         sheet.text(x, 28, words, size=SMALL, colour=style.TEXT_SOFT)
         colour = style.TEXT if marker == "D" else style.PARTICIPANT
@@ -378,8 +380,10 @@ def _draw_panel(
     if panel.line is not None:
         axes.axhline(panel.line, color=style.AXIS, linewidth=0.8, linestyle=(0, (4, 3)), zorder=1)
     people = sorted({person for column in panel.columns for person in column.values})
-    alone = not panel.joined or sum(len(column.values) for column in panel.columns) == len(people)
-    offsets = dict(zip(people, _offsets(panel, people, apart=alone) * step, strict=True))
+    if sum(len(column.values) for column in panel.columns) == len(people) and panel.columns[0].ends is None:
+        offsets = _offsets_of_points(axes, panel, _SPREAD_ALONE * step)
+    else:
+        offsets = dict(zip(people, _offsets(panel, people) * step, strict=True))
     for person in people:
         at = [(x + offsets[person], column.values[person])
               for x, column in zip(xs, panel.columns, strict=True) if person in column.values]  # fmt: skip
@@ -388,8 +392,8 @@ def _draw_panel(
         if panel.joined and len(at) > 1:
             axes.plot(*zip(*at, strict=True), color=colour, linewidth=0.6, alpha=0.55, zorder=2)
         marker = "o" if number is None else _MARKERS[number % len(_MARKERS)]
-        axes.plot(*zip(*at, strict=True), marker, color=colour, markersize=2.6, markeredgewidth=0, zorder=3,
-                  gid=f"person-{person}")  # fmt: skip
+        point = POINT | {"marker": marker, "color": colour}
+        axes.plot(*zip(*at, strict=True), **point, zorder=3, gid=f"person-{person}")
     for x, column in zip(xs, panel.columns, strict=True):
         ink = _GROUPS[groups.index(column.group) % len(_GROUPS)] if column.group in groups else style.TEXT
         for person, ends in (column.ends or {}).items():
@@ -401,13 +405,24 @@ def _draw_panel(
                 axes.plot([aside] * 2, [column.mean.low, column.mean.high], color=ink, linewidth=1.5, zorder=4)
 
 
-def _offsets(panel: Panel, people: Sequence[str], *, apart: bool) -> np.ndarray:
-    """Return the horizontal offset of each participant's points, so that equal numbers remain visible."""
+def _offsets_of_points(axes: Axes, panel: Panel, most: float) -> dict[str, float]:
+    """Return the horizontal offset of each participant's only point."""
+    per_pt = 72 / axes.figure.dpi
+    (left, _), (right, _) = axes.transData.transform([(0.0, axes.get_ylim()[0]), (1.0, axes.get_ylim()[0])])
+    offsets: dict[str, float] = {}
+    for column in panel.columns:
+        heights = axes.transData.transform([(0.0, value) for value in column.values.values()] or [(0.0, 1.0)])[:, 1]
+        width = per_pt * (right - left)
+        offsets |= zip(column.values, spread_points(per_pt * heights, most * width) / width, strict=False)
+    return offsets
+
+
+def _offsets(panel: Panel, people: Sequence[str]) -> np.ndarray:
+    """Return the horizontal offset of each participant's points, which are joined or have intervals."""
     if len(people) < 2:
         return np.zeros(len(people))
     first = [next(it.values[person] for it in panel.columns if person in it.values) for person in people]
     order = np.argsort(np.argsort(first, kind="stable"))
     if panel.columns[0].ends is not None:
         return np.asarray((order / (len(people) - 1) - 0.75) * 2 * _SPREAD_OF_ENDS)
-    spread = _SPREAD if apart else 0.5 * _SPREAD
-    return np.asarray((np.arange(len(people)) * _GOLDEN % 1.0 - 0.5) * 2 * spread)
+    return np.asarray((np.arange(len(people)) * _GOLDEN % 1.0 - 0.5) * _SPREAD)

@@ -1,11 +1,11 @@
 """The figures of questions that no block of statements holds."""
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Final, TypeAlias
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap, to_hex
 
@@ -14,6 +14,7 @@ from study_app.analysis.data.blocks import PlacedQuestion
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.page_layout import (
     MARGIN_PT,
+    POINT,
     SMALL,
     Look,
     Picture,
@@ -21,6 +22,7 @@ from study_app.analysis.page_layout import (
     Style,
     picture_of,
     sample_words,
+    spread_points,
     tab_separated,
     try_figures,
 )
@@ -77,17 +79,21 @@ def _ends(sheet: Sheet, y: float, low: str, high: str) -> None:
 
 _ROW_PT: Final = 30.0
 _BAND: Final = 0.22
-_PILE: Final = 0.07  # from one of equal answers to the next
+_MOST_PT: Final = 30.0
+"""Farthest point from the middle of a row."""
 
 
 @style.own_settings()
 def draw_distribution(asked: PlacedQuestion, result: QuestionResult, look: Look) -> Sheet:
     """Draw the distribution of the answers."""
     groups = result.groups
-    sheet, axes = _rows_of_groups(result, look, _ROW_PT)
     values = [value for group in groups for value in group.numbers["values"]]
     low, high = asked.bounds or (min(values, default=0.0), max(values, default=1.0))
     span = (high - low) or 1.0
+    per_value = (style.PAGE_WIDTH_PT - _LEFT_PT - _RIGHT_PT) / (1.06 * span)
+    offsets = [spread_points(per_value * np.array(group.numbers["values"]), _MOST_PT) for group in groups]
+    row_pt = max(_ROW_PT, *(2 * np.abs(own).max(initial=0.0) + 10 for own in offsets))
+    sheet, axes = _rows_of_groups(result, look, row_pt)
     axes.set_xlim(low - 0.03 * span, high + 0.03 * span)
     for place, group in enumerate(groups):
         numbers = group.numbers
@@ -96,9 +102,7 @@ def draw_distribution(asked: PlacedQuestion, result: QuestionResult, look: Look)
             continue
         axes.fill_between([numbers["q1"], numbers["q3"]], place - _BAND, place + _BAND, color=style.BAND, linewidth=0)
         axes.plot([numbers["median"]] * 2, [place - _BAND, place + _BAND], color=style.ACCENT, linewidth=1.6)
-        for value, many in sorted(Counter(numbers["values"]).items()):
-            ys = [place + _PILE * (number - (many - 1) / 2) for number in range(many)]
-            axes.plot([value] * many, ys, "o", markersize=2.6, color=style.PARTICIPANT, gid=f"{group.code}")
+        axes.plot(numbers["values"], place + offsets[place] / row_pt, **POINT, gid=f"{group.code}")
     view = asked.question.view(0, asked.context)
     ends = (f"{low:g} {getattr(view, 'low', '')}".strip(), f"{high:g} {getattr(view, 'high', '')}".strip())
     _ends(sheet, sheet.height_pt - _FOOT_PT + 12, *ends)

@@ -41,7 +41,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.equivalence import Equivalence, fewest_participants, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, noticed
-from study_app.analysis.statistics.trend import StepDown, step_down
+from study_app.analysis.statistics.trend import StepDown, Trend, step_down
 from study_app.analysis.wording import (
     all_of,
     bound_text,
@@ -50,8 +50,10 @@ from study_app.analysis.wording import (
     listed,
     ms,
     number,
+    p_equals,
     p_value,
     percent,
+    significant,
     with_group,
 )
 from study_app.protocol.groups import EACH_GROUP
@@ -128,10 +130,12 @@ def _said_of(result: BlockResult, delay_ms: float, here: Sequence[ContrastWithCo
     if all(tested.verdict == "equivalent" for tested in here):
         not_excluded = _not_excluded([tested.found for tested in here])
         return f"The mean answers to these statements stay within the bounds, but {not_excluded}."
-    claim = f"the claim that delays of up to {ms(delay_ms)} do not matter"
-    if reasons := _evidence_up_to(result, delay_ms):
-        return f"These data are evidence against {claim}: {'; '.join(reasons)}."
-    return f"These data neither support nor refute {claim}."
+    reasons = _evidence_up_to(result, delay_ms)
+    if not reasons:
+        return f"These data neither support nor refute the claim that delays of up to {ms(delay_ms)} do not matter."
+    is_open = any(tested.verdict in ("inconclusive", "out of reach") for tested in here)
+    beyond = f" They do not show whether the mean differences at {ms(delay_ms)} exceed the bounds." * is_open
+    return f"Delays of up to {ms(delay_ms)} change the answers: {'; '.join(reasons)}.{beyond}"
 
 
 def _evidence_up_to(result: BlockResult, delay_ms: float) -> tuple[str, ...]:
@@ -293,6 +297,10 @@ class Lowest:
                 break
             lowest = step.longest_ms
         return lowest
+
+    def trend_up_to(self, longest_ms: float) -> Trend:
+        """Return the test of the delays up to ``longest_ms``, one of the steps."""
+        return next(step.trend for step in self.steps.steps if step.longest_ms == longest_ms)
 
 
 class LowestDelay(Finding[tuple[Lowest, ...]]):
@@ -515,14 +523,17 @@ class _NoticedFrom(Finding[None]):
         at = min(one.over_all_ms or 0.0 for one in lowest)
         rated = [
             f"{'higher' if correlation > 0 else 'lower'} on “{short_text(self.found, one.item)}” "
-            f"(mean rank correlation {number(correlation)})"
+            f"(mean rank correlation {number(correlation)}, {p_equals(trend.p or 0.0)}, n = {trend.n})"
             for one in lowest
-            if one.over_all_ms == at and (correlation := self._correlation(one, at))
+            if one.over_all_ms == at and (correlation := self._correlation(one, trend := one.trend_up_to(at)))
         ]
+        members, alpha = lowest[0].members, lowest[0].steps.alpha
+        criterion = f"{significant(alpha / members)} ({significant(alpha)} / {members})"
+        corrected = f" Because {counted(members, 'statement')} were tested, p must be at most {criterion}."
         return (
             f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
-            f"{listed(rated)}. They may also notice shorter delays. The test "
-            "compares ranks, not mean ratings."
+            f"{listed(rated)}.{corrected * (members > 1)} They may also notice shorter delays. The test compares "
+            "ranks, not mean ratings."
         )
 
     def _threshold_words(self) -> str:
@@ -537,11 +548,10 @@ class _NoticedFrom(Finding[None]):
             f"“{item}”. "
         )
 
-    def _correlation(self, lowest: Lowest, up_to_ms: float) -> float:
-        """Return the mean rank correlation between answers to a statement and delays up to the given one."""
-        step = next(step for step in lowest.steps.steps if step.longest_ms == up_to_ms)
+    def _correlation(self, lowest: Lowest, trend: Trend) -> float:
+        """Return the mean rank correlation of a trend, negative if answers fall with the delay."""
         falling = self.results.decided.direction(lowest.item) == "decreasing"
-        return (step.trend.effect or 0.0) * (-1 if falling else 1)
+        return (trend.effect or 0.0) * (-1 if falling else 1)
 
 
 class _UnchangedUpTo(Finding[None]):
@@ -591,13 +601,14 @@ def _largest_words(result: BlockResult, against: Sequence[ContrastWithControl]) 
 
 
 def _beyond_words(against: Sequence[ContrastWithControl]) -> str:
-    """Return a sentence on the number of comparisons that are not equivalent, or on their absence."""
-    beyond = sum(tested.verdict == "not equivalent" for tested in against)
+    """Return a sentence on the comparisons that are not equivalent and their delays, or on their absence."""
+    beyond = [tested.delay_ms for tested in against if tested.verdict == "not equivalent"]
     if not beyond:
         return "Failing to show equivalence is not evidence that answers change."
+    delays = listed([f"{delay_ms:g}" for delay_ms in sorted({*beyond})])
     return (
-        f"In {beyond} of {number_text.counted(len(against), 'comparison')}, the whole confidence interval lies outside "
-        "the equivalence bounds (not equivalent; not corrected for the number of comparisons)."
+        f"In {len(beyond)} of {number_text.counted(len(against), 'comparison')} (at {delays} ms), the whole confidence "
+        "interval lies outside the equivalence bounds (not equivalent; not corrected for the number of comparisons)."
     )
 
 

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import RATIOS, equality_limits, inclusion_words, t_test_name
-from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions, display_language
+from study_app.analysis.data.blocks import SPENDINGS, TRENDS, Decided, decisions
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.html_page import bullets, heading, paragraph
 from study_app.analysis.levels.thresholds import FAMILIES, REMOVED
@@ -23,7 +23,7 @@ from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.analysis.wording import bound_text, counted, listed, percent, significant
 from study_app.errors import AnalysisError
-from study_app.protocol.blocks import Block
+from study_app.protocol.blocks import Block, display_language
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Analysis, Contrast, Protocol

@@ -14,7 +14,7 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 
 from study_app import __version__
-from study_app.analysis.data.blocks import block_titles, decisions, display_language
+from study_app.analysis.data.blocks import decisions
 from study_app.analysis.data.measures import Array
 from study_app.analysis.planning.power_curves import (
     OF_BLOCK,
@@ -28,6 +28,7 @@ from study_app.analysis.planning.simulated_studies import group_shares
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
+from study_app.protocol.blocks import block_titles, display_language
 from study_app.protocol.model import Contrast, Protocol
 from study_app.protocol.table import text_in
 from study_app.protocol.tracks import stimulus_of, tracks_of

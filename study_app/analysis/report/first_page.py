@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from markupsafe import Markup
 
-from study_app.analysis.contrasts import answer, mean_words, question
+from study_app.analysis.contrasts import RATIOS, answer, mean_words, question
 from study_app.analysis.data.blocks import AFTER, Block, LevelBlock
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.study_tables import Study
@@ -126,10 +126,24 @@ def _hypotheses(results: Results, presented: Mapping[str, str]) -> Iterator[Card
         yield Card(
             question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(contrast)}",
             verdict=contrast.verdict,
-            sentences=(answer(contrast), *_cell_words(contrast), *filter(None, [" ".join(new)])),
+            sentences=(
+                f"{answer(contrast)}{_unit_words(contrast, results)}",
+                *_cell_words(contrast),
+                *filter(None, [" ".join(new)]),
+            ),
             block=blocks[0],
             figures=(f"hypothesis-{place}",),
         )
+
+
+def _unit_words(contrast: ContrastResult, results: Results) -> str:
+    """Return a sentence on the unit of thresholds or points of subjective equality, with a leading space, or ""."""
+    of = next((level for level in results.levels if level.block == contrast.contrast.blocks[0]), None)
+    if of is None or contrast.contrast.measure not in RATIOS:
+        return ""
+    if of.level_kind == "weber":
+        return " Values are Weber fractions."
+    return f" Values are in {of.unit}." if of.unit else ""
 
 
 def _cell_words(contrast: ContrastResult) -> Iterator[str]:

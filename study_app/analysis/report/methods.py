@@ -6,7 +6,7 @@ from typing import Final
 
 from study_app import __version__, number_text
 from study_app.analysis.contrasts import contrast_methods
-from study_app.analysis.data.blocks import SPENDINGS, Block, block_titles
+from study_app.analysis.data.blocks import SPENDINGS, Block
 from study_app.analysis.data.measures import QUARTILES
 from study_app.analysis.data.study_tables import Study, group_assignment, group_counts
 from study_app.analysis.figures.answer_figures import people_a_setting
@@ -17,6 +17,7 @@ from study_app.analysis.levels.evaluate import level_methods
 from study_app.analysis.planned_exclusions import NEED_KEY, proposals, rule_conditions
 from study_app.analysis.results import BlockResult, Results, lead_phrase, said_of_presentations
 from study_app.analysis.wording import counted, listed, ms, number, significant
+from study_app.protocol.blocks import block_titles
 from study_app.protocol.groups import blocks_before
 from study_app.protocol.orders.block_orders import session_steps_of
 from study_app.protocol.quantities import liquid_words

@@ -83,9 +83,9 @@ def limits(study: Study, results: Results) -> tuple[str, ...]:
             lines.append(f"{lead_phrase(result)}: no answers are included yet.")
             continue
         if len(result.names) == 1:
-            lines.append(
-                f"{lead_phrase(result)}: there is only one {settings_noun(result)}, so no comparisons were made."
-            )
+            if any(item.id in results.decided.primary for item in result.items):
+                noun = settings_noun(result)
+                lines.append(f"{result.title} presents only one {noun}, so its ratings are not compared.")
             continue
         lines += [f"{lead_phrase(result)}: {sentence}" for sentence in missing_sentences(result)]
         decisive = [one for finding in all_findings() if finding.statements for one in finding.of(result)]
@@ -359,16 +359,21 @@ def block(
     result: BlockResult, results: Results, drawn: Sequence[Picture], failures: Failures | None = None
 ) -> Iterator[str]:
     """Return the section of one block; a part that fails is replaced by its reason and added to ``failures``."""
-    yield heading(2, lead_phrase(result))
+    title = heading(2, lead_phrase(result))
     if not result.n:
+        yield title
         untested = any(failure.block == result.id for failure in results.failures)
         none = paragraph("No answers are included yet.")
         yield bullets(missing_sentences(result)) if untested else none
         return
     held = Failures() if failures is None else failures
     pictures = {picture.name.split("-")[0]: picture for picture in drawn if picture.block == result.id}
-    for what, make in _parts(result, results, pictures):
-        yield from try_part(held, what, heading(3, what.capitalize()), make, block=result.id)
+    parts = [
+        part
+        for what, make in _parts(result, results, pictures)
+        for part in try_part(held, what, heading(3, what.capitalize()), make, block=result.id)
+    ]
+    yield from [title, *parts] if parts else []
 
 
 def _parts(
@@ -384,7 +389,7 @@ def _parts(
     yield "figure showing the answers", lambda: drawn_figure(pictures, result.kind)
     for finding in others:
         yield finding.what or finding.figure_title, finding(result, results, pictures).section
-    if result.absent:
+    if result.absent and len(result.names) > 1:
         lines = [f"{line[:1].upper()}{line[1:]}" for line in missing_sentences(result)]
         yield "missing parts", lambda: (heading(3, "What could not be computed, and why"), bullets(lines))
 

@@ -13,7 +13,7 @@ from matplotlib.text import Text
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures
 from study_app.analysis.figures.people_figures import Column, Panel, draw_people, mean_of, numbers_of_panels
-from study_app.analysis.page_layout import Look
+from study_app.analysis.page_layout import POINT, Look
 from tests.analysis.made_up import liquids, study
 
 pytestmark = pytest.mark.slow
@@ -172,3 +172,14 @@ def test_the_legend_of_levels_has_the_colours_of_the_bars() -> None:
     assert {colours[to_hex(bar.get_facecolor())]: bar.get_width() for bar in bars} == {
         str(level): level for level in range(1, 8)
     }
+
+
+@pytest.mark.parametrize("panels", [1, 6])
+def test_participants_with_equal_numbers_can_be_told_apart(panels: int) -> None:
+    values = {f"P{number:02d}": 50.0 if number < 9 else 5.0 * number for number in range(16)}
+    made = [Panel(columns=(Column(name="", values=values),), ends=(-6.0, 106.0))] * panels
+    figure = draw_people(made, LOOK, above="").figure
+    for axes in figure.axes:
+        points = [axes.transData.transform(line.get_xydata())[0] * 72 / figure.dpi for line in axes.lines
+                  if str(line.get_gid()).startswith("person-")]  # fmt: skip
+        assert min(float(np.hypot(*(one - other))) for one, other in combinations(points, 2)) >= POINT["markersize"]

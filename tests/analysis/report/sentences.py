@@ -173,7 +173,8 @@ def trend_is_shown(match: re.Match[str], told: Told) -> bool:
     if float(at) != min(lowest[item] for item in of) or float(shortest) != short_delay(told):
         return False
     falling = told.results["decided"]["falling"]
-    for side, item, number in re.findall(rf"(higher|lower) on “(\w+)” \(mean rank correlation {R}\)", rated):
+    told_of = re.findall(rf"(higher|lower) on “(\w+)” \(mean rank correlation {R}, {P}, n = (\d+)\)", rated)
+    for side, item, number, p, n in told_of:
         (row,) = (
             row
             for row in told.asked("answers change with the delay, step-down test")
@@ -182,7 +183,18 @@ def trend_is_shown(match: re.Match[str], told: Told) -> bool:
         effect = float(row["effect"]) * (-1 if item.lower() in falling else 1)
         if not is_number(number, effect) or (side == "higher") != (effect > 0):
             return False
-    return True
+        if not is_p(p, float(row["p"])) or n != row["n"]:
+            return False
+    return len(told_of) == rated.count("correlation") > 0
+
+
+def trend_is_corrected(match: re.Match[str], told: Told) -> bool:
+    """Check the criterion for the p values of trends, which are corrected over the statements."""
+    members = {int(row["members"]) for row in told.asked("answers follow the delay") if row["item"] in told.lowest()}
+    return members == {count(match[1]), int(match[4])} and all(
+        math.isclose(float(text), alpha, rel_tol=6e-3)
+        for text, alpha in ((match[3], told.alpha), (match[2], told.alpha / int(match[4])))
+    )
 
 
 def nothing_noticed(_match: re.Match[str], told: Told) -> bool:
@@ -417,7 +429,8 @@ def bayes_factor(match: re.Match[str], told: Told) -> bool:
     return (
         one["verdict"] not in DECIDED
         and math.isclose(float(match[1]), max(factor, 1 / factor), rel_tol=6e-3)
-        and (match[2], match[3]) == (("a", "none") if factor > 1 else ("no", "one"))
+        and (match[2] == "with") == (factor > 1) == (" as without one" in match[0])
+        and (match[3] is not None) == (1 / 3 < factor < 3)
     )
 
 
@@ -757,6 +770,7 @@ LOOKS: Final = r"(?P<looks>\d+(?:, \d+)* and \d+) participants"
 TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # First page: delays
     (rf"Over delays of {R} to {R} ms, participants tended to rate longer delays (.*)\.", trend_is_shown),
+    (rf"Because {N} statements were tested, p must be at most {R} \({R} / (\d+)\)\.", trend_is_corrected),
     (r"They may also notice shorter delays\.", always),
     (r"The test compares ranks, not mean ratings\.", always),
     (r"Agreement increases with the delay, but we could not show that participants noticed any particular delay\.",
@@ -767,9 +781,10 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"We could not show for any delay that the mean answers to all statements stay within ±{R} points? of those at "
      rf"{R} ms\.", nothing_equivalent),
     (r"Failing to show equivalence is not evidence that answers change\.", when(lambda told: beyond(told) == 0)),
-    (r"In (\d+) of (\d+) comparisons?, the whole confidence interval lies outside the equivalence bounds \(not "
-     r"equivalent; not corrected for the number of comparisons\)\.",
-     lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))),
+    (r"In (\d+) of (\d+) comparisons? \(at (.*) ms\), the whole confidence interval lies outside the equivalence "
+     r"bounds \(not equivalent; not corrected for the number of comparisons\)\.",
+     lambda match, told: (int(match[1]), int(match[2])) == (beyond(told), len(told.against))
+     and {*map(float, listed_in(match[3]))} == {one["delay_ms"] for one in told.against if position(one) == "beyond"}),
     (rf"Up to {R} ms, mean answers to (all \w+ statements|both statements|the one statement) stay within ±{R} points? "
      rf"of those at {R} ms, but the data do not rule out the possibility that up to {R} % of people show a larger "
      r"difference\.", all_equivalent),
@@ -801,8 +816,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf"(?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
      r"(?P<adjusted>adjusted )?(?P<one>one-sided )?p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
     (r"It was higher in (\S+) for (\d+) of (\d+) participants(?: and equal for (\d+))?\.", higher_for_so_many),
-    (r"The data are ([\d.]+) times as likely if there is (a|no) difference as if there is (one|none) \(JZS Bayes "
-     r"factor, Cauchy prior with scale 0\.707\)\.", bayes_factor),
+    (r"The data are ([\d.]+) times as likely (with|without) a difference as (?:with one|without one) \(JZS Bayes "
+     r"factor, Cauchy prior with scale 0\.707\)(, which is weak evidence)?\.", bayes_factor),
     (r"Standardised effects give all participants equal weight: d_z is .*\.", when(lambda told: bool(told.contrasts))),
     (r"Their 95 % confidence intervals are calculated from the noncentral t distribution\.",
      when(lambda told: bool(told.contrasts))),
@@ -848,7 +863,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      r"liquid-study validate-report\)\.", claims),
     (r"No answers are included yet\.", when(lambda told: told.block["n"] == 0)),
     (rf"{LEAD}no answers are included yet\.", when(lambda told: told.block["n"] == 0)),
-    (rf"{LEAD}there is only one (?:liquid|delay|setting), so no comparisons were made\.",
+    (r"Block presents only one (?:liquid|delay|setting), so its ratings are not compared\.",
      when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),

@@ -31,6 +31,7 @@ from tests.golden_values import page_lines
 pytestmark = pytest.mark.slow
 
 DELAYS = (0.0, 50.0, 100.0, 150.0)
+ONE_LIQUID = "Block presents only one liquid, so its ratings are not compared."
 Said = Callable[[int, int, str, str], int]
 
 
@@ -119,6 +120,14 @@ def studies() -> Iterator[tuple[str, Results]]:
     yield "suggested, not tested", threshold_alone(changed=True)
     yield "suggested, not tested", threshold_alone(primary=ITEMS[1:])
     yield "shown, not tested", threshold_alone(primary=ITEMS[:1])
+
+
+@pytest.mark.parametrize(("primary", "said"), [((), []), (ITEMS[:1], [ONE_LIQUID])])
+def test_a_single_liquid_is_a_limit_only_of_statements_that_are_planned_to_differ(
+    primary: tuple[str, ...], said: list[str]
+) -> None:
+    made = study(liquids(1), list(everybody(liquids(1), 12, lambda *_: 4)), replace(DECIDED, primary=primary))
+    assert [line for line in sections.limits(made, evaluate(made)) if "one liquid" in line] == said
 
 
 def test_the_page_says_what_each_block_presented() -> None:

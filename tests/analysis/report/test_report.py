@@ -44,6 +44,19 @@ def test_every_answer_stands_beside_its_figure_and_the_page_is_small(of_twelve: 
     assert not set(re.findall(r'aria-label="([^"]*)"', first)) & set(re.findall(r'aria-label="([^"]*)"', rest))
 
 
+def test_letters_of_figures_are_readable_on_a_narrow_screen_and_figures_fit_on_a_printed_page(of_twelve: Path) -> None:
+    page = (of_twelve / "report.html").read_text("utf-8")
+    drawings = re.findall(r'<svg role="img"[^>]*--least: (\d+)px[^>]*viewBox="0 0 ([\d.]+) .*?</svg>', page, re.DOTALL)
+    figures = re.findall(r'<svg role="img".*?</svg>', page, re.DOTALL)
+    assert len(drawings) == len(figures) >= 6
+    for (least, width), figure in zip(drawings, figures, strict=True):
+        assert min(map(float, re.findall(r"font-size: ([\d.]+)px", figure))) * int(least) / float(width) >= 11
+    style = page[: page.index("</style>")]
+    assert "figure svg { min-width: var(--least); }" in style
+    assert "@page { size: A4;" in style
+    assert re.search(r"figure svg, figure img { max-height: 2[0-6]\dmm;", style), "A4 is 297 mm high"
+
+
 def test_while_sealed_nothing_is_told_that_blinding_hides(small: Results, tmp_path: Path) -> None:
     for number_ in range(1, 8):
         small.add(f"P{number_:03d}", lambda condition, _item: 6 if condition == "heavyzembla" else 2)

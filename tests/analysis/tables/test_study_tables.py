@@ -9,9 +9,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from study_app.analysis.data.blocks import block_titles
 from study_app.analysis.data.study_tables import Study, group_counts, load_study
 from study_app.errors import StoreError
+from study_app.protocol.blocks import block_titles
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from study_app.store.columns import RESPONSES

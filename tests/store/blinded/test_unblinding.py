@@ -185,14 +185,16 @@ def test_a_study_of_an_earlier_version_stays_sound_sealed_and_opened(
 def test_catch_trials_are_judged_block_by_block(finished: Start, monkeypatch: pytest.MonkeyPatch) -> None:
     session, catch = finished().folder, SimpleNamespace(wrong_most=0.25)
     blocks = {name: SimpleNamespace(id=name, catch=catch) for name in ("easy", "hard")}
+    titles = {name: {"phase": "main", "title": {"en": f"{name} pairs"}, "catch": 1} for name in blocks}
+    published = {"study": {"languages": ["en"]}, "blocks": titles}
     missed = {1: ("easy", 0), 2: ("easy", 0), 3: ("easy", 0), 4: ("hard", 1), 5: ("hard", 0), 6: ("hard", 1)}
     lines = [event_of("trial_started", trial=number, block=block) for number, (block, _) in missed.items()]
     results = [SimpleNamespace(trial=number, catch=True, correct=not wrong) for number, (_, wrong) in missed.items()]
-    monkeypatch.setattr(module.receipt, "read", lambda _: {"protocol": {"blocks": {"hard": {"catch": 1}}}})
+    monkeypatch.setattr(module.receipt, "read", lambda _: {"protocol": published})
     monkeypatch.setattr(module, "complete_protocol", lambda *_: SimpleNamespace(blocks=blocks))
     monkeypatch.setattr(module, "open_events", lambda *_: lines)
     monkeypatch.setattr(module, "trial_results", lambda *_: results)
     key: Any = None
     assert list(module._missed_catch_trials(session, key)) == [
-        'block "hard": 2 of 3 catch trials were answered incorrectly; at most 25 % are permitted'
+        "2 of 3 catch trials in “hard pairs” were answered incorrectly (at most 25 % are permitted)"
     ]
