@@ -47,15 +47,13 @@ class Scale(Table):
     @classmethod
     def _has_every_label(cls, labels: Any) -> Any:
         """Reject a language with fewer labels than another one."""
-        counts = {
-            code: sum(isinstance(text, str) and bool(text.strip()) for text in texts)
-            for code, texts in (labels.items() if isinstance(labels, Mapping) else ())
-            if isinstance(texts, tuple)
-        }
-        most = max(counts.values(), default=0)
-        for code, count in counts.items():
-            if count < most:
-                message = f"lacks {most - count} of {most} labels in {language_name(code)}"
+        listed = labels.items() if isinstance(labels, Mapping) else ()
+        tuples = {code: texts for code, texts in listed if isinstance(texts, tuple)}
+        most = max(map(len, tuples.values()), default=0)
+        for code, texts in tuples.items():
+            if len(texts) < most:
+                written = sum(isinstance(text, str) and bool(text.strip()) for text in texts)
+                message = f"lacks {most - written} of {most} labels in {language_name(code)}"
                 raise invalid(message, code, hint="the scale must have the same number of points in every language")
         return labels
 

@@ -277,13 +277,11 @@ class AddInstrument(Request):
     def step(self, at: Situation) -> Step:
         table, edits = _instrument_edits(at.study, self.name)
         path = ("questionnaires", free_id(names(at.study.document, "questionnaires"), self.name.replace("-", "_")))
-        lacking = " and ".join(
-            language_name(code)
-            for code in languages_of(at.study.document)
-            if code not in instrument(self.name)["languages"]
-        )
-        where = "The next problem (F8), or “Write …” at the study's languages, lists them"
-        said = f"The program does not include the {lacking} texts. {where}." if lacking else ""
+        codes, known = languages_of(at.study.document), instrument(self.name)["languages"]
+        lacking, said = [language_name(code) for code in codes if code not in known], ""
+        if 0 < len(lacking) < len(codes):
+            where = "The next problem (F8), or “Write …” at the study's languages, lists them"
+            said = f"The program does not include the {' and '.join(lacking)} texts. {where}."
         return Step(f"Add {self.name}", (*edits, Set(path, table)), path, said=said, entry=path)
 
 
