@@ -70,7 +70,8 @@ def carry_out(order: Order, send: Send, stop: Callable[[], bool]) -> Done:
             else:
                 include(*place, order.session, trial=order.trial, by=by, reason=reason)
         case OpenKey():
-            opened = unblind_folder(order.folder, by=order.by, reason=order.reason)
+            show = partial(_send_unstoppable, send)
+            opened = unblind_folder(order.folder, by=order.by, reason=order.reason, progress=show)
             return Done(warnings=tuple(line for site in opened.values() for line in site.left))
         case WriteTables() | WriteReport():
             return _write(order, send, stop)
@@ -301,6 +302,10 @@ def _write(order: WriteTables | WriteReport, send: Send, stop: Callable[[], bool
 def _going(send: Send, stop: Callable[[], bool], what: str, share: float) -> None:
     _go_on(stop)
     send(Progress(what, share))
+
+
+def _send_unstoppable(send: Send, what: str, share: float) -> None:
+    send(Progress(what, share, stops=False))
 
 
 def _go_on(stop: Callable[[], bool]) -> None:

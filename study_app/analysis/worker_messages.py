@@ -165,10 +165,11 @@ class FirstPage:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """The current activity, and the share of all work that is done (0 to 1)."""
+    """The current activity, the share of all work that is done (0 to 1), and whether it can be stopped."""
 
     what: str
     share: float
+    stops: bool = True
 
 
 @dataclass(frozen=True, slots=True)

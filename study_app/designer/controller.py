@@ -275,7 +275,7 @@ class DesignerController(QObject):
         self.place.show_view(
             DesignerView(
                 self._header_state(),
-                form_of(study, selected),
+                form_of(study, selected, opened.to_write),
                 file_text(study, opened.file.name, selected),
                 problems,
                 self.saving.banner,

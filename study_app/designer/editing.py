@@ -5,8 +5,9 @@ from pathlib import Path
 
 from PySide6.QtCore import QObject, Signal
 
+from study_app.designer.document.additions import texts_to_write
 from study_app.designer.document.document import Document
-from study_app.designer.document.elements import existing_path
+from study_app.designer.document.elements import STUDY_LANGUAGES, existing_path
 from study_app.designer.document.fields import edits_to_rename, id_at, suggested_id
 from study_app.designer.document.steps import (
     AddElement,
@@ -64,16 +65,19 @@ class Editing(QObject):
         self.opened = opened
         if opened is not None:
             opened.end_step()
+            opened.to_write = texts_to_write(opened.study) if opened.selected == STUDY_LANGUAGES else ()
         self._back, self._added = [], ((), "", "")
         self.opened_other.emit()
 
     def select(self, path: Place, *, back: bool = False) -> None:
         opened = self.opened
-        if opened is None or opened.selected == path:
+        if opened is None or (opened.selected == path and path != STUDY_LANGUAGES):
             return
         before = opened.selected
         self.suggest_id()
-        if not back:
+        if path == STUDY_LANGUAGES:
+            opened.to_write = texts_to_write(opened.study)
+        if not back and before != path:
             self._back.append(opened.selected)
         opened.end_step()
         opened.selected = with_path(path, before, opened.selected)

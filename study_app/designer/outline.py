@@ -45,7 +45,7 @@ from study_app.designer.document.elements import (
     short_note,
     title_of,
 )
-from study_app.designer.document.fields import distinguishing_key, element_noun, label_of, node_at, rows
+from study_app.designer.document.fields import EXCLUSIONS, distinguishing_key, element_noun, label_of, node_at, rows
 from study_app.designer.document.steps import AddElement, AddInstrument, AddLiquid, shipped_liquids_to_add
 from study_app.designer.document.study import Study
 from study_app.designer.parts import make_dense
@@ -63,7 +63,7 @@ from study_app.protocol.checks.cross_references import OWN
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.questions import STATEMENT
 from study_app.protocol.source.document import Path, names, value_at
-from study_app.protocol.wording.languages import languages_of
+from study_app.protocol.wording.languages import language_name, languages_of
 
 _ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",
@@ -204,6 +204,7 @@ _SECTIONS_OF_TABLES: Final = frozenset(_ICONS) - {
 
 _HELP: Final = {
     "designs": "2IFC and other trial designs",
+    "groups": "Groups of participants. A study has at least two, so the first one comes with a second one.",
     "liquids": "A new liquid; you enter its values. To copy a shipped liquid, such as water or slime, type its name.",
 }
 """What a section is for, where its name does not say it."""
@@ -219,6 +220,15 @@ class Addable:
     help: str = ""
 
 
+_EXCLUSION: Final = Addable(
+    words="Exclusion rule",
+    icon="bars",
+    asks=AddElement(EXCLUSIONS),
+    help="Proposes to exclude sessions with constant or fast answers, answers below chance, or thresholds beyond the "
+    "levels. Catch trials exclude sessions by a rule of their own: add them to a block with levels.",
+)
+
+
 def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
     """Return what can be added: for lists of the selected element, its section, then the other sections.
 
@@ -232,7 +242,7 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
     entries = [_addable_entry(study, path) for path in lists]
     entries += [
         Addable(
-            words=label_of(element_noun(path[0])),
+            words="Two groups" if path == ("groups",) and path[0] not in document else label_of(element_noun(path[0])),
             icon=icon_of(path, study.document),
             asks=AddElement(path),
             help=_HELP.get(str(path[0]), ""),
@@ -240,8 +250,9 @@ def addable_elements(study: Study, selected: Path) -> tuple[Addable, ...]:
         for path in sections
     ]
     entries += _addable_questions(study, around) if not any(path[0] == _QUESTIONNAIRES for path in lists) else ()
+    entries.append(_EXCLUSION)
     first = 1 if selected[:1] == ("liquids",) else len(entries)
-    return (*entries[:first], *_addable_liquids(study), *entries[first:], *_addable_instruments())
+    return (*entries[:first], *_addable_liquids(study), *entries[first:], *_addable_instruments(languages_of(document)))
 
 
 def _addable_liquids(study: Study) -> tuple[Addable, ...]:
@@ -265,13 +276,13 @@ def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:
 
 
 @cache
-def _addable_instruments() -> tuple[Addable, ...]:
-    """Return the standard questionnaires, with publisher and licence of their texts."""
+def _addable_instruments(languages: tuple[str, ...]) -> tuple[Addable, ...]:
+    """Return the standard questionnaires, with publisher and licence of their texts, and the languages they lack."""
     entries = []
     for name in instruments():
         source = instrument(name)
-        lacks = ". The program does not include its texts, so you must add them to the study"
-        texts = "" if source["languages"] else lacks
+        lacking = " or ".join(language_name(code) for code in languages if code not in source["languages"])
+        texts = f". The program does not include its {lacking} texts, so you must write them" if lacking else ""
         help_ = f"{source['source']}. Licence: {source['licence']}{texts}"
         title = f"Instrument: {name.upper()}, {len(source['items'])} questions"
         entries.append(Addable(words=title, icon="list", asks=AddInstrument(name), help=help_))
@@ -342,8 +353,8 @@ class AddList(Themed, QFrame):
         fitting = [
             entry for entry in self._every if all(part in f"{entry.words} {entry.help}".casefold() for part in wanted)
         ]
-        typed = text.casefold().split()
-        fitting.sort(key=lambda entry: entry.words.casefold().split()[: len(typed)] != typed)  # whole words come first
+        typed = text.casefold().strip()
+        fitting.sort(key=lambda entry: not entry.words.casefold().startswith(typed))
         for entry in fitting:
             item = QListWidgetItem(icon(entry.icon, self.theme.text2, 18), entry.words)
             item.setData(Qt.ItemDataRole.UserRole, entry)

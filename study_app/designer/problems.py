@@ -12,8 +12,8 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent, QPaintEvent
 from PySide6.QtWidgets import QScrollArea, QVBoxLayout, QWidget
 
 from study_app.designer.document.additions import Repair, additions_for, repairs
-from study_app.designer.document.elements import FIRST, element_of, kind_and_title, place_words
-from study_app.designer.document.fields import label_of
+from study_app.designer.document.elements import FIRST, STUDY_LANGUAGES, element_of, kind_and_title, place_words
+from study_app.designer.document.fields import key_order, label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline import icon_of
 from study_app.designer.parts import Segments, small_button
@@ -60,9 +60,9 @@ class ProblemRow:
 
 
 def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
-    """Return the problems of a study outside unfinished entries, in the order of their lines.
+    """Return the problems of a study outside unfinished entries, in the order of `fault_rows`.
 
-    The texts that are missing in a language are one problem, at the first of them.
+    The texts that are missing in a language are one problem, which leads to the list of texts to write.
     """
     rows = [row for row in fault_rows(study) if not study.is_unfinished(row.fault)]
     missing = Counter(row.fault.missing_language for row in rows if row.fault.kind == "no text")
@@ -70,9 +70,12 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     for row in rows:
         code = row.fault.missing_language
         if row.fault.kind == "no text" and missing[code] > 1:
-            message = f"{missing[code]} texts are missing in {language_name(code)}; this is the first of them"
-            fault = row.fault._replace(message=message, hint="")
-            shown.setdefault(code, replace(row, message=message, hint="", fault=fault))
+            message = f"{missing[code]} texts are missing in {language_name(code)}"
+            fault, name = row.fault._replace(message=message, hint=""), f"Texts in {language_name(code)}"
+            listed = replace(
+                row, element=STUDY_LANGUAGES, name=name, icon="list", message=message, hint="", fault=fault
+            )
+            shown.setdefault(code, listed)
         else:
             shown[row] = row
     return tuple(shown.values())
@@ -80,7 +83,7 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
 
 @lru_cache(maxsize=2)
 def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
-    """Return a row for each fault of a study, in the order of their lines."""
+    """Return a row for each fault of a study: elements in the order of their lines, their fields as in the form."""
     if not study.is_toml:
         return tuple(
             ProblemRow(
@@ -96,7 +99,13 @@ def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
         )
     places = places_of(study.text)
     rows = [_problem_row(study, fault, places.line(fault.path)) for fault in study.faults]
-    return tuple(sorted(rows, key=lambda row: row.line or 0))
+    orders = {element: key_order(study.document, element) for element in {row.element for row in rows}}
+
+    def place(row: ProblemRow) -> tuple[int, int, int]:
+        key = str(row.fault.path[len(row.element)]) if len(row.fault.path) > len(row.element) else ""
+        return places.line(row.element) or 0, orders[row.element].get(key, -1), row.line or 0
+
+    return tuple(sorted(rows, key=place))
 
 
 def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ...]:

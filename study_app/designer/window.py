@@ -557,6 +557,16 @@ class DesignerPlace(Place):
             self.flush()
             self.asked.emit(MoveElement(self.form_path, by))
 
+    def write_question(self, by: int) -> None:
+        """Go to the text of the next or previous question, or from a questionnaire to that of its first one."""
+        if (form := self.view.form) is None:
+            return
+        listed = [row.facts.lines for row in form.rows if row.path[-1] == "items" and row.facts is not None]
+        paths = [line.path for line in (*form.questions.lines, *(line for lines in listed for line in lines))]
+        at = (paths.index(form.path) if form.path in paths else -1) + by
+        if 0 <= at < len(paths):
+            self._handle_request(Do("write", (paths[at],)))
+
     @property
     def form_path(self) -> ElementPath:
         return () if self.view.form is None else self.view.form.path
@@ -681,7 +691,7 @@ class DesignerPlace(Place):
         match asked:
             case Do("write", (path,)):
                 self.ask("select", path)
-                self.form.focus_row((*path, "text"))
+                self.parts.focus_field((*path, "text"))
             case GoTo(element, field):
                 self.ask("select", element)
                 self.parts.focus_field(field)
@@ -693,14 +703,14 @@ class DesignerPlace(Place):
         said = f"Deleted {step.removed}. {keys_of('undo')[0]} restores it." if step.removed else step.said
         if said:
             announce(self, said)
-        if step.removed:
-            self.form.show_note(said)
         beside = not self.parts.drawer and self.outline.isAncestorOf(self.focusWidget())
         if step.fresh:
             self.outline.words.clear()  # a search would hide it
         if step.fresh and not (step.fresh == "copy" and beside):  # after a copy in an open outline, the focus stays
             self.parts.show_side("form")
             self.form.focus_first_text(filled=step.fresh == "copy")  # a copy has its texts
+        if said and (step.removed or step.entry):
+            self.form.show_note(said)
 
     def open_next_problem(self) -> None:
         """Open the next problem and focus its field, or its repair if there is no field to focus."""

@@ -4,7 +4,7 @@
 ``checks`` refuses what no type can express, ``warnings`` reports what is valid but unwise, ``trials`` has designs,
 stimuli and methods.
 
-Reading order: source, streams, table; groups, questions, raters, sequences, wording; blocks, questionnaires; trials;
+Reading order: source, streams, table; groups, raters, sequences, wording; questions; blocks, questionnaires; trials;
 model; formats, quantities, tracks, without_force; json_schema, orders, scene_file; differences, presented; checks,
 simulated; load; upgrade, warnings; describe.
 """

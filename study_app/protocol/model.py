@@ -495,7 +495,7 @@ class Contrast(Table):
 
 def quoted_title(name: str) -> str:
     """Return a title of several words in quotation marks, so that a sentence can contain it."""
-    return f"“{name}”" if " " in name and not name.endswith(")") else name
+    return f"“{name}”" if " " in name and not name.startswith("“") and not name.endswith(")") else name
 
 
 BELOW_CHANCE_P: Final = 0.001

@@ -9,7 +9,7 @@ from functools import reduce
 from operator import or_
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
+from pydantic import ConfigDict, Discriminator, Field, Tag, field_validator, model_validator
 
 from study_app.discovery import Registry, Returns, instance_of
 from study_app.haptics.model.ranges import later, within
@@ -25,6 +25,7 @@ from study_app.protocol.table import (
     text_in,
     unprintable_character,
 )
+from study_app.protocol.wording.languages import language_name
 
 POINTS = 7
 """Of the scale of statements."""
@@ -41,6 +42,20 @@ class Scale(Table):
     cannot_judge: Localised | None = Field(
         default=None, description="Label for an answer that is not on the scale, such as “cannot judge”; default: none."
     )
+
+    @field_validator("labels", mode="before")
+    @classmethod
+    def _has_every_label(cls, labels: Any) -> Any:
+        """Reject a language with fewer labels than another one."""
+        listed = labels.items() if isinstance(labels, Mapping) else ()
+        tuples = {code: texts for code, texts in listed if isinstance(texts, tuple)}
+        most = max(map(len, tuples.values()), default=0)
+        for code, texts in tuples.items():
+            if len(texts) < most:
+                written = sum(isinstance(text, str) and bool(text.strip()) for text in texts)
+                message = f"lacks {most - written} of {most} labels in {language_name(code)}"
+                raise invalid(message, code, hint="the scale must have the same number of points in every language")
+        return labels
 
     @property
     def points(self) -> int:

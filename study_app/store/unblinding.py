@@ -101,11 +101,13 @@ def unblind(folder: Path, by: str, reason: str, progress: ReportProgress | None 
         sessions = study.sessions()
         for number, session in enumerate(sessions):
             if progress is not None:
-                progress(f"opening session {number + 1} of {len(sessions)}", number / len(sessions))
+                progress(f"opening session {number + 1} of {len(sessions)}", number / (len(sessions) + 1))
             try:
                 left += _open_tables(study, session, key)
             except StoreError as error:
                 left.append(f"{error}; then unblind again")
+        if progress is not None:
+            progress("writing the tables of the study", len(sessions) / (len(sessions) + 1))
         try:
             write_study_files(study)
         except StoreError as error:

@@ -95,7 +95,9 @@ def test_while_sealed_nothing_is_told_but_codes_and_nothing_is_tested(study: Pat
 
 
 def test_once_open_names_are_told_and_what_tests_add_is_drawn_again(study: Path) -> None:
-    told(OpenKey(study, "AK", "done"))
+    opening = of_kind(Progress, told(OpenKey(study, "AK", "done")))
+    assert [one.what for one in opening[:3]] == [f"opening session {number} of 3" for number in (1, 2, 3)]
+    assert [(one.share, one.stops) for one in opening] == [(number / 4, False) for number in range(4)]
     answers = told(ReadStudy(study))
     (sessions,), (found,) = of_kind(SessionsFound, answers), of_kind(StudyFound, answers)
     assert sessions.reveal is not None

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QLineEdit, QPlainTextEdit, QWidget
 
 from study_app.designer.document.steps import ChangeLanguage
@@ -164,3 +165,59 @@ def test_a_copy_of_an_abx_block_can_have_the_same_conditions(designer: Any) -> N
     designer.key("ctrl+d")
     designer.press("Same conditions")
     assert designer.value("blocks", "liquids_2", "conditions") == ("thin", "thick")
+
+
+@pytest.mark.parametrize("words", ["exclusion", "exclude", "catch trials"])
+def test_add_finds_exclusion_rules_and_adds_one_with_its_usual_limit(designer: Any, words: str) -> None:
+    designer.controller.begin_study("template:compare-liquids", "rules")
+    designer.hit("Insert")
+    QTest.keyClicks(designer.place.adding.words, words)
+    designer.hit("Return")
+    assert designer.value("analysis", "exclusions") == ({"rule": "constant_answers", "limit": 95},)
+    assert (designer.study.faults, designer.editing.selected) == ((), ("analysis", "exclusions", 0))
+
+
+def test_groups_are_added_in_twos_which_the_entry_and_the_foot_say(designer: Any) -> None:
+    designer.open("kitchen", "study")
+    designer.add("Two groups")
+    assert tuple(designer.value("groups")) == ("group", "group_2")
+    form = designer.place.form
+    assert "Group 2" in form.foot.words.text()
+    assert (designer.keyboard, form.head.id.selectedText()) == (form.head.id, "group")
+    QTest.keyClicks(designer.keyboard, "thick_first")
+    designer.hit("Return")
+    assert tuple(designer.value("groups")) == ("thick_first", "group_2")
+
+
+@pytest.mark.parametrize("path", [("conditions", "thin", "liquid"), ("blocks", "liquids", "conditions")])
+def test_a_shipped_liquid_is_chosen_without_leaving_the_form(designer: Any, path: tuple[str, ...]) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "mine")
+    designer.go_to(*path[:2])
+    asked = next(asked for words, asked in designer.form_row(*path).row.additions if words.startswith("Slime liquid"))
+    designer.place.form.asked.emit(asked)
+    assert designer.editing.selected == path[:2]
+    named = designer.value(*path)
+    assert named == "slime" if path[0] == "conditions" else named[-1] == "slime"
+    assert designer.value("conditions", "slime") == ({"liquid": "slime"} if path[0] == "blocks" else None)
+    assert "slime" in designer.value("liquids")
+
+
+def test_tab_skips_the_buttons_of_conditions_which_have_keys(designer: Any) -> None:
+    designer.open("kitchen", "blocks", "liquids")
+    row = designer.form_row("blocks", "liquids", "conditions")
+    inner = [stop.accessibleName() for stop in focus_stops(row.field.list) if stop is not row.field.list]
+    assert inner == []
+    row.field.list.setFocus()
+    designer.hit("shift+Return")
+    assert designer.editing.selected == ("liquids", "thin")
+
+
+def test_a_key_leads_from_a_questionnaire_to_the_text_of_each_question_and_back(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "mine")
+    designer.go_to("questionnaires", "after")
+    designer.place.parts.focus_form()
+    for key, number in (("Down", 0), ("Down", 1), ("Down", 2), ("Down", 2), ("Up", 1)):
+        designer.hit(f"alt+Page{key}")
+        assert designer.editing.selected == ("questionnaires", "after", "items", number)
+        (line,) = designer.field("questionnaires", "after", "items", number, "text").lines.values()
+        assert (designer.keyboard, line.textCursor().selectedText()) == (line, line.words())

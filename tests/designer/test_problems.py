@@ -8,7 +8,8 @@ from PySide6.QtGui import QEnterEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
 
-from study_app.designer.document.steps import RetypeFile
+from study_app.designer.document.document import Answers
+from study_app.designer.document.steps import AddInstrument, RetypeFile
 from study_app.designer.document.toml_edits import Set, Unset
 from tests.designer.support.designer import DEMO
 
@@ -105,3 +106,38 @@ def test_a_repeated_text_is_a_problem_of_its_language_alone(designer: Any) -> No
     assert {code: line.property("state") for code, line in row.field.lines.items()} == {"en": "", "nl": "refused"}
     designer.editing.make_step("Change", Set((*copy, "text", "nl"), "Een andere tekst"))
     assert row.row.faults == ()
+
+
+def test_the_next_problem_is_the_next_one_in_the_form_whatever_the_order_in_the_file(designer: Any) -> None:
+    designer.open()
+    block = ("blocks", "liquids")
+    designer.editing.make_step("Break", Set((*block, "part"), 99), Set((*block, "repetitions"), 0))
+    assert designer.text.index("part = 99") < designer.text.index("repetitions = 0")
+    fields = []
+    for _ in range(2):
+        designer.hit("F8")
+        fields.append(designer.place.form.row_path_of(designer.keyboard)[-1])
+    assert fields == ["repetitions", "part"]
+
+
+def test_missing_texts_are_one_problem_that_lists_them_and_enter_leads_to_the_next(designer: Any) -> None:
+    designer.controller.begin_study("template:two-liquids-abx", "mine", Answers(languages=("en", "fr")))
+    designer.editing.handle_request(AddInstrument("nasa-tlx"))
+    assert "does not include the French texts" in designer.place.form.foot.words.text()
+    missing = [fault.path for fault in designer.study.faults]
+    designer.hit("F8")
+    (problem,) = designer.place.problems.problems
+    assert problem.message == f"{len(missing)} texts are missing in French"
+    listed = [row.row.path for row in designer.place.form.rows]
+    assert set(missing) <= set(listed)
+    texts = designer.form_row("questionnaires", "nasa_tlx", "items", 0, "text").field.lines
+    assert texts["en"].words().startswith("How much mental")
+    texts["fr"].setFocus()
+    for number in range(3):
+        QTest.keyClicks(designer.keyboard, f"Texte {number}")
+        designer.hit("Return")
+    items = designer.value("questionnaires", "nasa_tlx", "items")
+    written = [items[0][key].get("fr") for key in ("text", "short", "low", "high")]
+    assert written == ["Texte 0", "Texte 1", "Texte 2", None]
+    assert designer.keyboard is designer.form_row("questionnaires", "nasa_tlx", "items", 0, "high").field.lines["fr"]
+    assert [row.row.path for row in designer.place.form.rows] == listed, "they can still be corrected"

@@ -13,6 +13,7 @@ from study_app.designer.document.steps import (
     AddEntry,
     AddKey,
     AddNamed,
+    ChangeLanguage,
     DuplicateElement,
     RemoveKey,
     SetValue,
@@ -273,3 +274,40 @@ def test_enter_does_not_confirm_a_deletion_that_also_deletes_other_elements(desi
     assert focused is designer.place.prompt.cancel
     QTest.keyClick(focused, Qt.Key.Key_Return)
     assert designer.study.text == before
+
+
+def test_labels_of_another_language_are_no_problem_while_they_are_typed(designer: Any) -> None:
+    begin(designer)
+    labels = ("scales", "agreement", "labels")
+    designer.editing.handle_request(ChangeLanguage("add", "nl"))
+    designer.go_to(*labels[:2])
+    for at, first in enumerate(("Oneens", "Beetje")):
+        field = designer.field(*labels).lines[at][1]
+        field.setFocus()
+        QTest.keyClicks(field, first)
+        field.flush()
+        QApplication.processEvents()
+        assert not [row for row in designer.place.problems.problems if row.fault.path[:3] == labels]
+        hint = designer.form_row(*labels).wrong.sentence
+        assert (hint.text().partition(" (")[0], hint.property("role")) == (
+            f"Lacks {6 - at} of 7 labels in Dutch",
+            "text2",
+        )
+    designer.go_to("pages", "welcome")
+    assert [row.message for row in designer.place.problems.problems if row.fault.path[:3] == labels] == [
+        "Lacks 5 of 7 labels in Dutch"
+    ]
+
+
+def test_a_second_hypothesis_begins_with_a_statement_without_one(designer: Any) -> None:
+    begin(designer)
+    designer.editing.handle_request(DuplicateElement(BLOCK))
+    sequence = [*designer.value("sequence")]
+    sequence.insert(sequence.index("liquids") + 1, "after")
+    designer.editing.make_step("Ask after each block", Set(("sequence",), sequence))
+    contrasts, form = ("analysis", "contrasts"), {"form": "after", "blocks": ["liquids", "liquids_2"]}
+    first, *others = [item["id"] for item in designer.value(*FORM, "items")]
+    designer.editing.make_step("State", Set(contrasts, [{"measure": first, **form}]))
+    for other in others:
+        designer.field(*contrasts).add.click()
+        assert designer.value(*contrasts)[-1] == {"measure": other, "form": "after", "blocks": ("liquids", "liquids_2")}

@@ -101,18 +101,54 @@ def read_commitment(folder: Path) -> Commitment | None:
         ) from error
 
 
+def _language(protocol: Protocol) -> str:
+    return display_language({"study": {"languages": protocol.study.languages}})
+
+
+def _title(protocol: Protocol, block: str) -> str:
+    """Return the title of a block in quotation marks, followed by its ID if another block has this title."""
+    titles = {name: protocol.text(other.title, _language(protocol)) for name, other in protocol.blocks.items()}
+    repeated = list(titles.values()).count(titles[block]) > 1
+    return f"“{titles[block]}”{f' ({block})' if repeated else ''}"
+
+
+def _form_title(protocol: Protocol, form: str) -> str:
+    title = protocol.forms[form].title
+    shown = (
+        number_text.capitalised(form.replace("_", " ")) if title is None else protocol.text(title, _language(protocol))
+    )
+    return f"“{shown}”"
+
+
+def _measure_words(protocol: Protocol, contrast: Contrast, language: str) -> str:
+    """Return the measure with the short text of its statement or question, and the form's title; "" without a text."""
+    if contrast.form is not None and contrast.measure in protocol.forms[contrast.form].scores:
+        return f"{contrast.measure} score of {_form_title(protocol, contrast.form)}"
+    asked = protocol.questionnaire_of(contrast.blocks[0]) if contrast.form is None else protocol.forms[contrast.form]
+    item = next((item for item in (asked.items if asked else ()) if item.id == contrast.measure), None)
+    if item is None:
+        return ""
+    short = f"“{protocol.text(item.short, language)}”"
+    of = f"agreement with {short}"
+    return of if contrast.form is None else f"{short} in {_form_title(protocol, contrast.form)}"
+
+
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
     """Yield the contrasts and the questions of each main block; predictions are marked as hypotheses."""
     for contrast in () if protocol.analysis is None else protocol.analysis.contrasts:
         stimuli = {block.id: stimulus_of(protocol, block) for block in protocol.main_blocks if block.stimulus}
-        words = contrast.words({block: condition_of(protocol, stimulus) for block, stimulus in stimuli.items()})
+        titled = contrast.model_copy(update={"blocks": tuple(_title(protocol, block) for block in contrast.blocks)})
+        words = titled.words(
+            {_title(protocol, block): condition_of(protocol, stimulus) for block, stimulus in stimuli.items()}
+        )
+        described = titled.described(words, measure=_measure_words(protocol, contrast, language))
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
         test = t_test_name(contrast, ratio=ratio)
         test += " and the degrees of freedom of the smaller group" if contrast.groups else ""
         sides = "two-sided" if contrast.expected is None else "one-sided"
         weighted = " Participants are weighted as in the group mean." if contrast.measure == "threshold" else ""
         yield (
-            f"Hypothesis: {contrast.described(words)}. We test it with a {sides} {test}, using one value per "
+            f"Hypothesis: {described}. We test it with a {sides} {test}, using one value per "
             f"participant.{weighted} We also use a bootstrap that adds a participant as extreme as the most extreme "
             "one (Gaffke 2005) and a t test corrected for skewness (Hall 1992). The p value is the largest of the "
             f"three, Holm-adjusted across all hypotheses of this kind.{_equality_of(protocol, contrast)}"
@@ -125,7 +161,8 @@ def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
         else:
             yield from _of_statements(protocol, block, language)
     for published in () if protocol.analysis is None else protocol.analysis.published:
-        yield f"Published value for comparison, block {published.described()}."
+        titled_value = published.model_copy(update={"block": _title(protocol, published.block)})
+        yield f"Published value for comparison, block {titled_value.described()}."
 
 
 def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
@@ -143,32 +180,31 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
 
 
 def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
-    design = design_of(protocol, block)
+    design, title = design_of(protocol, block), _title(protocol, block.id)
     if block.stimulus is None:
         others = [name for name in block.conditions if name != block.standard]
-        yield f"Block {block.id}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
+        yield f"Block {title}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
         return
     stimulus = stimulus_of(protocol, block)
     what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit
     standards = [one for one in standards_of(protocol, block) if one is not None]
     if threshold_plan(protocol, block) is None:
         asked = {"number": "What is the exponent of the power law for", "rating": "How do ratings change with"}
-        yield f"Block {block.id}: {asked.get(design.reply, 'How do answers change with')} {what}?"
+        yield f"Block {title}: {asked.get(design.reply, 'How do answers change with')} {what}?"
         return
     at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
-    yield (
-        f"Block {block.id}: what is the {kind} for {what}{at}? We report an estimate with a 95 % interval but no test."
-    )
+    yield (f"Block {title}: what is the {kind} for {what}{at}? We report an estimate with a 95 % interval but no test.")
     if len(standards) > 1:
         yield (
-            f"Block {block.id}: is the just-noticeable difference proportional to the standard (exponent 1, Weber's "
+            f"Block {title}: is the just-noticeable difference proportional to the standard (exponent 1, Weber's "
             "law) or constant (exponent 0)?"
         )
 
 
 def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[str]:
     questionnaire, decided = protocol.questionnaire_of(block.id), protocol.analysis or Analysis()
+    title = _title(protocol, block.id)
     if questionnaire is None or len(block.conditions) < 2:
         return
     texts = {item.id: text_in(item.text, language) for item in questionnaire.statements}
@@ -176,76 +212,77 @@ def _of_statements(protocol: Protocol, block: Block, language: str) -> Iterator[
         for name, words in texts.items():
             if name in decided.rising or name in decided.falling:
                 moves = "increases" if name in decided.rising else "decreases"
-                yield f"Hypothesis, block {block.id}: agreement with “{words}” ({name}) {moves} with the delay."
+                yield f"Hypothesis, block {title}: agreement with “{words}” ({name}) {moves} with the delay."
         if decided.noticed in texts:
             yield (
-                f"Block {block.id}: at what delay do participants notice a difference (answers of 5 to 7 to the "
-                f"statement “{decided.noticed}”)?"
+                f"Block {title}: at what delay do participants notice a difference (answers of 5 to 7 to the "
+                f"statement “{texts[decided.noticed]}”)?"
             )
         if decided.equivalence_bound is not None:
             yield (
-                f"Block {block.id}: which delays are equivalent to the shortest one, within "
+                f"Block {title}: which delays are equivalent to the shortest one, within "
                 f"{bound_text(decided.equivalence_bound)}?"
             )
         return
     primary = [name for name in texts if not decided.primary or name in decided.primary]
     yield (
-        f"Hypothesis, block {block.id}: agreement differs between {listed(block.conditions)} for "
+        f"Hypothesis, block {title}: agreement differs between {listed(block.conditions)} for "
         f"{listed([f'“{texts[name]}” ({name})' for name in primary])}."
     )
     labels = [
         f"“{condition.label}” for {name}" for name, condition in protocol.conditions.items() if condition.label in texts
     ]
     if labels and protocol.analysis is not None:
-        yield f"Block {block.id}: are the liquids recognised above chance (statements: {listed(labels)})?"
+        yield f"Block {title}: are the liquids recognised above chance (statements: {listed(labels)})?"
 
 
 def analyses(protocol: Protocol) -> Iterator[str]:
     """Yield sentences on the analysis of each block."""
     for block in protocol.main_blocks:
-        plan = threshold_plan(protocol, block)
+        plan, title = threshold_plan(protocol, block), _title(protocol, block.id)
         if plan is not None:
             stimulus, design = stimulus_of(protocol, block), design_of(protocol, block)
             method, family = method_of(protocol, block), FAMILIES[assumed_for(stimulus, design).family]
             yield (
-                f"Block {block.id} ({design.paper_name}, {method.paper_name}): for each participant and standard, we "
+                f"Block {title} ({design.paper_name}, {method.paper_name}): for each participant and standard, we "
                 f"estimate the threshold as the posterior median ({family} function) with its equal-tailed 95 % "
                 "interval, using the delivered levels, and also report the median under a flat prior on the width. "
                 "Goodness of fit is tested with 999 simulated data sets, and drift over the trials is reported."
                 + (f" {REMOVED.format('is')}" if design.kind == "2ifc" else "")
             )
             yield (
-                f"Block {block.id}, group: we report the random-effects mean of the logarithmic thresholds "
+                f"Block {title}, group: we report the random-effects mean of the logarithmic thresholds "
                 f"(Paule–Mandel), with the Hartung–Knapp 95 % interval if there are at least {FEWEST} participants. "
                 "Each participant's variance is replaced by the geometric mean of it and the median variance."
             )
             if plan.standards > 1:
                 yield (
-                    f"Block {block.id}, exponent: we report the mean of the participants' slopes of ln JND on ln "
+                    f"Block {title}, exponent: we report the mean of the participants' slopes of ln JND on ln "
                     "standard, with a 95 % confidence interval (Student's t)."
                 )
         elif block.design is not None and block.stimulus is not None:
             yield (
-                f"Block {block.id}: for each level, we report the mean across participants of their mean answers, "
+                f"Block {title}: for each level, we report the mean across participants of their mean answers, "
                 "with a 95 % confidence interval (Student's t). If participants estimate numbers, we use the "
                 "logarithms of the answers, and the exponent is their slope on the logarithm of the level."
             )
             if design_of(protocol, block).reply == "rating":
                 yield (
-                    f"Block {block.id}: we report d_a for each level relative to the lowest level, calculated from "
+                    f"Block {title}: we report d_a for each level relative to the lowest level, calculated from "
                     "the area under the ROC curve."
                 )
         elif block.design is not None:
             yield (
-                f"Block {block.id}: we report d′ for each participant, calculated from rates with the log-linear "
+                f"Block {title}: we report d′ for each participant, calculated from rates with the log-linear "
                 "correction."
             )
     asked = [block for block in protocol.main_blocks if block.design is None and block.questionnaire is not None]
     if protocol.forms:
         contrasts = () if protocol.analysis is None else protocol.analysis.contrasts
+        forms = listed([_form_title(protocol, form) for form in protocol.forms])
         hypotheses = " except in the hypotheses above" * any(contrast.form is not None for contrast in contrasts)
         yield (
-            f"We describe the answers to the questions in {listed(list(protocol.forms))} and do not test "
+            f"We describe the answers to the questions in {forms} and do not test "
             f"them{hypotheses}. We report the mean score of each form across participants with its 95 % confidence "
             "interval (Student's t). If a form is not scored, we report the means of its ratings and numbers. We "
             "count how often each option is chosen."
@@ -303,7 +340,7 @@ def preregistration(protocol: Protocol, protocol_hash: str, power: str | None = 
     """
     one = commitment(protocol, protocol_hash)
     study = protocol.study
-    language = display_language({"study": {"languages": study.languages}})
+    language = _language(protocol)
     lines = [
         f"# Preregistration: {text_in(study.title, language)}",
         "",
@@ -370,8 +407,8 @@ def _design(protocol: Protocol) -> Iterator[str]:
     yield ("Each participant's trial orders are generated from the session's seed, as described below for each block.")
     for block in protocol.main_blocks:
         compared = f"levels of {block.stimulus}" if block.stimulus is not None else listed(list(block.conditions))
-        alone = block.stimulus is None and len(block.conditions) == 1
-        yield f"Block {block.id} {'presents' if alone else 'compares'} {compared}."
+        alone, title = block.stimulus is None and len(block.conditions) == 1, _title(protocol, block.id)
+        yield f"Block {title} {'presents' if alone else 'compares'} {compared}."
 
 
 def _participants(protocol: Protocol, one: Commitment, power: str | None) -> Iterator[str]:
@@ -413,12 +450,12 @@ def _precision_of(protocol: Protocol, block: Block) -> Iterator[str]:
     if (plan := precision_plan(protocol, block)) is None:
         return
     ((label, reached),) = precision_rows(protocol, block)
-    expected, enough = expected_of(plan), ""
+    expected, enough, title = expected_of(plan), "", _title(protocol, block.id)
     goal = None if protocol.analysis is None else protocol.analysis.precision
     if goal is not None and expected.measured and (needed := expected.participants_for(goal)) is not None:
         enough = f" The goal requires at least {number_text.counted(needed, 'participant')}."
     yield (
-        f"Block {block.id}: we simulated {expected.trials} trials{plan.per}, with {plan.estimated} that differ between "
+        f"Block {title}: we simulated {expected.trials} trials{plan.per}, with {plan.estimated} that differ between "
         f"people by a factor of {BETWEEN_PEOPLE:g}. {label}{', ' if plan.words else ': '}{reached}.{enough}"
     )
 
@@ -429,8 +466,8 @@ def _exclusions(protocol: Protocol) -> Iterator[str]:
         if block.catch is not None:
             yield (
                 f'Rule "catch": a session with more than {100 * block.catch.wrong_most:g} % incorrect answers to the '
-                f"catch trials of block {block.id} is excluded; the program applies this rule when the data are "
-                "unblinded."
+                f"catch trials of block {_title(protocol, block.id)} is excluded; the program applies this rule when "
+                "the data are unblinded."
             )
     limits = "; ".join(f"{what} ({value})" for value, what in limit_rows(protocol))
     has_intervals = any(block.design is not None for block in protocol.main_blocks)

@@ -458,7 +458,8 @@ def _facts(study: Study) -> str:
     of_groups = f" ({groups})" if groups else ""
     took_part = rows["participant"].nunique()
     planned = (study.protocol.get("analysis") or {}).get("participants")
-    differing = [f"{took_part - study.n} of {took_part} were not included"] if took_part > study.n else []
+    reasons = "(for the reasons, see “How the study was run”)"
+    differing = [f"{took_part - study.n} of {took_part} were not included {reasons}"] if took_part > study.n else []
     differing += [f"{planned} were planned"] if planned not in (None, study.n) else []
     others = f" {capitalised('; '.join(differing))}." if differing else ""
     return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}.{others} {when}"

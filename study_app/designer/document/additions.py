@@ -29,11 +29,14 @@ from study_app.designer.document.toml_text import Refused
 from study_app.ids import MAX_ID, free_id
 from study_app.number_text import MINUS, exact_text, number_of
 from study_app.protocol.checks.cross_references import TEXTS
+from study_app.protocol.checks.designs import missing_for_rule
 from study_app.protocol.checks.force_limits import check_paced
 from study_app.protocol.groups import ASSIGNMENT
-from study_app.protocol.model import RULE_LIMITS
+from study_app.protocol.model import RULE_LIMITS, RULES
+from study_app.protocol.questionnaires import instrument_tables, instruments
 from study_app.protocol.source.document import Path, entries, has, names, value_at
 from study_app.protocol.source.problems import Fault, rule_of, shown_value
+from study_app.protocol.warnings.untranslated import untranslated_texts
 from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
 
 
@@ -125,7 +128,26 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
     if code not in LANGUAGES:
         raise Refused(f'the program does not support "{code}"; supported languages: {", ".join(LANGUAGES)}')
     tables = (Set(path, {codes[0]: text}) for path, text in texts_of(study) if isinstance(text, str))
-    return (Set(("study", "languages"), [*codes, code]), *tables)
+    return (Set(("study", "languages"), [*codes, code]), *tables, *_instrument_texts(study, (*codes, code)))
+
+
+def _instrument_texts(study: Study, codes: tuple[str, ...]) -> Iterator[Edit]:
+    """Yield the edits that write the texts of standard questionnaires that lack a language into the study."""
+    for path, of in entries(study.document, "questionnaires.*.instrument"):
+        if of in instruments() and not {"intro", "items"} & value_at(study.document, path[:-1]).keys():
+            table, scales = instrument_tables(of, codes)
+            yield from (
+                Set((*path[:-1], key), as_written(value)) for key, value in table.items() if key != "instrument"
+            )
+            known = names(study.document, "scales")
+            yield from (Set(("scales", name), as_written(scale)) for name, scale in scales.items() if name not in known)
+
+
+def texts_to_write(study: Study) -> tuple[Path, ...]:
+    """Return the places of texts that some language of the study lacks, or that are not translated yet."""
+    lacking = {fault.path for fault in study.faults if fault.kind == "no text"}
+    lacking |= {text.path for text in untranslated_texts(study.document)}
+    return tuple(path for path, _ in texts_of(study) if path in lacking)
 
 
 def without_language(study: Study, code: str) -> tuple[Edit, ...]:
@@ -147,6 +169,13 @@ def edits_to_fill_in(study: Study, code: str) -> tuple[Edit, ...]:
         elif isinstance(text, str):
             edits.append(Set(path, {first: text, code: text}))
     return tuple(edits)
+
+
+def as_written(value: Any) -> Any:
+    """Return a value as TOML writes it: lists instead of tuples, and no omitted keys."""
+    if isinstance(value, Mapping):
+        return {key: as_written(part) for key, part in value.items() if part is not None}
+    return [as_written(part) for part in value] if isinstance(value, list | tuple) else value
 
 
 def texts_of(study: Study) -> Iterator[tuple[Path, Any]]:
@@ -379,6 +408,8 @@ def edits_to_add(
         path = (*section, behind + 1 if isinstance(behind, int) and behind < count else count)
         entry = row_at(study.document, path)
         made = initial_value(study.document, path) if entry is not None and entry.kind == "references" else value
+        if section == EXCLUSIONS:
+            value |= _usual_rule(study)
         first = Insert(path, made) if row.value else Set(section, [made])
     else:
         path = (*section, free_id(names(study.document, str(section[0])), name or element_noun(section[-1])))
@@ -408,6 +439,15 @@ def edits_to_add(
         else:
             others += (edit for edit in _edits_outside(after, fault) if not _unsets(edit, path))
     return (first, *others), path
+
+
+def _usual_rule(study: Study) -> dict[str, Any]:
+    """Return the first exclusion rule that applies to the study and is not in it yet, with its usual limit."""
+    known = {value for _, value in entries(study.document, "analysis.exclusions.*.rule")}
+    fitting = [rule for rule in RULES if study.formed is None or not missing_for_rule(study.formed, rule)]
+    rule = next((rule for rule in fitting if rule not in known), fitting[0])
+    limit = RULE_LIMITS.get(rule)
+    return {"rule": rule} if limit is None else {"rule": rule, "limit": limit.usual}
 
 
 def _unsets(edit: Edit, path: Path) -> bool:

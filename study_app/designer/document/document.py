@@ -173,7 +173,7 @@ class Document:
 
     ``base`` is the hash of the file content that is edited and ``saved`` its text, "" for a new file; ``read_only`` is
     the reason why it cannot be changed, or ""; ``draft`` was found when it was opened, ``kept`` is the time of the last
-    draft.
+    draft. ``to_write`` are the texts that were missing when their list was opened.
     """
 
     def __init__(
@@ -184,6 +184,7 @@ class Document:
         self.done: list[_DoneStep] = []
         self.undone: list[_DoneStep] = []
         self.read_only = ""
+        self.to_write: tuple[Place, ...] = ()
         self.draft = draft
         self.kept: datetime | None = None
         self.keeper = Keeper(file, base)

@@ -35,6 +35,8 @@ _NAMED: Final = 3
 FIRST: Final = ("study",)
 """What is selected where nothing else is."""
 SEQUENCE: Final = ("sequence",)
+STUDY_LANGUAGES: Final = ("study", "languages")
+"""The languages; the element of this path is the list of texts to write or translate."""
 
 
 @dataclass(frozen=True, slots=True)

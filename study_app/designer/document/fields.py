@@ -548,6 +548,17 @@ def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tup
     return tuple((heading, tuple(keys)) for heading, keys in node.get(SECTIONS, ()))
 
 
+def key_order(document: Mapping[str, Any], path: Path) -> dict[str, int]:
+    """Return the position of each key of an element in its form, in which inner tables come last."""
+    nodes, value = node_at(document, path), value_at(document, path)
+    node, table = table_of(nodes, value) or {}, value if isinstance(value, Mapping) else {}
+    in_sections = (key for _, keys in node.get(SECTIONS, ()) for key in keys)
+    written = (distinguishing_key(nodes)[0], *in_sections, *node.get("properties", ()), *table)
+    inner = {key for key, part in table.items() if isinstance(part, Mapping)
+             and any("properties" in node for node in node_at(document, (*path, key)))}  # fmt: skip
+    return {key: at for at, key in enumerate(sorted(dict.fromkeys(written), key=lambda key: key in inner))}
+
+
 def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
     """Return the keys that a table with its current values does not permit."""
     table = value_at(document, path)

@@ -11,6 +11,7 @@ from pathlib import Path as File
 from typing import Any, Final, Literal, TypeAlias
 
 from study_app.designer.document.additions import (
+    as_written,
     check_values,
     edits_that_follow,
     edits_to_add,
@@ -25,7 +26,7 @@ from study_app.designer.document.additions import (
     with_language,
     without_language,
 )
-from study_app.designer.document.elements import step_of, title_of
+from study_app.designer.document.elements import step_of, title_of, unique_name
 from study_app.designer.document.fields import (
     counted_elements,
     edits_to_delete,
@@ -49,7 +50,7 @@ from study_app.ids import free_id
 from study_app.number_text import counted
 from study_app.protocol.load import read_document, shipped, source_bytes
 from study_app.protocol.model import SceneDefaults
-from study_app.protocol.questionnaires import instrument_tables
+from study_app.protocol.questionnaires import instrument, instrument_tables
 from study_app.protocol.source.document import Path, names, value_at
 from study_app.protocol.wording.languages import language_name, languages_of
 
@@ -102,6 +103,8 @@ class SetValue(Request):
     def step(self, at: Situation) -> Step:
         edits = edits_that_follow(at.study, self.path, Set(self.path, self.value))
         entry = self.path[:2] if self.path[:1] == ("blocks",) and self.path[2:] == ("design",) else ()
+        if self.typing and self.path[::2][:2] == ("scales", "labels"):
+            entry = self.path[:3]  # a label alone is a problem until the others are typed
         return Step(f"Change {label_at(self.path)}", edits, None, self.path if self.typing else None, entry=entry)
 
 
@@ -183,7 +186,7 @@ class AddEntry(Request):
                 edits, path = edits_to_add(at.study, self.path)
                 return Step(f"Add {element_noun(self.path[-1])}", edits, entry=path)
             first = initial_value({}, self.path) if not entries else entries[-1]
-            value = _as_written(first[0] if not entries and isinstance(first, list | tuple) else first)
+            value = as_written(first[0] if not entries and isinstance(first, list | tuple) else first)
         edit: Edit = Insert((*self.path, len(entries)), value) if entries else Set(self.path, [value])
         edits = edits_that_follow(at.study, self.path, edit)
         return Step(f"Add to {label_of(self.path[-1])}", edits, entry=(*self.path, len(entries)))
@@ -231,7 +234,18 @@ class AddElement(Request):
         behind = selected[len(section)] if inside else None
         edits, path = edits_to_add(at.study, section, behind=behind)
         edits = _edits_beside(at.study, edits, selected, path)
-        return Step(f"Add {element_noun(section[-1])}", edits, path, fresh="new", entry=path)
+        title, said = f"Add {element_noun(section[-1])}", _also_added(at.study, edits, path)
+        return Step(title, edits, path, said=said, fresh="new", entry=path)
+
+
+def _also_added(study: Study, edits: tuple[Edit, ...], path: Path) -> str:
+    """Return a sentence with the other elements that are added with the one at ``path``; "" if there are none."""
+    after = study.with_edits(*edits)[0].document
+    sections = [str(row.path[0]) for row in rows(after, ()) if row.kind == "tables"]
+    new = [(section, name) for section in sections for name in names(after, section)
+           if name not in names(study.document, section) and (section, name) != path[:2]]  # fmt: skip
+    added = ", ".join(unique_name(after, other) for other in new)
+    return f"Also added, because the study needs it: {added}. {label_of(new[0][0])} lists it." if new else ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -263,7 +277,12 @@ class AddInstrument(Request):
     def step(self, at: Situation) -> Step:
         table, edits = _instrument_edits(at.study, self.name)
         path = ("questionnaires", free_id(names(at.study.document, "questionnaires"), self.name.replace("-", "_")))
-        return Step(f"Add {self.name}", (*edits, Set(path, table)), path, entry=path)
+        codes, known = languages_of(at.study.document), instrument(self.name)["languages"]
+        lacking, said = [language_name(code) for code in codes if code not in known], ""
+        if 0 < len(lacking) < len(codes):
+            where = "The next problem (F8), or “Write …” at the study's languages, lists them"
+            said = f"The program does not include the {' and '.join(lacking)} texts. {where}."
+        return Step(f"Add {self.name}", (*edits, Set(path, table)), path, said=said, entry=path)
 
 
 def _instrument_edits(study: Study, name: str) -> tuple[dict[str, Any], tuple[Edit, ...]]:
@@ -296,7 +315,7 @@ class UseSource(Request):
                 file = os.path.relpath(file, at.study.folder)
             table = {"file": File(file).as_posix()}
         gone = (Unset((*element, other)) for other in before if other not in table)
-        new = (Set((*element, other), _as_written(value)) for other, value in table.items())
+        new = (Set((*element, other), as_written(value)) for other, value in table.items())
         return Step(f"Use {label_of(key).lower()} {File(self.name).stem}", (*edits, *new, *gone))
 
 
@@ -322,6 +341,7 @@ def shipped_liquids() -> dict[tuple[str, str], Mapping[str, Any]]:
 class AddLiquid(Request):
     """Add a shipped study's liquid, and name it in the reference at ``path``, or in a new condition if there are any.
 
+    A new condition is listed in a block if ``path`` is that of its conditions. With ``path`` the form stays there.
     A study without a scale of its own gets that of the shipped study: at another scale the device may not be able to
     present the liquid.
     """
@@ -362,15 +382,21 @@ class AddLiquid(Request):
     def step(self, at: Situation) -> Step:
         document = at.study.document
         name = free_id((*names(document, "liquids"), *names(document, "conditions")), self.name)
-        edits: tuple[Edit, ...] = (Set(("liquids", name), _as_written(shipped_liquids()[self.source, self.name])),)
-        if self.path:
-            edits = (*edits, Set(self.path, name))
-        elif names(document, "conditions"):
+        edits: tuple[Edit, ...] = (Set(("liquids", name), as_written(shipped_liquids()[self.source, self.name])),)
+        listed = self.path[::2] == ("blocks", "conditions")
+        if names(document, "conditions") and (listed or not self.path):
             edits = (*edits, Set(("conditions", name), {"liquid": name}))
+        if listed:
+            before = value_at(document, self.path) or ()
+            edits = (*edits, Insert((*self.path, len(before)), name) if before else Set(self.path, [name]))
+        elif self.path:
+            edits = (*edits, Set(self.path, name))
         theirs, own = self._scales(at.study)
         if theirs != own and value_at(document, _SCALE) is None:
             edits = (*edits, Set(_SCALE, theirs))
-        return Step(f"Add {label_of(self.name).lower()}", edits, ("liquids", name), entry=("liquids", name))
+        select: Path | None = None if self.path else ("liquids", name)
+        said = self.help(at.study) if self.path else ""
+        return Step(f"Add {label_of(self.name).lower()}", edits, select, said=said, entry=("liquids", name))
 
 
 def shipped_liquids_to_add(study: Study, path: Path = ()) -> tuple[AddLiquid, ...]:
@@ -630,21 +656,14 @@ def index_of(path: Path) -> int:
 
 def _first_value(study: Study, path: Path) -> Any:
     """Return the default of a key, or an initial value; for a table with the keys without which it is incomplete."""
-    value = _as_written(initial_value(study.document, path))
+    value = as_written(initial_value(study.document, path))
     if value != {}:
         return value
     after, _ = study.with_edits(Set(path, {}))
     needed = [row.path for row in rows(after.document, path) if row.required]
     while needed:
-        value |= {str(place[-1]): _as_written(initial_value(after.document, place)) for place in needed}
+        value |= {str(place[-1]): as_written(initial_value(after.document, place)) for place in needed}
         after, _ = study.with_edits(Set(path, value))
         inner = (fault.path for fault in after.faults if fault.path[:-1] == path)
         needed = [place for place in inner if value_at(after.document, place) is None]
     return value
-
-
-def _as_written(value: Any) -> Any:
-    """Return a value as TOML writes it: lists instead of tuples, and no omitted keys."""
-    if isinstance(value, Mapping):
-        return {key: _as_written(part) for key, part in value.items() if part is not None}
-    return [_as_written(part) for part in value] if isinstance(value, list | tuple) else value

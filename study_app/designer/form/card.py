@@ -12,6 +12,7 @@ from PySide6.QtCore import QCoreApplication, QEvent, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractItemView, QApplication, QBoxLayout, QGridLayout, QMenu, QVBoxLayout, QWidget
 
+from study_app.designer.document.elements import STUDY_LANGUAGES
 from study_app.designer.document.steps import (
     AddKey,
     LeaveText,
@@ -23,6 +24,7 @@ from study_app.designer.document.steps import (
 )
 from study_app.designer.form.drawn_fields import LEVELS, TRIAL
 from study_app.designer.form.fields import (
+    LANGUAGE,
     ChecksField,
     ChoiceField,
     Field,
@@ -39,7 +41,7 @@ from study_app.designer.form.fields import (
     removes_key,
 )
 from study_app.designer.form.lists import CONDITIONS, EntriesField, EntryList, LanguageListField, LinesField
-from study_app.designer.form.rows import STUDY_LANGUAGES, Form, FormRow, Section, added_row, values_of
+from study_app.designer.form.rows import Form, FormRow, Section, added_row, values_of
 from study_app.designer.form.special import (
     BLOCK_ORDER,
     DESCRIPTION,
@@ -858,10 +860,13 @@ class FormCard(Card):
     def focus_first_text(self, *, filled: bool) -> None:
         """Focus the first text and select it; empty texts are preferred unless all are filled in.
 
-        In a form without texts the first row gets the focus.
+        A new element without texts is called by its ID, which gets the focus; in another form the first row gets it.
         """
         fields = list(self._typed_fields())
         texts = [field for field in fields if isinstance(field.parent(), LanguagesField)]
+        if not (filled or texts) and self.head.id_line.isVisibleTo(self):
+            self.head.edit_id()
+            return
         empty = (field for field in fields if not filled and not field.words() and not field.placeholderText())
         field = next(iter((*empty, *texts)), None)
         if field is None:
@@ -869,6 +874,24 @@ class FormCard(Card):
             return
         self._focus_typed(field)
         field.selectAll()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        """In the list of texts to write, let Enter lead to the next missing text."""
+        if self.form is None or not self.form.lists_texts or event.key() not in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
+            super().keyPressEvent(event)
+            return
+        fields = list(self._typed_fields())
+        at = next((at for at, field in enumerate(fields, start=1) if field.hasFocus()), 0)
+        to_write = (field for field in (*fields[at:], *fields[:at]) if self._is_to_write(field))
+        if (field := next(to_write, None)) is None:
+            self.show_note("Every text is written in every language.")
+        else:
+            self._focus_typed(field)
+            field.selectAll()
+
+    def _is_to_write(self, field: TypedLine | TypedText) -> bool:
+        row = next(row.row for row in self.rows if row.isAncestorOf(field))
+        return not field.words().strip() or field.property(LANGUAGE) in {text.language for text in row.untranslated}
 
     def _typed_fields(self) -> Iterator[TypedLine | TypedText]:
         for row in self.rows:

@@ -319,6 +319,7 @@ class TypedSentence(TypedText):
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() in {Qt.Key.Key_Return, Qt.Key.Key_Enter}:
             self.accept()
+            event.ignore()  # as a line does
         else:
             super().keyPressEvent(event)
 

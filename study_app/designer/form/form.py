@@ -9,7 +9,9 @@ from study_app.designer.document.additions import number_rows
 from study_app.designer.document.elements import (
     FIRST,
     SEQUENCE,
+    STUDY_LANGUAGES,
     distinct_title,
+    element_of,
     kind_of,
     place_words,
     position_of,
@@ -24,6 +26,7 @@ from study_app.designer.document.fields import (
     EXCLUSIONS,
     Choice,
     Row,
+    key_order,
     kind_note,
     label_of,
     named_at,
@@ -46,7 +49,6 @@ from study_app.designer.document.study import Study
 from study_app.designer.form.card import EDITORS
 from study_app.designer.form.rows import (
     NO_QUESTIONS,
-    STUDY_LANGUAGES,
     Entry,
     Form,
     FormRow,
@@ -77,8 +79,8 @@ _WITH_LIQUIDS = ("liquids", "conditions", "blocks")
 """Sections whose elements the lab opens."""
 
 
-def form_of(study: Study, path: Path) -> Form:
-    """Return the form of the element at ``path``."""
+def form_of(study: Study, path: Path, to_write: tuple[Path, ...] = ()) -> Form:
+    """Return the form of the element at ``path``; that of `STUDY_LANGUAGES` lists the texts ``to_write``."""
     if study.is_unreadable:
         lines = [f"Line {problem.line}: " if problem.line else "" for problem in study.problems]
         said = [_sentence(problem.message, problem.hint) for problem in study.problems]
@@ -92,6 +94,16 @@ def form_of(study: Study, path: Path) -> Form:
             unreadable=True,
         )
     document, places = study.document, places_of(study.text)
+    if path == STUDY_LANGUAGES:
+        return Form(
+            path=path,
+            title="Texts in every language" if to_write else "Every text is written in every language",
+            icon="list",
+            kind="Enter leads to the next missing text",
+            sections=tuple(_texts(study, to_write, places)),
+            around=tuple((place, title_of(document, place)) for place in (FIRST, path)),
+            lists_texts=True,
+        )
     own_row = row_at(document, path) if len(path) == 1 else None
     if own_row is not None and own_row.kind == "tables":
         own_row = replace(own_row, label=_ENTRIES)
@@ -135,6 +147,20 @@ def form_of(study: Study, path: Path) -> Form:
         used=usage_text(document, path),
         asks=tuple(_session_requests(document, path)),
     )
+
+
+def _texts(study: Study, to_write: tuple[Path, ...], places: Places) -> Iterator[Section]:
+    """Yield a section with the texts to write for each element, elements in file order, texts as in its form."""
+    document, by_element = study.document, dict[Path, list[Path]]()
+    for path in to_write:
+        if value_at(document, path) is not None:
+            by_element.setdefault(element_of(study, path), []).append(path)
+    for element in sorted(by_element, key=lambda path: places.line(path) or 0):
+        order = key_order(document, element)
+        paths = sorted(by_element[element], key=lambda path: order[str(path[len(element)])])
+        shown = (row for path in paths if (row := row_at(document, path)) is not None)
+        form_rows = tuple(_form_row(study, row, places) for row in shown)
+        yield Section(STUDY_LANGUAGES, unique_name(document, element), form_rows)
 
 
 def _session_requests(document: Mapping[str, Any], path: Path) -> Iterator[tuple[str, Request]]:
@@ -314,7 +340,7 @@ def _additions(study: Study, row: Row) -> Iterator[tuple[str, Request]]:
     if row.path == ("liquids",):
         yield new_element_label("liquids"), AddElement(row.path)
         yield from ((asked.words, asked) for asked in shipped_liquids_to_add(study))
-    elif row.kind == "reference" and row.sections == ("liquids",):
+    elif (row.kind == "reference" and row.sections == ("liquids",)) or row.path[::2] == ("blocks", "conditions"):
         yield from ((asked.words, asked) for asked in shipped_liquids_to_add(study, row.path))
 
 
@@ -333,7 +359,8 @@ def _entries(study: Study, row: Row) -> Iterator[Entry]:
         for at, code in enumerate(row.value if isinstance(row.value, tuple) else ()):
             (present, wanted), alike = counts.get(str(code), (0, 0)), copied.get(str(code), 0)
             note = f"{present - alike} of {wanted} texts" + (f", {alike} to translate" if alike else "")
-            yield Entry((*row.path, at), language_name(str(code)), note, wanted - present)
+            target: Path = STUDY_LANGUAGES if present - alike < wanted else ()
+            yield Entry((*row.path, at), language_name(str(code)), note, wanted - present, target)
     if row.kind in {"list", "tables", "references"} and isinstance(row.value, tuple | Mapping):
         keys = row.value if isinstance(row.value, Mapping) else range(len(row.value))
         for key in keys:

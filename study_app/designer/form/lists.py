@@ -26,8 +26,8 @@ from study_app.designer.form.fields import Field, SpecialEditor, TypedLine, add_
 from study_app.designer.form.rows import FormRow
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
-from study_app.designer.parts import FIELD_PX, KeysOpenList, cut_text, make_dense
-from study_app.gui.kit.commands import with_key
+from study_app.designer.parts import FIELD_PX, KeysOpenList, cut_text, make_dense, small_button
+from study_app.gui.kit.commands import keys_of, with_key
 from study_app.gui.theme.themed import name_scroll_bars
 from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
 from study_app.gui.widgets.controls import ActionButton, IconButton
@@ -324,6 +324,14 @@ class _ConditionsField(EntriesField):
 
     caption = _CAPTION
 
+    def __init__(self, row: FormRow) -> None:
+        super().__init__(row)
+        self.list.keys[keys_of("open liquid")[0]] = lambda: self._open_liquid(self.list.currentRow())
+
+    def _open_liquid(self, at: int) -> None:
+        if 0 <= at < len(self.row.facts) and (liquid := self.row.facts[at].liquid):
+            self.asked.emit(Do("select", (liquid,)))
+
     def row_content(self) -> object:
         return self.row.entries, self.row.facts
 
@@ -335,8 +343,8 @@ class _ConditionsField(EntriesField):
         for part in (note, force):
             part.setAlignment(RIGHT)
             shown.line.addWidget(part)
-        name, select = f"Open the liquid used in {self.row.entries[at].title}", Do("select", (line.liquid,))
-        shown.add_button("drop", name, partial(self.asked.emit, select)).setEnabled(bool(line.liquid))
+        name = f"Open the liquid used in {self.row.entries[at].title}"
+        shown.add_button("drop", name, partial(self._open_liquid, at), "open liquid").setEnabled(bool(line.liquid))
 
 
 class LinesField(EntryList):
@@ -409,6 +417,11 @@ class LanguageListField(EntryList):
             note.setMinimumWidth(note.fontMetrics().horizontalAdvance(entry.note.partition(",")[0]) + 2)
             description = f"{entry.title}, {entry.note}, {at + 1} of {len(codes)}"
             shown = self.add_row(description, title, note, faulty=bool(entry.faults))
+            if entry.target:
+                write = small_button("", "Write …", height=32)
+                write.setAccessibleName(f"Write the texts that are missing in {entry.title}")
+                write.clicked.connect(partial(self.open_entry, at))
+                shown.line.addWidget(write)
             if entry.faults and at:
                 made = self.copies[code] = add_button(
                     f"Copy the {first} text wherever {entry.title} is missing", f"Copy {first}"

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any, Final
 
+from study_app.designer.document.elements import STUDY_LANGUAGES
 from study_app.designer.document.fields import Choice, Row, element_noun, label_of, name_label
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
@@ -81,7 +82,6 @@ def _show_if_note(item: Mapping[str, Any], numbers: Mapping[str, int]) -> str:
     return f"shown if {numbers.get(name, name)} is {' or '.join(labels) if labels else ' and '.join(limits)}"
 
 
-STUDY_LANGUAGES: Final = ("study", "languages")
 NO_QUESTIONS: Final = QuestionLines((), ())
 LEAST, MOST = "at least ", "at most "
 
@@ -180,6 +180,7 @@ class Form:
     series: bool = False  # whether a series of it is possible: elements that differ in one number
     used: str = ""  # how many other elements use it (`usage_text`); "" if that is not shown
     asks: tuple[tuple[str, Request], ...] = ()  # places where a questionnaire can be added
+    lists_texts: bool = False  # whether it lists texts to write or translate; Enter then leads to the next one
     # whether nothing can be edited but the text of the file, in which the study cannot be read
     unreadable: bool = False
 

@@ -655,6 +655,11 @@ def _comparison(value: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
+def _items_compared(comparison: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a comparison without its measure."""
+    return {key: entry for key, entry in comparison.items() if key not in {"measure", "form"}}
+
+
 def _relation(value: Mapping[str, Any]) -> Any:
     return value.get("expected", None if value.get("bound") is None else "equal")
 
@@ -684,11 +689,17 @@ class _HypothesesField(Field):
         self.why.setText(self.row.facts.hint)
 
     def _add_hypothesis(self) -> None:
-        values = list(_comparisons(self.row.facts.items))
+        """Add a hypothesis on a measure without one, if possible on the items that the last hypothesis compares."""
         known = [_comparison(value) for value in self.row.value or () if isinstance(value, Mapping)]
-        self.asked.emit(
-            AddEntry(self.row.path, next((value for value in values if _comparison(value) not in known), values[0]))
-        )
+        measures = [(value.get("form"), value.get("measure", "threshold")) for value in known]
+        form, items = (measures[-1][0], _items_compared(known[-1])) if known else (None, {})
+
+        def is_repeated(value: Mapping[str, Any]) -> tuple[bool, ...]:
+            own = _comparison(value)
+            measure = own.get("form"), own["measure"]
+            return own in known, measure in measures, measure[0] != form, _items_compared(own) != items
+
+        self.asked.emit(AddEntry(self.row.path, min(_comparisons(self.row.facts.items), key=is_repeated)))
 
     def _refuse(self, why: str) -> None:
         if why != self.refusal:

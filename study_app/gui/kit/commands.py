@@ -63,11 +63,14 @@ COMMANDS: Final = (
     Command("file", "Switch between form and file", ("Ctrl+E",), run=lambda place: place.parts.switch_to_file()),
     Command("home", "Home", ("Alt+Home",), run=lambda place: place.leave_for_home()),
     Command("back", "Previous element", ("Alt+Left",), run=lambda place: place.ask("back")),
+    Command("next question", "Text of the next question", ("Alt+PgDown",), run=lambda place: place.write_question(1)),
+    Command("question before", "Text of the previous one", ("Alt+PgUp",), run=lambda place: place.write_question(-1)),
     Command("page", "Participant's page", ("Ctrl+Return",)),
     Command("leave page", "Leave the page", ("Escape",), within="page"),
     Command("language", "Show the page in the next language", ("Ctrl+L",)),
     Command("add", "Add", ("Insert",), run=lambda place: place.ask_to_add()),
     Command("open entry", "Open the element that an entry refers to", ("Return",), within="lists"),
+    Command("open liquid", "Open the liquid of a condition", ("Shift+Return",), within="lists"),
     Command("duplicate", "Duplicate", ("Ctrl+D",), run=lambda place: place.duplicate()),
     Command(
         "series", "Make copies that differ in one number", ("Ctrl+Shift+D",), run=lambda place: place.make_series()

@@ -516,7 +516,7 @@ class _WorkLine(Card):
         """Show the progress; with ``untested``, that the work was stopped and what is missing."""
         self.setVisible(going is not None or untested)
         self.bar.setVisible(going is not None)
-        self.stop.setVisible(going is not None)
+        self.stop.setVisible(going is not None and going.stops)
         self.again.setVisible(going is None)
         if going is not None:
             self.words.show_text(f"{going.what[:1].upper()}{going.what[1:]} …")
@@ -549,6 +549,7 @@ class _TroubleCard(Card):
         self.sentence.setText(trouble.sentence)
         self.sentence.setVisible(bool(trouble.sentence))
         self.button.show_action("", trouble.button)
+        self.button.show()
         self.bar.hide()
         self._remedy = trouble.remedy
 
@@ -556,6 +557,7 @@ class _TroubleCard(Card):
         self.show_trouble(
             Trouble(title=f"{going.what[:1].upper()}{going.what[1:]} …", sentence="", button="Stop", remedy="stop")
         )
+        self.button.setVisible(going.stops)
         self.bar.setVisible(True)
         self.bar.show_share(going.share)
 
@@ -580,7 +582,8 @@ class FiguresPanel(QScrollArea):
         self.work.stop.clicked.connect(lambda: self.asked.emit("stop"))
         self.work.again.clicked.connect(lambda: self.asked.emit("read"))
         self._inside = QWidget()
-        self._column = vbox(self.trouble, self.work, STRETCH, spacing=_GAP - 2 * SHADOW, margins=0, parent=self._inside)
+        parts = (self.work, self.trouble, STRETCH)  # the work above the figures, where it is seen
+        self._column = vbox(*parts, spacing=_GAP - 2 * SHADOW, margins=0, parent=self._inside)
         self.trouble.hide()
         self.work.hide()
         self.setWidgetResizable(True)
@@ -615,7 +618,7 @@ class FiguresPanel(QScrollArea):
                 card = FigureCard(figure, colours)
                 card.failed.connect(self.failed)
                 card.person_asked.connect(self.person_asked)
-            self._column.insertWidget(place, card)
+            self._column.insertWidget(1 + place, card)
             self.cards.append(card)
         for gone in kept.values():
             remove_widget(gone)

@@ -727,7 +727,7 @@ class ResultsPlace(Place):
             self._orders = {}
         self._orders[self.reader.order(order)] = order
         self._since_s = time.perf_counter()
-        self._going = Progress(what, 0.0)
+        self._going = Progress(what, 0.0, stops=not isinstance(order, _Decided))
         self._listening.start()
 
     def _read_answers(self) -> None:

@@ -294,14 +294,6 @@ def check_questions(document: Document) -> Iterator[Fault]:
         for path, table in entries(document, "scales.*")
         if (scale := _valid_or_none(Scale.model_validate, table)) is not None
     }
-    for name, scale in scales.items():
-        if len(counts := {len(labels) for labels in scale.labels.values()}) > 1:
-            listed = " and ".join(map(str, sorted(counts)))
-            yield Fault(
-                ("scales", name, "labels"),
-                f"has {listed} points",
-                "the scale must have the same number of points in every language",
-            )
     language = next((name for _, name in entries(document, "study.languages.*") if isinstance(name, str)), "en")
     for path, table in entries(document, "questionnaires.*"):
         if not isinstance(table, Mapping):

@@ -60,7 +60,7 @@ def test_a_study_of_thresholds_states_levels_sample_size_and_catch_rule() -> Non
         "are the data unblinded and tested. The goal is a 95 % interval for the group mean no wider than ±15 %." in text
     )
     assert "we simulated 50 trials per standard" in text
-    assert "- Block viscosity compares levels of damping." in text
+    assert "- Block “Viscosity” compares levels of damping." in text
     assert 'Rule "catch": a session with more than 25 % incorrect answers' in text
     assert "the trial is repeated, for up to 3 presentations in total" in text
     assert "Hartung–Knapp 95 % interval if there are at least 3 participants" in text
@@ -71,16 +71,16 @@ def test_a_study_of_ratings_states_d_a_and_how_precise_it_is_expected_to_be() ->
     more = FIVE_POINTS + '\n[blocks.rate]\ntask = "stir"\nstimulus = "value"\ndesign = "rated"\nmethod = "few"\n'
     edits = [('sequence = ["viscosity"]', 'sequence = ["viscosity", "rate"]'), ("[0.2, 0.4, 0.8]", "[0.5, 0.6, 0.8]")]
     text = preregistration(study(*edits, ("part = 1\n", ""), ('code_prefix = "V"\n', ""), more=more), "0" * 64)
-    assert "- Block rate: we report d_a for each level relative to the lowest level, calculated from" in text
-    assert "Block viscosity: d_a" not in text
+    assert "- Block “Rate”: we report d_a for each level relative to the lowest level, calculated from" in text
+    assert "Block “Viscosity”: d_a" not in text
     assert "at d_a = 1: ±" in text
 
 
 def test_a_study_of_statements_states_its_hypotheses_and_corrections() -> None:
     text = preregistration(load("rek2024"), "0" * 64)
-    assert "Hypothesis, block delays: agreement with" in text
+    assert "Hypothesis, block “Delay effect”: agreement with" in text
     assert "(comfortable) decreases with the delay." in text
-    assert "- Block liquids compares water, honey and light_oil." in text
+    assert "- Block “Baseline settings” compares water, honey and light_oil." in text
     assert "within ±1 point?" in text
     assert "above chance (statements: “like_water” for water, “like_honey” for honey and “like_oil” for" in text
     assert "Alpha is 0.05. The p values of primary statements (all) are Holm-adjusted" in text
@@ -145,9 +145,9 @@ repetitions = 18
 def test_a_study_of_d_prime_states_only_what_applies_to_it_and_its_precision_once() -> None:
     protocol = parse(DISCRIMINATION.encode(), "discrimination.toml")
     text = preregistration(protocol, "0" * 64)
-    assert "- Block prompt: how well can slime be discriminated from water (d′)?" in text
-    assert "- Block late: how well can late_slime be discriminated from late_water (d′)?" in text
-    assert "- We describe the answers to the questions in after and do not test them. We report the mean" in text
+    assert "- Block “Prompt”: how well can slime be discriminated from water (d′)?" in text
+    assert "- Block “Late”: how well can late_slime be discriminated from late_water (d′)?" in text
+    assert "- We describe the answers to the questions in “After” and do not test them. We report the mean" in text
     assert "maximum number of attempts to deliver an interval trial (3)" in text
     for other in ("threshold", "speed of the target", "delivered level", "delay difference", "Primary"):
         assert other not in text

@@ -104,7 +104,8 @@ def test_the_exclusions_and_what_was_not_completed_are_listed(rek: Results, tmp_
     assert "participant P001, session 1: fell <asleep> & left" in told
     assert "participant P002, session 1, trial 2: the phone rang" in told
     assert "1 session was not completed and therefore not analysed" in told
-    assert "Five participants (5 x). 2 of 7 were not included. Sessions on" in told
+    reasons = "(for the reasons, see “How the study was run”)"
+    assert f"Five participants (5 x). 2 of 7 were not included {reasons}. Sessions on" in told
     assert numbers(tmp_path / "report")["study"]["participants"] == 5
 
 

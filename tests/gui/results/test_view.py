@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QLabel
 from study_app import figure_style as style
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.report.study_figures import plot
-from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, TakeBack
+from study_app.analysis.worker_messages import FigureDrawn, LeaveOut, OpenKey, Progress, TakeBack
 from study_app.gui.results import figures
 from study_app.gui.results.view import NO_SAV
 from study_app.gui.widgets.controls import ActionButton
@@ -173,6 +173,12 @@ def test_unblinding_warns_of_sessions_that_go_on(place, qtbot):
     assert "cannot be undone" in said
     assert decided(qtbot, place, "AK", "closed") == OpenKey(place.view.chosen, "AK", "closed")
     assert (place.unblind.text(), place.unblind.isEnabled()) == ("Unblinding …", False)
+    place.show_view(replace(place.view, drawing=Progress("opening session 2 of 3", 0.25, stops=False)))
+    work, panel = place.figures.work, place.figures
+    assert (work.words.whole, work.bar.share, work.stop.isVisible()) == ("Opening session 2 of 3 …", 0.25, False)
+    assert panel.viewport().rect().contains(work.mapTo(panel.viewport(), work.rect().center())), (
+        "it is not scrolled out"
+    )
 
 
 def test_what_is_left_out_is_taken_back_with_a_name_and_a_reason(place, qtbot):
