@@ -184,10 +184,12 @@ POINT: Final[Style] = {
 def spread_points(places_pt: Sequence[float] | NDArray[np.float64], most_pt: float) -> NDArray[np.float64]:
     """Return an offset [pt] across the scale for each point, so that points overlap only if there is no room.
 
-    Offsets lie within ±``most_pt``; points that have room to both sides have none.
+    Offsets lie within ±``most_pt``; points that have room to both sides have none. Without room for all, points are
+    placed between others, a quarter of a point apart or more.
     """
     places, apart = np.asarray(places_pt, dtype=float), POINT["markersize"] + POINT["markeredgewidth"]
-    lanes = apart * np.array(sorted(range(-int(most_pt / apart), int(most_pt / apart) + 1), key=abs))
+    step = apart / 4
+    lanes = step * np.array(sorted(range(-int(most_pt / step), int(most_pt / step) + 1), key=abs))
     order, offsets = np.argsort(places, kind="stable"), np.zeros(len(places))
     for rank, point in enumerate(order):
         near = order[np.searchsorted(places[order], places[point] - apart) : rank]

@@ -108,13 +108,14 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     assert found.p == pytest.approx(student.sf(expected.mean / error, 5))
     least = detectable(6, tail=results.decided.alpha)[1] * error * math.log(10) * math.sqrt(6)
     not_shown = replace(results, contrasts=(replace(found, verdict="not shown"),))
-    assert any(
-        f"a mean ratio must be at least ×/÷ {math.exp(least):.2f} to be" in it for it in limits(study, not_shown)
-    )
+    detected = f"a mean ratio must be at least {math.exp(least):.2f} (or at most {math.exp(-least):.2f}) to be detected"
+    assert any(detected in it for it in limits(study, not_shown))
     page = report(delayed, tmp_path / "report", failed=pytest.fail)[0].read_text(encoding="utf-8")
     first = page[page.index('class="first"') :].replace("\u00a0", " ")
-    standard = "the liquid was damper, with varied damping at the hand (standard: 8 N·s/m) and a visual delay of 60 ms."
-    assert f"In Late, {standard}" in first
+    standard = (
+        "the liquid was “damper”, with varied damping at the hand (standard: 8 N·s/m) and a visual delay of 60 ms."
+    )
+    assert f"In the block “Late”, {standard}" in first
     asked = "Threshold is higher in Late than in Prompt, with an equivalence bound of 1.25"
     assert first.index(asked) < first.index("Prompt: ")
     assert f"; mean ratio {found.effect:.2f}, two-sided 95 % confidence interval" in first
@@ -702,8 +703,8 @@ def test_a_mean_d_prime_that_may_be_chance_is_a_limit(
     page = limits(made, replace(results, contrasts=(replace(contrast, sides=sides),)))
     lines = [line for line in page if "(chance)" in line]
     assert lines == [
-        f"Hypothesis: the interval of the mean d′ in {named} includes 0 (chance). If participants guess, a difference "
-        "in d′ cannot be detected."
+        f"Hypothesis: the interval of the mean d′ in {named} includes 0 (chance). If the participants guessed, "
+        "d′ cannot show a difference."
     ] * bool(named)
     shown = limits(made, replace(results, contrasts=(replace(contrast, sides=sides, verdict="shown"),)))
     assert not [line for line in shown if "(chance)" in line], "it has been detected"

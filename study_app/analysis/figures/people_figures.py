@@ -42,6 +42,8 @@ _GAP_PT: Final = 12.0
 _TITLE_PT: Final = 10.0
 _NAME_PT: Final = 8.6
 _HEAD_PT: Final = 38.0
+_ROOM: Final = 0.07
+"""Beyond the ends of a scale, as a share of it."""
 _SPREAD: Final = 0.16
 """How far joined points of a column are apart at most, as a share of the distance of columns."""
 _SPREAD_OF_ENDS: Final = 0.26
@@ -105,7 +107,7 @@ class Panel:
     line, bound : a number, and the ends of a range, to be marked
     log : whether the scale is logarithmic
     level : the confidence level of the intervals of means
-    ends : ends of the scale; by default from the numbers
+    ends : ends of the scale, labelled like its middle; by default from the numbers
     ticks : positions and names below the columns; by default each column's own
     """
 
@@ -336,12 +338,16 @@ def _scale(sheet: Sheet, axes: Axes, panel: Panel, of: Sequence[Panel], *, words
             factor = max((high / low) ** 0.06, 1.08)
             ends = low / factor, high * factor
         else:
-            room = 0.07 * ((high - low) or 1.0)
+            room = _ROOM * ((high - low) or 1.0)
             ends = low - room, high + room
+        ticks = scale_ticks(*ends, log=panel.log)
+    else:
+        low, high = ends
+        room, ticks = _ROOM * (high - low), [low, (low + high) / 2, high]
+        ends = low - room, high + room
     if panel.log:
         axes.set_yscale("log")
         axes.minorticks_off()
-    ticks = scale_ticks(*ends, log=panel.log)
     sheet.scale(axes, "y", ticks, [f"{tick:g}".replace("-", "−") if words else "" for tick in ticks], lines=True)
     return ends
 

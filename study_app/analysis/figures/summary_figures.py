@@ -123,7 +123,8 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
         )
         for side, group in zip(contrast.sides, contrast.contrast.groups or ("", ""), strict=True)
     )
-    panels = [Panel(columns=columns, joined=within, share=1.6, log=log)]
+    chance = 0.0 if contrast.contrast.measure == "d_prime" else None
+    panels = [Panel(columns=columns, joined=within, share=1.6, line=chance, log=log)]
     kind, sign = ("ratio", " ÷ ") if contrast.ratio else ("difference", " − ")
     if contrast.cells:
         cells = tuple(
@@ -136,7 +137,7 @@ def _hypothesis(study: Study, results: Results, contrast: ContrastResult, forms:
             for place, cell in enumerate(contrast.cells)
         )
         panels = [
-            Panel(title="Values", columns=cells, places=_CELL_PLACES, share=3.2, log=log),
+            Panel(title="Values", columns=cells, places=_CELL_PLACES, share=3.2, line=chance, log=log),
             replace(panels[0], title=f"{kind.capitalize()}: {sign.join(cell.name for cell in contrast.cells[:2])}"),
         ]
     ends = contrast.interval
@@ -260,10 +261,6 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
     return numbers
 
 
-def _with_room(low: float, high: float) -> tuple[float, float]:
-    return low - 0.06 * (high - low), high + 0.06 * (high - low)
-
-
 def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence[str], name: str) -> Picture:
     panels = [
         Panel(
@@ -271,7 +268,7 @@ def _answers(study: Study, where: str, shown: Sequence[Numbers], forms: Sequence
             columns=tuple(
                 Column(name=words, values=values, mean=mean_of(values.values())) for words, values in numbers.by_setting
             ),
-            ends=None if numbers.bounds is None else _with_room(*numbers.bounds),
+            ends=numbers.bounds,
         )
         for numbers in shown
     ]

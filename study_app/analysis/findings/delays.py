@@ -529,7 +529,7 @@ class _NoticedFrom(Finding[None]):
         ]
         members, alpha = lowest[0].members, lowest[0].steps.alpha
         criterion = f"{significant(alpha / members)} ({significant(alpha)} / {members})"
-        corrected = f" Because {counted(members, 'statement')} were tested, p must be at most {criterion}."
+        corrected = f" With {counted(members, 'statement')} tested, p ≤ {criterion} is significant."
         return (
             f"Over delays of {self.found.delays_ms[0]:g} to {ms(at)}, participants tended to rate longer delays "
             f"{listed(rated)}.{corrected * (members > 1)} They may also notice shorter delays. The test compares "
@@ -574,9 +574,11 @@ class _UnchangedUpTo(Finding[None]):
             return self.answered("not tested", f"This was not tested, because {why}.")
         at, within = common_ms(self.found), _within(against[0])
         if at is None:
+            fewest = fewest_participants(against[0].found.alpha, against[0].found.bound)
+            needed = f" (at least {fewest} participants are needed)" if self.found.n < fewest else ""
             return self.answered(
                 "inconclusive",
-                f"{_NO_DELAY.format(within)} {_largest_words(self.found, against)}{_beyond_words(against)}",
+                f"{_NO_DELAY.format(within + needed)} {_largest_words(self.found, against)}{_beyond_words(against)}",
             )
         statements = all_of(len(equivalent_up_to(against)), "statement")
         share = _not_excluded([tested.found for tested in against if tested.delay_ms <= at])

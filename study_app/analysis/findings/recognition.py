@@ -224,14 +224,14 @@ class _Distinguished(Finding[None]):
         verdicts = {test.verdict for test in (*differing, *(tested for _, tested in pairs))}
         verdicts |= {named.verdict} if named is not None and known else set()
         verdict = "shown" if "shown" in verdicts else "suggested"
-        apart = [
-            f"{name(result, first)} – {name(result, second)}".lower()
-            for (first, second), test in pairs
-            if test.verdict == verdict
-        ]
+        apart: dict[str, list[str]] = {}
+        for (first, second), test in pairs:
+            if test.verdict == verdict:
+                pair = f"between {name(result, first)} and {name(result, second)}".lower()
+                apart.setdefault(pair, []).append(f"“{short_text(result, test.item)}”")
         items = [f"“{short_text(result, one.item)}”" for one in differing if one.verdict == verdict]
         if apart:
-            text = f"Participants rated these pairs differently: {listed(list(dict.fromkeys(apart)))}."
+            text = f"Ratings differed {listed([f'{pair} ({listed(texts)})' for pair, texts in apart.items()])}."
         elif items:
             text = (
                 f"The {result.kind} were rated differently on {listed(items)}, but the tests do not show which ones "

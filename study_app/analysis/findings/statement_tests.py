@@ -425,7 +425,7 @@ class Effects(Finding[tuple[Effect, ...]]):
                     line=0.0 if over_delay else None,
                     bound=None if bound is None else (-bound, bound),
                     level=level,
-                    ends=None if over_delay else (LEVELS[0] - 0.5, LEVELS[-1] + 0.5),
+                    ends=None if over_delay else (LEVELS[0], LEVELS[-1]),
                 )
             )
         first = name(result, result.settings[0].code)

@@ -72,7 +72,9 @@ def presented_sentences(study: Study) -> dict[str, str]:
     for block in blocks:
         stimulus, reference = (block.stimulus, block.reference) if isinstance(block, LevelBlock) else (None, None)
         conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
-        liquids = [liquid.replace("_", " ") for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid]
+        liquids = [
+            f"“{liquid.replace('_', ' ')}”" for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid
+        ]
         if not liquids:
             continue
         delays = sorted({condition.delay_ms for condition in conditions if condition.delay_ms is not None})
@@ -88,7 +90,7 @@ def presented_sentences(study: Study) -> dict[str, str]:
             details.append("no visual delay")
         displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
         sentences[block.id] = (
-            f"In {quoted_title(block.title)}, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}"
+            f"In the block “{block.title}”, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}"
             f"{f', with {listed(details)}' if details else ''}{''.join(f', {words}' for words in displays)}."
         )
     return sentences

@@ -130,10 +130,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.pilot:
         yield "These are pilot sessions, so do not report them as results of the study."
     if not decided.made:
-        yield (
-            "The study file does not plan the analysis (the table [analysis] is missing), so all results are "
-            "exploratory."
-        )
+        yield ("No analysis was planned (the study file has no table [analysis]), so all results are exploratory.")
     elif decided.changed:
         yield (
             "The decisions about the analysis changed between sessions, so all results are exploratory; the decisions "
@@ -213,7 +210,9 @@ def _low_power(results: Results) -> Iterator[str]:
         if least > min(MOST_SD * sd, largest):
             yield f"{lead}: {people} are too few to find even {beyond} with {power}."
             continue
-        kind, size = ("ratio", f"×/÷ {number(math.exp(least))}") if result.ratio else ("difference", number(least))
+        kind, size = ("difference", number(least))
+        if result.ratio:
+            kind, size = "ratio", f"{number(math.exp(least))} (or at most {number(math.exp(-least))})"
         yield (
             f"{lead}: with {people} and the observed variation between them, a mean {kind} must be at least {size} to "
             f"be detected with {power}; the confidence interval shows which {kind}s remain possible."
@@ -233,8 +232,8 @@ def _near_chance(results: Results) -> Iterator[str]:
         lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
         if sides:
             yield (
-                f"{lead}: the interval of the mean d′ in {listed(sides)} includes 0 (chance). If participants guess, "
-                "a difference in d′ cannot be detected."
+                f"{lead}: the interval of the mean d′ in {listed(sides)} includes 0 (chance). If the participants "
+                "guessed, d′ cannot show a difference."
             )
 
 

@@ -51,7 +51,6 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.wording import counted, listed, with_d_z
 from study_app.errors import AnalysisError
-from study_app.number_text import capitalised
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
 from study_app.store.columns import TRIALS_MISSING
@@ -458,11 +457,16 @@ def _facts(study: Study) -> str:
     of_groups = f" ({groups})" if groups else ""
     took_part = rows["participant"].nunique()
     planned = (study.protocol.get("analysis") or {}).get("participants")
-    reasons = "(for the reasons, see “How the study was run”)"
-    differing = [f"{took_part - study.n} of {took_part} were not included {reasons}"] if took_part > study.n else []
-    differing += [f"{planned} were planned"] if planned not in (None, study.n) else []
-    others = f" {capitalised('; '.join(differing))}." if differing else ""
-    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}.{others} {when}"
+    included = "All were included"
+    if took_part > study.n:
+        included = (
+            f"{took_part - study.n} of {took_part} were not included (for the reasons, see “How the study was run”)"
+        )
+    planned_words = "" if planned is None else f"; {planned} were planned"
+    return (
+        f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}. "
+        f"{included}{planned_words}. {when}"
+    )
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:

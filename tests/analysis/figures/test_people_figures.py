@@ -177,7 +177,7 @@ def test_the_legend_of_levels_has_the_colours_of_the_bars() -> None:
 @pytest.mark.parametrize("panels", [1, 6])
 def test_participants_with_equal_numbers_can_be_told_apart(panels: int) -> None:
     values = {f"P{number:02d}": 50.0 if number < 9 else 5.0 * number for number in range(16)}
-    made = [Panel(columns=(Column(name="", values=values),), ends=(-6.0, 106.0))] * panels
+    made = [Panel(columns=(Column(name="", values=values),), ends=(0.0, 100.0))] * panels
     figure = draw_people(made, LOOK, above="").figure
     for axes in figure.axes:
         points = [axes.transData.transform(line.get_xydata())[0] * 72 / figure.dpi for line in axes.lines

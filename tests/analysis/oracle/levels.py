@@ -187,6 +187,7 @@ def _tested(compared: Compared, contrast: Numbers, trials: pd.DataFrame) -> Numb
         values, reach = held[number]["value"], stats.t.ppf(0.975, len(held[number]) - 1) * spread
         side = {"mean": scale(middle), "low": scale(middle - reach), "high": scale(middle + reach), "sd": values.std()}
         people = {str(who): scale(value) for who, value in values.items()}
+        side["standard_error"] = spread
         own |= named(f"sides.{number}", side) | named(f"sides.{number}.values", people)
     return own | _standardised([one["value"].to_numpy() for one in samples])
 

@@ -206,9 +206,11 @@ def nothing_equivalent(match: re.Match[str], told: Told) -> bool:
     """Check that not all statements are equivalent at the shortest of the delays that are compared."""
     first = min(one["delay_ms"] for one in told.against)
     at_first = [one for one in told.against if one["delay_ms"] == first]
-    bound = told.against[0]["found"]["bound"]
+    tested = told.against[0]["found"]
+    bound, least = tested["bound"], fewest(tested["alpha"], min(1 / 5, tested["bound"] / 6))
     return (
-        float(match[1]) == bound
+        match["fewest"] == (str(least) if told.block["n"] < least else None)
+        and float(match[1]) == bound
         and float(match[2]) == short_delay(told)
         and not all(one["found"]["verdict"] == "equivalent" for one in at_first)
     )
@@ -295,13 +297,15 @@ def pairs_differ(match: re.Match[str], told: Told) -> bool:
     names = {setting["code"]: name.lower() for setting, name in
              zip(told.block["settings"], told.block["names"], strict=True)}  # fmt: skip
     question = "settings differ" if len(names) == 2 else "two settings differ"
-    found: dict[str, set[str]] = {"shown": set(), "suggested": set()}
+    found: dict[str, set[tuple[str, str]]] = {"shown": set(), "suggested": set()}
     verdicts = {row["verdict"] for row in (*told.asked("settings differ"), *told.asked(question))}
     for row in told.asked(question):
         if row["verdict"] in found and float(row["p_adjusted"]) <= told.alpha:
-            found[row["verdict"]].add(" – ".join(names[code] for code in row["codes"].split()))
+            pair = " and ".join(names[code] for code in row["codes"].split())
+            found[row["verdict"]].add((pair, row["item"]))
     stated = "shown" if "shown" in verdicts or _recognition_shown(told) else "suggested"
-    return listed_in(match[1]) == found[stated]
+    told_pairs = re.findall(r"between ([^(]+) \(([^)]*)\)", match[1])
+    return {(pair, item) for pair, items in told_pairs for item in names_in(items)} == found[stated]
 
 
 def largest_of_settings(match: re.Match[str], told: Told) -> bool:
@@ -770,7 +774,7 @@ LOOKS: Final = r"(?P<looks>\d+(?:, \d+)* and \d+) participants"
 TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     # First page: delays
     (rf"Over delays of {R} to {R} ms, participants tended to rate longer delays (.*)\.", trend_is_shown),
-    (rf"Because {N} statements were tested, p must be at most {R} \({R} / (\d+)\)\.", trend_is_corrected),
+    (rf"With {N} statements tested, p ≤ {R} \({R} / (\d+)\) is significant\.", trend_is_corrected),
     (r"They may also notice shorter delays\.", always),
     (r"The test compares ranks, not mean ratings\.", always),
     (r"Agreement increases with the delay, but we could not show that participants noticed any particular delay\.",
@@ -779,7 +783,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"This is not evidence that there is no difference\.", always),
     (r"This was not tested, because [a-z].*\.", when(lambda told: not told.against)),
     (rf"We could not show for any delay that the mean answers to all statements stay within ±{R} points? of those at "
-     rf"{R} ms\.", nothing_equivalent),
+     rf"{R} ms(?: \(at least (?P<fewest>\d+) participants are needed\))?\.", nothing_equivalent),
     (r"Failing to show equivalence is not evidence that answers change\.", when(lambda told: beyond(told) == 0)),
     (r"In (\d+) of (\d+) comparisons? \(at (.*) ms\), the whole confidence interval lies outside the equivalence "
      r"bounds \(not equivalent; not corrected for the number of comparisons\)\.",
@@ -800,7 +804,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
     (r"We could not show that participants recognised any liquid above "
      r"chance\.", when(lambda told: told.block["named"]["verdict"] not in DECIDED)),
-    (r"Participants rated these pairs differently: (.*)\.", pairs_differ),
+    (r"Ratings differed (between .*)\.", pairs_differ),
     (rf"The largest mean difference from (.*) is {R} points \(({ITEM}) for (.*), 95 % confidence interval {ENDS}, "
      r"n = (\d+)\)\.", largest_of_settings),
     (r"The liquids were rated differently on (.*), but the tests do not show which ones differ\.", statements_differ),
@@ -867,8 +871,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
-    (r"The study file does not plan the analysis \(the table \[analysis\] is missing\), so all results are "
-     r"exploratory\.", when(lambda told: not told.results["decided"]["made"])),
+    (r"No analysis was planned \(the study file has no table \[analysis\]\), so all results are exploratory\.",
+     when(lambda told: not told.results["decided"]["made"])),
     (r"The decisions about the analysis changed between sessions, so all results are exploratory; the decisions from "
      r"the first session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
     (r"There is only one participant, so the results do not generalise to other people\.",

@@ -146,10 +146,10 @@ def test_the_page_says_what_each_block_presented() -> None:
     ]
     study: Any = SimpleNamespace(blocks=(), levels=blocks)
     assert presented_sentences(study) == {
-        "late": "In Liquids (late), the liquids were slime and gear oil, with a visual delay of 73 ms.",
-        "b": "In Liquids (late), the liquid was slime, with visual delays of 0 and 41 ms.",
-        "c": "In “On time”, the liquid was slime, with no visual delay, force 20 ms late.",
-        "d": "In Liquids (late), the liquid was slime, with a varied visual delay.",
+        "late": "In the block “Liquids (late)”, the liquids were “slime” and “gear oil”, with a visual delay of 73 ms.",
+        "b": "In the block “Liquids (late)”, the liquid was “slime”, with visual delays of 0 and 41 ms.",
+        "c": "In the block “On time”, the liquid was “slime”, with no visual delay, force 20 ms late.",
+        "d": "In the block “Liquids (late)”, the liquid was “slime”, with a varied visual delay.",
     }
 
 
