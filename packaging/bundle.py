@@ -8,6 +8,7 @@ Needs an environment with the extras ``analysis`` and ``bundle``. Prints the siz
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tarfile
@@ -32,7 +33,7 @@ def freeze(to: Path, work: Path) -> Path:
     """Let PyInstaller make the folder; return it."""
     words = ["--noconfirm", "--log-level", "ERROR", "--distpath", str(to), "--workpath", str(work)]
     command = [sys.executable, "-m", "PyInstaller", *words, str(HERE / f"{NAME}.spec")]
-    subprocess.run(command, check=True)
+    subprocess.run(command, check=True, env=os.environ | {"QT_QPA_PLATFORM": "offscreen"})  # the recipe draws the icon
     return to / NAME
 
 

@@ -8,9 +8,10 @@
 #     sudo packaging/windows_wine.sh http://MIRROR/debian /var/tmp/wine tests tests/store tests/session
 #
 # MIRROR is an archive of Debian packages. Without steps all are done: setup, libraries, commands, exchange, windows,
-# tests. `.venv` must exist: the step exchange verifies the results of each system on the other one.
-# Wine lacks parts of Windows' C runtime: `wine_shims.py` adds them. Tests that only Wine lets fail are in
-# `wine_known.txt`, each with its reason.
+# bundle (made by PyInstaller), trial (of the bundle, in a Windows without Python), tests (the quick tests of all folders,
+# and the slow ones of tests/store, tests/session and tests/app). `.venv` must exist: the step exchange verifies the results of
+# each system on the other one. Wine lacks parts of Windows' C runtime: `wine_shims.py` adds them. Tests that only Wine
+# lets fail are in `wine_known.txt`, each with its reason.
 set -euo pipefail
 here=$(cd "$(dirname "$0")/.." && pwd)
 mirror=$1
@@ -18,7 +19,7 @@ mkdir -p "$2"/{sdist,wheels,shots}
 folder=$(cd "$2" && pwd)
 shift 2
 . "$here/packaging/debian_root.sh"
-all=(setup libraries commands exchange windows tests)
+all=(setup libraries commands exchange windows bundle trial tests)
 steps=("${@:-${all[@]}}")
 unset PYTHONDONTWRITEBYTECODE PYTHONPATH
 export WINEPREFIX=$folder/prefix WINEARCH=win64 WINEDEBUG=-all WINEDLLOVERRIDES="mscoree,mshtml=;winedbg.exe=d"
@@ -38,7 +39,7 @@ wine() {
 }
 
 # All output goes through a pipe: Wine does not let a program use a file as its output (fstat: WinError 6).
-wine_python() { (cd "$folder/clone" && wine /usr/lib/wine/wine64 "$python" "$@" 2>&1 | tr -d '\r'); }
+wine_python() { (cd "$folder/clone" && wine /usr/lib/wine/wine64 "$python" "$@" 2>&1 | sed -u 's/\r$//'); }
 
 study() {
     LIQUID_STUDY_CONFIG='C:\study\config' LIQUID_STUDY_DATA='C:\study\data' LIQUID_STUDY_WORKSPACE='C:\study\work' \
@@ -50,15 +51,23 @@ linux_study() {
         LIQUID_STUDY_WORKSPACE=$folder/linux QT_QPA_PLATFORM=offscreen "$here/.venv/bin/python" -m study_app "$@" 2>&1
 }
 
-# expect TEXT COMMAND...: run the command; its output must contain the text.
+# make_prefix NAME: make an empty Windows in this folder.
+make_prefix() {
+    rm -rf "${folder:?}/$1"
+    (cd "$folder" && WINEPREFIX=$folder/$1 wine /usr/lib/wine/wine64 wineboot -i) >>"$folder/setup.log" 2>&1
+    cp "$folder/ucrtmath.dll" "$folder/$1/drive_c/windows/system32"
+}
+
+# expect TEXT COMMAND...: run the command; its output must contain the text. The first line with it is printed.
 expect() {
-    local text=$1 output began=$SECONDS
+    local text=$1 output line took began=${EPOCHREALTIME/./}
     shift
     output=$("$@" || true)
-    if grep -qF -- "$text" <<<"$output"; then
-        printf 'ok      %3d s  %s\n' $((SECONDS - began)) "$*"
+    took=$(((${EPOCHREALTIME/./} - began) / 100000))
+    if line=$(grep -m 1 -F -- "$text" <<<"$output"); then
+        printf 'ok      %3d.%d s  %s: %s\n' $((took / 10)) $((took % 10)) "$*" "$line"
     else
-        printf 'FAILED  %3d s  %s\n%s\n' $((SECONDS - began)) "$*" "$(tail -n 12 <<<"$output")"
+        printf 'FAILED  %3d.%d s  %s\n%s\n' $((took / 10)) $((took % 10)) "$*" "$(tail -n 12 <<<"$output")"
         failed=1
     fi
 }
@@ -104,7 +113,8 @@ extras = project["optional-dependencies"]
 left_out = ("cffconvert", "mypy", "pandas-stubs", "ruff", "taplo", "twine", "types-", "import-linter", "build", "hatchling")
 lines = [*project["dependencies"], *extras["analysis"], *extras["proofs"], *extras["test"]]
 print("\n".join(line for line in lines if not line.startswith((*left_out, "liquid-study"))))
-print("colorama\ntzdata\npywin32-ctypes")
+lines = [line for line in extras["bundle"] if line.startswith("pyinstaller")]
+print("colorama", "tzdata", "pefile", "pywin32-ctypes", *lines, sep="\n")
 END
     windows=(--platform win_amd64 --python-version 3.11 --implementation cp --only-binary=:all:)
     "$folder/tools/bin/pip" download --quiet "${windows[@]}" --find-links "$folder/wheels" -d "$folder/wheels" \
@@ -115,8 +125,9 @@ END
         --find-links "$folder/wheels" "$folder"/wheels/*.whl 2>>"$folder/setup.log"
 
     step "Wine"
-    (cd "$folder" && wine /usr/lib/wine/wine64 wineboot -i) >>"$folder/setup.log" 2>&1
-    "$folder/tools/bin/python" "$here/packaging/wine_shims.py" "$packages" "$folder/prefix/drive_c/windows/system32"
+    "$folder/tools/bin/python" "$here/packaging/wine_shims.py" \
+        "$folder/root/usr/lib/x86_64-linux-gnu/wine/x86_64-windows" "$folder/ucrtmath.dll"
+    make_prefix prefix
     du -sh "$folder"
 }
 
@@ -171,10 +182,34 @@ exchange() {
     expect "reproduced" study reproduce 'C:\study\work\results\from-linux\data\sub-P001\ses-01'
 }
 
+# wait_for COMMAND...: wait up to 3 minutes until the command succeeds, and 5 s until what it shows is painted.
+wait_for() {
+    for _ in $(seq 90); do
+        if "$@" >/dev/null 2>&1; then sleep 5 && return; fi
+        sleep 2
+    done
+    echo "FAILED  waited in vain: $*" && failed=1
+}
+
+# is_shown TITLE [NUMBER]: whether so many windows have this title.
+is_shown() { [ "$(xdotool search --onlyvisible --name "^$1\$" | wc -l)" -ge "${2:-1}" ]; }
+
+# has_event KIND [NUMBER]: whether the session's journal has so many events of this kind.
+has_event() {
+    local journals=("$studies"/work/results/demo/data/sub-P001/ses-01/journal.jsonl)
+    [ "$(grep -c "\"event\":\"$1\"" "${journals[@]}")" -ge "${2:-1}" ]
+}
+
+# begin_session: click "Start" below the checks, which may take a while.
+begin_session() { click 1263 859 && sleep 5 && has_event page_shown; }
+
+click() { xdotool mousemove "$1" "$2" click 1; }
+
 # The points are those of a screen of 1600 x 1000 without a window manager.
 windows() {
-    step "Windows: home, and a session with the mouse"
+    step "Windows: home, a new study, results, and a session with the mouse"
     unset QT_QPA_PLATFORM
+    rm -rf "$studies"/work/{protocols,results/demo,*-tables,*-report}
     if [ ! -e "/tmp/.X11-unix/X${DISPLAY#:}" ]; then
         Xvfb "$DISPLAY" -screen 0 1600x1000x24 -nolisten tcp >/dev/null 2>&1 &
         server=$!
@@ -182,33 +217,87 @@ windows() {
         sleep 3
     fi
     study >"$folder/shots/home.log" &
-    for _ in $(seq 90); do
-        xdotool search --onlyvisible --name 'Liquid Study' >/dev/null 2>&1 && break
-        sleep 2
-    done
-    sleep 15 && picture home
-    xdotool mousemove 295 407 click 1 && sleep 10 && picture new-session
-    xdotool mousemove 1075 767 click 1 && sleep 30 && picture preflight
-    xdotool mousemove 1263 859 click 1 && sleep 15 && picture instructions
-    xdotool key space && sleep 8
+    wait_for is_shown 'Liquid Study' && sleep 10 && picture home
+    xdotool key ctrl+n && sleep 20 && click 620 292 && sleep 5 # the template "Two liquids, ABX"
+    xdotool type --delay 200 'Honey or oil' && sleep 2 && picture new-study
+    click 1300 870 && sleep 20 && xdotool key ctrl+s
+    wait_for test -e "$studies/work/protocols/honeyoroil.toml" && picture designer
+    expect "Expected duration" study check honeyoroil
+    click 115 286 && sleep 60 && picture results
+    click 1291 90 && sleep 8 && xdotool key Return # Export
+    wait_for bash -c "ls '$studies'/work/*-tables/codebook.json" && picture export
+    xdotool key Escape && sleep 3 && click 1430 90 && sleep 8 && xdotool key Return # Report
+    wait_for bash -c "ls '$studies'/work/*-report/report.html" && picture report
+    xdotool key Escape && sleep 3 && xdotool key alt+Home && sleep 5
+    click 295 407 && wait_for is_shown 'New session' && picture new-session
+    click 1075 767 && wait_for is_shown 'Liquid Study' 2 && sleep 15 && picture preflight
+    wait_for begin_session && picture instructions
+    xdotool key space && wait_for has_event trial_started
     for i in $(seq 40); do xdotool mousemove $((600 + i * 37 % 500)) $((350 + i * 53 % 300)) && sleep 0.15; done
     picture trial
-    sleep 10 && picture questions
-    xdotool key 5 && sleep 1 && xdotool key 3 && sleep 1 && xdotool key Return && sleep 5
-    picture next-trial
-    journal=$(find "$studies/work/results/demo" -name journal.jsonl | head -n 1)
-    expect '"event":"response' cat "${journal:-/dev/null}"
+    wait_for has_event item_shown && picture questions
+    xdotool key 5 && sleep 1 && xdotool key 3 && sleep 1 && xdotool key Return
+    wait_for has_event responses && picture next-trial
     (cd "$folder" && wine /usr/lib/wine/wineserver -k) || true # of this prefix
     wait %% 2>/dev/null || true
     if [ -s "$folder/shots/home.log" ]; then cat "$folder/shots/home.log"; fi
 }
 
-tests() { # with cp1252, as on a German or Dutch Windows: PYTHONUTF8=1 would hide faults
-    step "Tests"
+# Starts the program of the bundle in a Windows without Python, with the folder C:\work for what it writes.
+bundled() {
+    (cd "$folder/fresh/drive_c" && WINEPREFIX=$folder/fresh LIQUID_STUDY_WORKSPACE='C:\work' \
+        wine /usr/lib/wine/wine64 'C:\liquid-study\liquid-study.exe' "$@" 2>&1 | sed -u 's/\r$//')
+}
+
+# text_of FILE NAME: print a text that a Python program of this checkout defines.
+text_of() { "$folder/tools/bin/python" -c "import runpy; print(runpy.run_path('$here/$1')['$2'])"; }
+
+first_force() { bundled -c "$(text_of tests/benchmarks/windows/first_force.py FIRST_FORCE)"; }
+
+first_session() { bundled -c "$(text_of packaging/try_in_empty_root.py SESSION)"; }
+
+pages_of_help() { bundled -c "$(text_of packaging/try_in_empty_root.py HELP)"; }
+
+bundle() {
+    step "The bundle"
     export QT_QPA_PLATFORM=offscreen
-    if [ $# -eq 0 ]; then set -- tests; fi
+    rm -rf "$folder/dist" && mkdir "$folder/dist"
+    expect "compressed" wine_python packaging/bundle.py --to "Z:${folder//\//\\}\\dist"
+}
+
+trial() {
+    step "The bundle in a Windows without Python"
+    export QT_QPA_PLATFORM=offscreen
+    make_prefix fresh
+    unzip -q "$folder/dist/liquid-study.zip" -d "$folder/fresh/drive_c"
+    mkdir -p "$folder/fresh/drive_c/work"
+    (cd "$folder/dist" && du -sm liquid-study liquid-study.zip liquid-study/liquid-study.exe)
+    expect "FileVersion" "$folder/tools/bin/python" - "$folder/dist/liquid-study/liquid-study.exe" <<'END'
+import sys, pefile
+program = pefile.PE(sys.argv[1])
+sizes = [len(program.get_data(one.directory.entries[0].data.struct.OffsetToData, one.directory.entries[0].data.struct.Size))
+         for kind in program.DIRECTORY_ENTRY_RESOURCE.entries if kind.id == pefile.RESOURCE_TYPE["RT_ICON"]
+         for one in kind.directory.entries]
+strings = {key.decode(): value.decode() for block in program.FileInfo[0] if block.Key == b"StringFileInfo"
+           for table in block.StringTable for key, value in table.entries.items()}
+print(f"{len(sizes)} icons, {strings}")
+END
+    expect "compiled 0 functions" first_force
+    expect "compiled 0 functions" first_force
+    expect "windows after" first_session
+    expect "pages" pages_of_help
+    expect "2 simulated participants" bundled rehearse demo --participants 2
+    expect "sound" bundled verify demo-rehearsal-1
+    expect "L1" bundled unblind demo-rehearsal-1 --by "Wine" --reason "a test of the bundle"
+    expect "report.html" bundled report demo-rehearsal-1 --to 'C:\work\report'
+    (cd "$folder" && WINEPREFIX=$folder/fresh wine /usr/lib/wine/wineserver -k) || true
+}
+
+# run_tests MARKERS PATH...
+run_tests() {
+    echo "-m '$1': ${*:2}"
     wine_python -X faulthandler -m pytest -q -n 2 --dist loadfile --timeout 3600 -p no:cacheprovider \
-        --continue-on-collection-errors -m "not slow and not nightly" --tb=short "$@" >"$folder/tests.log" || true
+        --continue-on-collection-errors --tb=short -m "$@" >"$folder/tests.log" || true
     tail -n 1 "$folder/tests.log"
     grep -E '^(FAILED|ERROR) ' "$folder/tests.log" | sed 's/ - .*//' | sort -u >"$folder/failed.txt" || true
     sed 's/ *#.*//' "$here/packaging/wine_known.txt" | sort -u | comm -23 "$folder/failed.txt" - >"$folder/new.txt"
@@ -218,9 +307,20 @@ tests() { # with cp1252, as on a German or Dutch Windows: PYTHONUTF8=1 would hid
     fi
 }
 
+tests() { # with cp1252, as on a German or Dutch Windows: PYTHONUTF8=1 would hide faults
+    step "Tests"
+    export QT_QPA_PLATFORM=offscreen
+    local paths=("${@:-tests}") slow=(tests/store tests/session tests/app)
+    if [ $# -gt 0 ]; then
+        mapfile -t slow < <(printf '%s\n' "$@" | grep -E '^tests/(store|session|app)(/|$)' || true)
+    fi
+    run_tests "not slow and not nightly" "${paths[@]}"
+    if [ ${#slow[@]} -gt 0 ]; then run_tests "slow and not nightly" "${slow[@]}"; fi
+}
+
 for index in "${!steps[@]}"; do
     case ${steps[index]} in
-    setup | libraries | commands | exchange | windows) "${steps[index]}" ;;
+    setup | libraries | commands | exchange | windows | bundle | trial) "${steps[index]}" ;;
     tests) tests "${steps[@]:index+1}" && break ;;
     *) echo "${steps[index]} is not a step: use ${all[*]}" && exit 2 ;;
     esac

@@ -1,12 +1,13 @@
-"""Add what Wine's C runtime lacks for numpy, scipy, numba and Rust extensions, and let the libraries use it.
+"""Give Wine the complex functions of C99, which its C runtime has only as stubs that end the program (seen in Wine 10).
 
-    python packaging/wine_shims.py SITE_PACKAGES SYSTEM32     # needs pefile, and gcc of mingw-w64 on the PATH
+    python packaging/wine_shims.py WINE_LIBRARIES DLL     # needs pefile, and gcc of mingw-w64 on the PATH
 
-Wine 8 and 10 have C99's complex functions as stubs that end the program (`ucrtbase.dll.crealf`), and Wine 8 has no
-`bcryptprimitives.dll`. Windows needs none of this. The libraries stay as published except for the name of one imported
-DLL (api-ms-win-crt-math-l1-1-0.dll becomes lsx-ms-win-crt-math-l1-1-0.dll), which forwards all other functions.
+Windows needs none of this. Programs import these functions from api-ms-win-crt-math-l1-1-0.dll, which Wine's own table
+(apisetschema.dll) resolves to ucrtbase.dll. Afterwards it resolves it to DLL, which must be copied to the folder
+system32 of each Wine prefix. DLL defines the complex functions and forwards all others to ucrtbase.dll.
 """
 
+import struct
 import subprocess
 import sys
 import tempfile
@@ -14,7 +15,7 @@ from pathlib import Path
 
 import pefile
 
-OLD, NEW = (f"{start}-ms-win-crt-math-l1-1-0.dll" for start in ("api", "lsx"))
+API_SET = "api-ms-win-crt-math-l1-1"
 PARTS = {"creal": "z.r", "cimag": "z.i", "cabs": "hypot(z.r, z.i)", "carg": "atan2(z.i, z.r)"}
 INVERSES = "acos acosh asin asinh atan atanh"
 UNARY = [f"c{name}" for name in f"{INVERSES} cos cosh exp log sin sinh sqrt tan tanh".split(" ")]
@@ -29,18 +30,6 @@ static inline D wide(F z) {D w = {z.r, z.i}; return w;}
 static inline F narrow(D z) {F w = {z.r, z.i}; return w;}
 F shim__FCbuild(float r, float i) {F z = {r, i}; return z;}
 D shim__Cbuild(double r, double i) {D z = {r, i}; return z;}
-"""
-PRNG = """
-#include <windows.h>
-BOOLEAN NTAPI SystemFunction036(PVOID, ULONG);
-__declspec(dllexport) BOOL WINAPI ProcessPrng(PBYTE data, SIZE_T size) {
-    while (size) {
-        ULONG n = size > 0x10000 ? 0x10000 : (ULONG)size;
-        if (!SystemFunction036(data, n)) return FALSE;
-        data += n; size -= n;
-    }
-    return TRUE;
-}
 """
 
 
@@ -60,46 +49,43 @@ def complex_functions() -> tuple[str, set[str]]:
     return "\n".join(lines), names | {"cpow", "cpowl", "cpowf"}
 
 
-def compile_dll(source: str, to: Path, *options: str) -> None:
-    """Compile C to a DLL."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder, "shim.c")
-        file.write_text(source, encoding="ascii", newline="\n")
-        command = ["x86_64-w64-mingw32-gcc", "-O2", "-shared", "-static-libgcc", "-o", to, file, *options]
-        subprocess.run(command, check=True)
-
-
-def patch_libraries(packages: Path, defined: set[str]) -> tuple[int, set[str]]:
-    """Rename the import in libraries that use a function in ``defined``; return their number, and all that they use."""
-    used: set[str] = set()
-    patched = 0
-    for path in (*packages.rglob("*.pyd"), *packages.rglob("*.dll")):
-        content = path.read_bytes()
-        if OLD.encode() not in content and NEW.encode() not in content:
-            continue
-        library = pefile.PE(data=content, fast_load=True)
-        library.parse_data_directories([pefile.DIRECTORY_ENTRY["IMAGE_DIRECTORY_ENTRY_IMPORT"]])
-        for entry in library.DIRECTORY_ENTRY_IMPORT:
-            names = {function.name.decode() for function in entry.imports if function.name}
-            if entry.dll.decode().lower() in (OLD, NEW) and names & defined:
-                used |= names
-                patched += 1
-                path.write_bytes(content.replace(OLD.encode(), NEW.encode()))
-    return patched, used
-
-
-def main(packages: Path, system: Path) -> None:
-    """Patch the libraries and write both DLLs."""
+def compile_dll(runtime: Path, dll: Path) -> None:
+    """Compile the complex functions to a DLL that forwards the other functions to the C runtime."""
     source, defined = complex_functions()
-    patched, used = patch_libraries(packages, defined)
-    table = [f"LIBRARY {NEW}", "EXPORTS"]
-    table += [f"  {name} = {f'shim_{name}' if name in defined else f'ucrtbase.{name}'}" for name in sorted(used)]
+    exported = {symbol.name.decode() for symbol in pefile.PE(runtime).DIRECTORY_ENTRY_EXPORT.symbols if symbol.name}
+    names = sorted(name for name in exported if name.isidentifier())  # the others are of C++
+    lines = [f"{name} = {f'shim_{name}' if name in defined else f'{runtime.stem}.{name}'}" for name in names]
     with tempfile.TemporaryDirectory() as folder:
-        exports = Path(folder, "shim.def")
-        exports.write_text("\n".join(table) + "\n", encoding="ascii", newline="\n")
-        compile_dll(source, system / NEW, str(exports))
-    compile_dll(PRNG, system / "bcryptprimitives.dll", "-ladvapi32")
-    print(f"{patched} libraries use {NEW}, which defines {len(used & defined)} of their {len(used)} functions")
+        file, exports = Path(folder, "shim.c"), Path(folder, "shim.def")
+        file.write_text(source, encoding="ascii", newline="\n")
+        exports.write_text("\n".join((f"LIBRARY {dll.name}", "EXPORTS", *lines)), encoding="ascii", newline="\n")
+        command = ["x86_64-w64-mingw32-gcc", "-O2", "-shared", "-static-libgcc", "-o", dll, file, exports]
+        subprocess.run(command, check=True)
+    print(f"{dll.name} defines {len(exported & defined)} functions and forwards {len(set(names) - defined)}")
+
+
+def redirect(schema: Path, target: str) -> None:
+    """Let the table resolve `API_SET` to ``target``, which is written behind its last text."""
+    content = bytearray(schema.read_bytes())
+    (section,) = (section for section in pefile.PE(schema).sections if section.Name.startswith(b".apiset"))
+    start, text = section.PointerToRawData, target.encode("utf-16-le")
+    _version, size, _flags, count, first = struct.unpack_from("<5I", content, start)
+    for entry in range(start + first, start + first + 24 * count, 24):
+        _flags, name, _length, hashed, values, _count = struct.unpack_from("<6I", content, entry)
+        if content[start + name : start + name + hashed].decode("utf-16-le") == API_SET:
+            struct.pack_into("<2I", content, start + values + 12, size, len(text))
+    content[start + size : start + size + len(text)] = text
+    for place in (start + 4, section.get_file_offset() + 8):  # the table's size, and the section's
+        struct.pack_into("<I", content, place, size + len(text))
+    schema.write_bytes(content)
+
+
+def main(libraries: Path, dll: Path) -> None:
+    """Compile the DLL, and change Wine's table once."""
+    compile_dll(libraries / "ucrtbase.dll", dll)
+    schema = libraries / "apisetschema.dll"
+    if dll.name.encode("utf-16-le") not in schema.read_bytes():
+        redirect(schema, dll.name)
 
 
 if __name__ == "__main__":

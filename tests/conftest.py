@@ -27,8 +27,9 @@ hypothesis.settings.register_profile("unhurried", deadline=None)
 hypothesis.settings.load_profile("unhurried")
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
-# The program's own fonts alone (Linux): what a window paints must not depend on the machine's.
+# The program's own fonts alone (on Linux, elsewhere): what a window paints must not depend on the machine's.
 os.environ["FONTCONFIG_FILE"] = str(Path(__file__).with_name("fonts.conf"))
+os.environ["QT_QPA_FONTDIR"] = str(Path(__file__).parents[1] / "study_app" / "gui" / "assets" / "fonts")
 # No test uses the settings or the workspace of this machine's user: its workspace is its working folder.
 # Set here because fixtures of modules and sessions begin before those of a test.
 os.environ["LIQUID_STUDY_CONFIG"] = str(Path(tempfile.gettempdir(), f"liquid-study-tests-{os.getpid()}", "settings"))

@@ -6,8 +6,11 @@ Every one must follow from the change of the program; one that you cannot explai
 Regenerate windows with the Qt of ``tests/gui/golden/qt_version``; commit texts and program together.
 """
 
+import ctypes
+import errno
 import os
 import re
+import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from difflib import unified_diff
@@ -23,6 +26,8 @@ CHANGING = re.compile(
 """Dates, versions, hashes and fingerprints."""
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 MASKED = re.compile(r"(?:(?<![\w.])[-−])?\d+(?:[.,:]\d+)*(?:e[+-]?\d+)?")
+MISSING = ctypes.FormatError(2).rstrip(". \r\n") if sys.platform == "win32" else os.strerror(errno.ENOENT)
+DRIVE = re.compile(r"\b[A-Z]:/")
 HEADINGS = ("== ", "-- ")
 SHOWN = 40
 """Most lines of a difference that are printed."""
@@ -30,6 +35,12 @@ TEXT_ENDS = re.compile(r" [|/] |^[-+=]+ ")
 """What separates the licence of a line."""
 CHANGED: Counter[str] = Counter()
 """How often each text was removed ("- ...") or added ("+ ...") by ``--regenerate``."""
+
+
+def as_on_linux(line: str) -> str:
+    """Return a line of Windows with the paths and the system's words of Linux."""
+    line = line.replace("WindowsPath", "PosixPath").replace("\\\\", "/").replace("\\", "/")
+    return DRIVE.sub("/", line.replace(MISSING, os.strerror(errno.ENOENT)))
 
 
 def masked(line: str) -> str:
@@ -75,8 +86,7 @@ def compare(
         kept.write_text("\n".join(found) + "\n", encoding="utf-8", newline="\n")
     expected = kept.read_text(encoding="utf-8").removesuffix("\n").split("\n")
     if os.sep == "\\":  # paths of Windows
-        found = [line.replace("WindowsPath", "PosixPath").replace("\\", "/") for line in found]
-        expected = [line.replace("\\", "/") for line in expected]
+        found, expected = [*map(as_on_linux, found)], [*map(as_on_linux, expected)]
     pairs = zip_longest(expected, found)
     alike = found == expected if exact else all(None not in pair and _alike(*pair, rel, abs_) for pair in pairs)
     if not alike:

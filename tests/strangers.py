@@ -1,6 +1,7 @@
 """Servers of this computer that hang, or send something else than what a client expects."""
 
 import itertools
+import os
 import socket
 import threading
 import time
@@ -163,7 +164,10 @@ def serving(answer: Answer, *, at_once: bool = False) -> Iterator[int]:
         yield int(listener.getsockname()[1])
     finally:
         ended.set()
-        listener.shutdown(socket.SHUT_RDWR)
+        if os.name == "posix":
+            listener.shutdown(socket.SHUT_RDWR)
+        else:  # here closing ends the call of accept
+            listener.close()
         for thread in (accepting, *threads):
             thread.join()
         listener.close()

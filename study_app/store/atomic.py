@@ -283,7 +283,9 @@ def flush_entry(path: Path) -> None:
 
 def cannot_write(path: Path, error: OSError) -> StoreError:
     """Return the one-line error for ``path``: what, why, and what to do."""
-    blocked = isinstance(error, FileExistsError | NotADirectoryError)
+    blocked = isinstance(error, FileExistsError | NotADirectoryError) or (
+        isinstance(error, FileNotFoundError) and any(map(os.path.isfile, path.parents))  # on Windows
+    )
     why = "there is a file where a folder is needed" if blocked else system_message(error)
     return StoreError(
         f"{path} cannot be written ({why}): free disk space, correct its permissions, close the program "

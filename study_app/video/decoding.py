@@ -64,7 +64,10 @@ def failure_reason(error: Exception) -> str:
         return "no data arrived in time"
     if isinstance(error, UnicodeError):  # PyAV reads a name in it
         return "the file is damaged"
-    return str(getattr(error, "strerror", None) or error or type(error).__name__)
+    reason = str(getattr(error, "strerror", None) or error or type(error).__name__)
+    if reason.startswith("Error number") and (number := getattr(error, "errno", None)):  # unknown to FFmpeg
+        return os.strerror(abs(number))
+    return reason
 
 
 def period_ns(stream: Any) -> int:

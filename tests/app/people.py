@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -125,7 +124,7 @@ class Leaver(Person):
         if participant is not None and isinstance(participant.page, TaskPage) and participant.page.trial == 2:
             with self._monkeypatch.context() as patched:
                 patched.setattr(SessionStore, "finish", lambda *_arguments, **_named: None)
-                os.kill(os.getpid(), signal.SIGTERM)
+                signal.raise_signal(signal.SIGTERM)
                 QTest.qWait(300)
         else:
             super().look()

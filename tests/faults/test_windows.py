@@ -1,6 +1,5 @@
 """Windows that are closed, by whomever: zero force, everything kept, and a last line that says how it ended."""
 
-import os
 import signal
 from pathlib import Path
 from typing import Any
@@ -98,7 +97,7 @@ def test_a_request_to_terminate_in_a_trial_interrupts_it_and_can_be_resumed(
 ) -> None:
     def watch(participant: ParticipantWindow, _operator: OperatorWindow) -> bool:
         if in_tank(participant):
-            os.kill(os.getpid(), signal.SIGTERM)
+            signal.raise_signal(signal.SIGTERM)
             return True
         return False
 

@@ -65,6 +65,8 @@ def told(window: QWidget) -> list[str]:
             continue
         kinds = (QAccessible.Text.Name, QAccessible.Text.Description, QAccessible.Text.Value)
         words = [*(interface.text(kind) for kind in kinds), part.toolTip()]
+        if isinstance(part, QComboBox):  # Windows tells its label
+            words[0] = words[2] or words[0]
         state = interface.state()
         on = [name for name in STATES if getattr(state, name)]
         if any(words):

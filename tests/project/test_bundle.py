@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from PySide6.QtGui import QColor, QImage
 
 from study_app import __version__, documentation
+from study_app.gui.theme.theme import LIGHT
 
 pytestmark = pytest.mark.slow
 
@@ -78,7 +80,9 @@ def test_with_the_newest_libraries_it_opens_a_sessions_windows_in_an_empty_root(
         subprocess.run(command, check=True, env=environment)
 
 
-def test_the_recipe_contains_the_pages_of_help(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def recipe(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, qapp: object) -> dict[str, Any]:
+    """What the recipe asks PyInstaller for: the words of Analysis and EXE."""
     hooks = types.ModuleType("PyInstaller.utils.hooks")
     hooks.copy_metadata = lambda _name: []  # type: ignore[attr-defined]
     for name in ("PyInstaller", "PyInstaller.utils"):
@@ -86,18 +90,35 @@ def test_the_recipe_contains_the_pages_of_help(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setitem(sys.modules, hooks.__name__, hooks)
     asked: dict[str, Any] = {}
 
-    def analysis(_scripts: object, **words: Any) -> Any:
-        asked.update(words)
-        return types.SimpleNamespace(pure=[], scripts=[], binaries=[], datas=words["datas"])
+    def make(*_words: object, **options: Any) -> Any:
+        asked.update(options)
+        return types.SimpleNamespace(pure=[], scripts=[], binaries=[], datas=asked["datas"])
 
-    makers = dict.fromkeys(("PYZ", "EXE", "COLLECT"), lambda *_words, **_options: None)
-    given = {"SPECPATH": str(PACKAGING), "Analysis": analysis} | makers
-    runpy.run_path(str(PACKAGING / "liquid-study.spec"), init_globals=given)
-    shipped = {(Path(to) / Path(source).name).as_posix() for source, to in asked["datas"]}
+    given = {"SPECPATH": str(PACKAGING), "workpath": str(tmp_path)}
+    runpy.run_path(
+        str(PACKAGING / "liquid-study.spec"),
+        init_globals=given | dict.fromkeys(("Analysis", "PYZ", "EXE", "COLLECT"), make),
+    )
+    return asked
+
+
+def test_the_recipe_contains_the_pages_of_help(recipe: dict[str, Any]) -> None:
+    shipped = {(Path(to) / Path(source).name).as_posix() for source, to in recipe["datas"]}
     top = documentation.folder()
-    pages = {f"study_app/docs/{name}.md" for name in documentation.names()}
+    pages = {f"study_app/docs/{path.name}" for path in top.iterdir() if path.suffix in {".md", ".txt"}}
+    pages |= {f"study_app/docs/{name}.md" for name in documentation.names()}
     pictures = {f"study_app/docs/pictures/{path.name}" for path in (top / "pictures").iterdir()}
     assert (pages | pictures) - shipped == set()
+
+
+def test_the_program_for_windows_has_an_icon_and_its_version_and_hides_its_console(recipe: dict[str, Any]) -> None:
+    icon = QImage(recipe["icon"])
+    assert (icon.width(), icon.height(), icon.pixelColor(0, 0).alpha()) == (256, 256, 0)
+    assert icon.pixelColor(128, 20) == QColor(LIGHT.accent)
+    version = Path(recipe["version"]).read_text("utf-8")
+    assert f"StringStruct('FileVersion', '{__version__}')" in version
+    assert f"filevers=({__version__.replace('.', ', ')}, 0)" in version
+    assert (recipe["console"], recipe["hide_console"]) == (True, "hide-early")
 
 
 def test_the_recipe_names_every_library_whose_version_a_receipt_or_a_report_states() -> None:

@@ -14,7 +14,7 @@ from study_app.store import unblinding
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, keep, reversals
 from study_app.store.unblinding import late_exclusions, unblind
 from study_app.store.verification.verify_study import verify_study
-from tests.platforms import files_up_to
+from tests.platforms import files_up_to, needs_links
 from tests.store.conftest import Start
 
 pytestmark = pytest.mark.slow
@@ -165,6 +165,7 @@ def test_a_list_with_an_endless_cell_is_named(folder: Path) -> None:
         exclusions(folder)
 
 
+@needs_links
 @pytest.mark.parametrize("name", ["exclusions.csv", "exclusions_reversed.jsonl"])
 def test_a_list_that_a_link_leads_out_of_the_folder_is_refused(tmp_path: Path, name: str) -> None:
     study, outside = tmp_path / "study", tmp_path / "outside"

@@ -25,7 +25,8 @@ OF_SYSTEMS = (
     "desktop.ini", "Thumbs.db", "~$x.xlsx", "x (AB's conflicted copy 2026-01-02).csv", "x (conflicted copy).csv",
     "receipt.sync-conflict-20260101-101010-ABCDEFG.json", "receipt-DESKTOP-AB12CD3.json", "journal (1).jsonl",
     "journal (Konfliktkopie von AB).jsonl", "journal_conflict-20260102-101010.jsonl", "receipt-Anna's Mac.json",
-    "journal 2.jsonl", "journal.jsonl.bak", "journal.jsonl~", "journal - Kopie.jsonl", "~WRL0001.tmp", "Icon\r",
+    "journal 2.jsonl", "journal.jsonl.bak", "journal.jsonl~", "journal - Kopie.jsonl", "~WRL0001.tmp",
+    *["Icon\r"] * (os.name == "posix"),
     "recordings/trial-001 (1).parquet", "recordings/trial-001_frames (SFConflict ab 2026).parquet",
 )  # fmt: skip
 HIDDEN = (".DS_Store", "._journal.jsonl", ".dropbox.attr", ".~lock.x.csv#")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
 import time
 from collections import deque
@@ -77,14 +79,25 @@ def camera_study(tmp_path: Path) -> Path:
     return file
 
 
-def test_a_camera_that_fails_before_its_first_frame_is_refused_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+class Unknown(Exception):
+    """An error of the system that FFmpeg does not know."""
+
+    errno, strerror = errno.EACCES, f"Error number -{errno.EACCES} occurred"
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"), [(OSError("device is busy"), "device is busy"), (Unknown(), os.strerror(errno.EACCES))]
+)
+def test_a_camera_that_fails_before_its_first_frame_is_refused_at_once(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, reason: str
+) -> None:
     def refuse(*_: Any, **__: Any) -> None:
         time.sleep(0.02)  # who opens it waits by now
-        raise OSError("device is busy")
+        raise error
 
     monkeypatch.setattr(sources, "open_video", refuse)
     began = time.perf_counter()
-    with pytest.raises(VideoError, match="v4l2:/dev/video9 cannot be used: device is busy"):
+    with pytest.raises(VideoError, match=f"v4l2:/dev/video9 cannot be used: {reason}$"):
         Camera("v4l2:/dev/video9", time.perf_counter_ns, 0.5)
     assert time.perf_counter() - began < sources.OPENS_S / 2
 

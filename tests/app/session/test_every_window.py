@@ -158,7 +158,8 @@ def test_a_window_that_comes_forward_ends_no_hold_and_the_keyboards_repetition_i
     QTest.keyPress(in_focus(bridge.participant, qtbot), ESC)
     handle = in_focus(bridge.operator, qtbot)
     QTest.keyPress(handle, ESC)  # as a window hears it that got the keyboard while the key was down
-    qtbot.waitUntil(lambda: not world.force_is_on)
+    qtbot.waitUntil(lambda: "force_stopped" in world.events())
+    assert not world.force_is_on
     assert ("force_stopped", {"by": "operator"}) in world.done
     assert world.events().count("force_stopped") == 1
 

@@ -34,7 +34,7 @@ from tests import studies
 from tests.faults.support.killer import die, forked
 from tests.faults.support.racers import race
 from tests.journal_lines import raw
-from tests.platforms import needs_fork
+from tests.platforms import needs_fork, needs_links
 from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
 
 SOURCE = (STUDY + GROUPS).encode()
@@ -191,8 +191,17 @@ def test_verify_names_entries_that_were_removed_changed_or_doubled(tmp_path: Pat
     assert errors() == ""
     assert "it will remain unused" in "\n".join(map(str, verify_study(study.path).warnings))
     (study.allocated / "\u00b2.json").write_text("{}", encoding="utf-8", newline="\n")  # a digit that int() refuses
+    assert errors() == ""
+
+
+@needs_links
+def test_an_entry_that_cannot_be_read_counts_as_changed(tmp_path: Path) -> None:
+    study = StudyFolder(tmp_path / "s")
+    with begun(study.path, "P001"):
+        pass
     (loop := study.allocated / "006.json").symlink_to(loop)
-    assert errors() == "blinding/allocated/006.json: has been changed: restore it from a backup"
+    (error,) = verify_study(study.path).errors
+    assert str(error) == "blinding/allocated/006.json: has been changed: restore it from a backup"
 
 
 def test_a_session_that_the_group_does_not_have_is_refused_before_anything_is_claimed(tmp_path: Path) -> None:

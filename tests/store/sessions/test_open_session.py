@@ -123,12 +123,11 @@ def test_an_end_that_was_half_written_is_finished_by_another_call(
     assert verify_study(store.place.study_folder.path).errors == ()
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="the system does not name open files")
 def test_while_it_runs_only_the_journal_is_waited_for_and_at_its_end_every_table(
     start: Start, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = start()
-    if sys.platform != "linux":
-        pytest.skip("the system does not name open files")
     flushed: list[Path] = []
     fsync = os.fsync
 

@@ -15,6 +15,7 @@ from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.tables import study_files
 from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import raw
+from tests.platforms import needs_links
 from tests.store.conftest import Start
 
 pytestmark = pytest.mark.slow
@@ -86,8 +87,11 @@ def into_a_link_out_of_the_study(path: Path) -> None:
     path.symlink_to(path.rename(path.parents[4] / "elsewhere"))
 
 
+LINKS = [pytest.param(turn, marks=needs_links) for turn in (into_a_link_to_itself, into_a_link_out_of_the_study)]
+
+
 @pytest.mark.parametrize("name", ["journal.jsonl", "checksums.sha256", "receipt.json"])
-@pytest.mark.parametrize("turn", [into_a_folder, into_a_link_to_itself, into_a_link_out_of_the_study])
+@pytest.mark.parametrize("turn", [into_a_folder, *LINKS])
 def test_a_file_that_cannot_be_read_hides_no_session_and_stops_none(
     tmp_path: Path, start: Start, turn: Callable[[Path], None], name: str, finished: Start
 ) -> None:

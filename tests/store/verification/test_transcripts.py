@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from tests.golden import compare
+from tests.platforms import needs_links
 from tests.store.verification.played_studies import STARTS, player
 from tests.transcripts import every, played
 
@@ -17,6 +18,8 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+@pytest.mark.parametrize(
+    "file", [pytest.param(file, marks=[needs_links] * (file.stem == "links"), id=file.stem) for file in FILES]
+)
 def test_what_is_found(file: Path, made: dict[str, Path], tmp_path: Path, pytestconfig: pytest.Config) -> None:
     compare(file, played(file, player(made, tmp_path)), pytestconfig)

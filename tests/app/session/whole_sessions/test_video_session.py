@@ -98,9 +98,7 @@ def test_a_camera_that_is_not_there_is_refused(study: Path, run: Any, results: P
         study.read_text("utf-8").replace(f'view = "{NAME}"', 'view = "camera"'), encoding="utf-8", newline="\n"
     )
     workstation.save_settings(MachineSettings(camera="tcp://127.0.0.1:9"))
-    with pytest.raises(
-        SessionError, match=r"video: the camera tcp://127\.0\.0\.1:9 cannot be used: Connection refused"
-    ):
+    with pytest.raises(SessionError, match=r"video: the camera tcp://127\.0\.0\.1:9 cannot be used: (?!Error number)"):
         run()
     assert not results.exists()
 

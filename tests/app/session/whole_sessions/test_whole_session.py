@@ -1,7 +1,6 @@
 """The command's way into a session, with real windows, servo and store, without a screen."""
 
 import json
-import os
 import shutil
 import signal
 import threading
@@ -16,6 +15,7 @@ from PySide6.QtTest import QTest
 from study_app import app
 from study_app.app import failures
 from study_app.app.session import live_session
+from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
 from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.operator.window import OperatorWindow
@@ -79,14 +79,14 @@ class Manager:
         self.hint = hint
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, None], ids=str)
+@pytest.mark.parametrize("number", [*ENDING_SIGNALS, None], ids=str)
 def test_a_signal_or_a_log_off_leaves_the_session_unfinished_and_resumable(short_demo, results, monkeypatch, number):
     class Application(QObject):
         asked = Signal(object)
 
     source, manager = Application(), Manager()
     monkeypatch.setattr(failures, "log_off_signal", lambda: source.asked)
-    before = signal.getsignal(number or signal.SIGHUP)
+    before = signal.getsignal(number or signal.SIGTERM)
 
     def suspend_and_end(_participant):
         if hasattr(signal, "SIGTSTP"):
@@ -94,14 +94,14 @@ def test_a_signal_or_a_log_off_leaves_the_session_unfinished_and_resumable(short
         if number is None:
             source.asked.emit(manager)
         else:
-            os.kill(os.getpid(), number)
+            signal.raise_signal(number)
 
     code, lines = attended(short_demo, results, Person(once=suspend_and_end), device="mouse")
     assert code == 128 + (number or 1)
     assert hasattr(manager, "hint") == (number is None)
     assert lines[-1] == f"session not finished: {results / 'data' / 'sub-P001' / 'ses-01'}"
     assert can_go_on(short_demo, results)
-    assert signal.getsignal(number or signal.SIGHUP) is before
+    assert signal.getsignal(number or signal.SIGTERM) is before
     assert window(OperatorWindow) is None
 
 
@@ -182,7 +182,7 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
     def look(participant):
         corner = participant.grab().toImage().pixelColor(2, 2).name()
         seen.extend((participant.isFullScreen(), participant.frame_px > 0, corner, participant.windowTitle()))
-        os.kill(os.getpid(), signal.SIGTERM)
+        signal.raise_signal(signal.SIGTERM)
 
     person = Person(once=look)
     app.run(short_demo, participant="test", pilot=True)
@@ -196,7 +196,7 @@ def test_a_pilot_is_marked_framed_and_kept_apart(short_demo, tmp_path, monkeypat
 
 def test_the_preflight_is_told_before_anything_is_created(short_demo, results):
     told = []
-    person = Person(once=lambda _participant: os.kill(os.getpid(), signal.SIGTERM))
+    person = Person(once=lambda _participant: signal.raise_signal(signal.SIGTERM))
     attended(short_demo, results, person, progress=lambda line: told.append((line, results.exists())))
     *before, (last, _) = told
     assert last.startswith("session not finished: ")

@@ -17,6 +17,7 @@ from study_app.devices.falcon.failures import FURTHER_KINDS, KINDS, FalconNotFou
 from study_app.devices.falcon.transport import FtdiTransport, PyUsbTransport, libusb_calls, open_transport
 from tests.devices.falcon.support.bridges import Backend, D2xx, both
 from tests.golden import compare
+from tests.platforms import needs_posix
 
 GOLDEN = Path(__file__).parents[1] / "golden"
 
@@ -141,7 +142,7 @@ def ftdi(recorded: Recorded) -> None:
     recorded("write", library, transport.write, b"a", 1.0)
 
 
-@pytest.mark.parametrize("scenario", [opening, transfers, ftdi])
+@pytest.mark.parametrize("scenario", [opening, pytest.param(transfers, marks=needs_posix), ftdi])
 def test_calls(scenario: Callable[[Recorded], None], pytestconfig: pytest.Config) -> None:
     recorded = Recorded()
     scenario(recorded)
