@@ -51,6 +51,7 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.wording import counted, listed, with_d_z
 from study_app.errors import AnalysisError
+from study_app.number_text import capitalised
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
 from study_app.store.columns import TRIALS_MISSING
@@ -457,16 +458,14 @@ def _facts(study: Study) -> str:
     of_groups = f" ({groups})" if groups else ""
     took_part = rows["participant"].nunique()
     planned = (study.protocol.get("analysis") or {}).get("participants")
-    included = "All were included"
+    notes = ["all were included"] if study.n == took_part > 1 else []
     if took_part > study.n:
-        included = (
+        notes = [
             f"{took_part - study.n} of {took_part} were not included (for the reasons, see “How the study was run”)"
-        )
-    planned_words = "" if planned is None else f"; {planned} were planned"
-    return (
-        f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}. "
-        f"{included}{planned_words}. {when}"
-    )
+        ]
+    notes += [] if planned is None else [f"{planned} were planned"]
+    others = f" {capitalised('; '.join(notes))}." if notes else ""
+    return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}.{others} {when}"
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:
