@@ -24,9 +24,10 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, label
-from study_app.number_text import capitalised
+from study_app.number_text import capitalised, counted
 from study_app.protocol.source.document import Path, names, places_of
 from study_app.protocol.source.problems import Fault
+from study_app.protocol.warnings.untranslated import untranslated_texts
 from study_app.protocol.wording.languages import language_name
 
 _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
@@ -66,11 +67,14 @@ def problem_rows(study: Study) -> tuple[ProblemRow, ...]:
     """
     rows = [row for row in fault_rows(study) if not study.is_unfinished(row.fault)]
     missing = Counter(row.fault.missing_language for row in rows if row.fault.kind == "no text")
+    copied = Counter(text.language for text in untranslated_texts(study.document))
     shown: dict[object, ProblemRow] = {}
     for row in rows:
         code = row.fault.missing_language
         if row.fault.kind == "no text" and missing[code] > 1:
             message = f"{missing[code]} texts are missing in {language_name(code)}"
+            if code in copied:
+                message += f", and {counted(copied[code], 'copied text')} must be translated"
             fault, name = row.fault._replace(message=message, hint=""), f"Texts in {language_name(code)}"
             listed = replace(
                 row, element=STUDY_LANGUAGES, name=name, icon="list", message=message, hint="", fault=fault

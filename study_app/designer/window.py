@@ -8,6 +8,7 @@ from typing import Any
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
 from PySide6.QtGui import QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractScrollArea, QAbstractSlider, QApplication, QSizePolicy, QStackedWidget, QWidget
+from shiboken6 import isValid
 
 from study_app.designer.document.steps import (
     Do,
@@ -256,6 +257,7 @@ class _Arrangement(QWidget):
         self.side = "form"
         self.used: QWidget = form
         self.drawer = False
+        self._before_drawer: QWidget | None = None
         self._width = DRAWER_BELOW
         self.path = _PathBar()
         self.path.outline_asked.connect(self.toggle_drawer)
@@ -305,6 +307,7 @@ class _Arrangement(QWidget):
 
     def focus_outline(self) -> None:
         if self.drawer:
+            self._before_drawer = self.window().focusWidget() if not self.outline.isVisible() else self._before_drawer
             self._place_drawer()
             self.outline.show()
             self.outline.raise_()
@@ -321,11 +324,14 @@ class _Arrangement(QWidget):
             self.focus_outline()
 
     def close_drawer(self) -> None:
-        """Close the drawer, if there is one; its button gets the focus."""
+        """Close the drawer, if there is one; the keyboard returns to where it was, otherwise to the drawer's button."""
         if self.drawer and self.outline.isVisible():
             had = self.outline.isAncestorOf(self.window().focusWidget() or self)
             self._hide_drawer()
-            if had:
+            before = self._before_drawer
+            if had and before is not None and isValid(before) and before.isVisible():
+                before.setFocus(Qt.FocusReason.OtherFocusReason)
+            elif had:
                 self.path.outline.setFocus(Qt.FocusReason.OtherFocusReason)
 
     def _follow_focus(self, _left: QWidget | None, now: QWidget | None) -> None:

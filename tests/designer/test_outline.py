@@ -271,6 +271,18 @@ def test_a_click_in_the_drawer_leads_to_the_form_and_leaves_what_is_open(qtbot: 
     assert ("blocks", "liquids") not in expanded(small)
 
 
+def test_escape_in_the_drawer_returns_the_keyboard_to_the_field(qtbot: Any, small: Any) -> None:
+    small.editing.select(("blocks", "liquids"))
+    before = small.form_row("blocks", "liquids", "repetitions").field.focusProxy()
+    before.setFocus()
+    for _ in range(2):
+        open_drawer(qtbot, small)
+        assert small.place.outline.isAncestorOf(small.keyboard)
+        small.hit("Escape")
+        assert small.keyboard is before
+        assert not small.place.outline.isVisible()
+
+
 def test_a_step_of_the_path_keeps_the_keyboard_when_it_is_clicked_after_an_id_was_typed(designer: Any) -> None:
     designer.open("kitchen", "conditions", "thin", width=1366)
     designer.fill(designer.place.form.head.id, "thinner")

@@ -127,7 +127,7 @@ def test_missing_texts_are_one_problem_that_lists_them_and_enter_leads_to_the_ne
     missing = [fault.path for fault in designer.study.faults]
     designer.hit("F8")
     (problem,) = designer.place.problems.problems
-    assert problem.message == f"{len(missing)} texts are missing in French"
+    assert problem.message == f"{len(missing)} texts are missing in French, and 3 copied texts must be translated"
     listed = [row.row.path for row in designer.place.form.rows]
     assert set(missing) <= set(listed)
     texts = designer.form_row("questionnaires", "nasa_tlx", "items", 0, "text").field.lines
