@@ -360,7 +360,7 @@ def names(story: Story) -> None:
     story.expect("1 place updated", selected="pages.goodbye", at="ID", undo="Rename to goodbye, 1 place updated")
     story.has('sequence = ["welcome", "liquids", "reaching", "delays", "goodbye"]', "[pages.goodbye]")
     story.ask(AddElement(("blocks",)))
-    story.expect(selected="blocks.block", undo="Add block", at="Add to Conditions")
+    story.expect(selected="blocks.block", undo="Add block", at="ID")
     story.press("Add Title")
     first_text()
     story.play("'Sec' 'ond' ' part'")
@@ -683,7 +683,7 @@ def tab_key(story: Story) -> None:
             designer.hit("Tab")
         return [name for name, _ in groupby(entered)]
 
-    assert areas(78) == ["header", "banner", "outline", "question", "form", "views", "problems"]
+    assert areas(76) == ["header", "banner", "outline", "question", "form", "views", "problems"]
     story.act("answer", place.prompt.cancel.click)
     story.act("smaller", lambda: designer.window.resize(1366, 800))
     assert areas(30) == ["header", "banner", "path", "form"]
