@@ -523,9 +523,11 @@ class _NoticedFrom(Finding[None]):
         at = min(one.over_all_ms or 0.0 for one in lowest)
         rated = [
             f"{'higher' if correlation > 0 else 'lower'} on “{short_text(self.found, one.item)}” "
-            f"(mean rank correlation {number(correlation)}, {p_equals(trend.p or 0.0)}, n = {trend.n})"
+            f"(mean rank correlation {number(correlation)}, {p_equals(trend.p)}, n = {trend.n})"
             for one in lowest
-            if one.over_all_ms == at and (correlation := self._correlation(one, trend := one.trend_up_to(at)))
+            if one.over_all_ms == at
+            and (trend := one.trend_up_to(at)).p is not None
+            and (correlation := self._correlation(one, trend))
         ]
         members, alpha = lowest[0].members, lowest[0].steps.alpha
         criterion = f"{significant(alpha / members)} ({significant(alpha)} / {members})"

@@ -23,7 +23,7 @@ from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.analysis.wording import bound_text, counted, listed, percent, significant
 from study_app.errors import AnalysisError
-from study_app.protocol.blocks import Block, display_language
+from study_app.protocol.blocks import Block, block_titles, display_language
 from study_app.protocol.describe import describe, limit_rows
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Analysis, Contrast, Protocol
@@ -106,10 +106,10 @@ def _language(protocol: Protocol) -> str:
 
 
 def _title(protocol: Protocol, block: str) -> str:
-    """Return the title of a block in quotation marks, followed by its ID if another block has this title."""
-    titles = {name: protocol.text(other.title, _language(protocol)) for name, other in protocol.blocks.items()}
-    repeated = list(titles.values()).count(titles[block]) > 1
-    return f"“{titles[block]}”{f' ({block})' if repeated else ''}"
+    """Return the title of a block in quotation marks, with its ID if another block has this title."""
+    blocks = {name: {"phase": other.phase, "title": other.title} for name, other in protocol.blocks.items()}
+    titles = block_titles({"study": {"languages": protocol.study.languages}, "blocks": blocks})
+    return f"“{titles[block]}”"
 
 
 def _form_title(protocol: Protocol, form: str) -> str:
@@ -194,7 +194,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
         return
     at = f" at {listed([f'{standard:g}' for standard in standards])} {unit}".rstrip() if standards else ""
     kind = "Weber fraction" if stimulus.level_kind == "weber" else "threshold"
-    yield (f"Block {title}: what is the {kind} for {what}{at}? We report an estimate with a 95 % interval but no test.")
+    yield f"Block {title}: what is the {kind} for {what}{at}? We report an estimate with a 95 % interval but no test."
     if len(standards) > 1:
         yield (
             f"Block {title}: is the just-noticeable difference proportional to the standard (exponent 1, Weber's "
