@@ -756,10 +756,14 @@ class _Described(NamedTuple):
 def _described(results: Results, contrast: ContrastResult) -> Iterator[_Described]:
     for side in contrast.sides:
         name = _row_words(results, contrast, side.name)
-        yield _Described(name, [*side.values.values()], side.mean, side.sd, side.standard_error)
+        yield _Described(
+            name=name, values=[*side.values.values()], mean=side.mean, sd=side.sd, standard_error=side.standard_error
+        )
     if differences := [*contrast.differences.values()]:
         name = _row_words(results, contrast, contrast.comparison)
-        yield _Described(name, differences, contrast.effect, contrast.sd, contrast.standard_error)
+        yield _Described(
+            name=name, values=differences, mean=contrast.effect, sd=contrast.sd, standard_error=contrast.standard_error
+        )
 
 
 _DIRECTIONS: Final = {"difference": "differences are first minus second", "ratio": "ratios are first divided by second"}

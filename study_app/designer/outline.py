@@ -225,7 +225,7 @@ _EXCLUSION: Final = Addable(
     icon="bars",
     asks=AddElement(EXCLUSIONS),
     help="Proposes to exclude sessions with constant or fast answers, answers below chance, or thresholds beyond the "
-    "levels. Catch trials exclude sessions by a rule of their own: add them to a block with levels.",
+    "levels. Catch trials exclude sessions by a separate rule: add them to a block with levels.",
 )
 
 

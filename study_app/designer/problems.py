@@ -105,11 +105,11 @@ def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
     rows = [_problem_row(study, fault, places.line(fault.path)) for fault in study.faults]
     orders = {element: key_order(study.document, element) for element in {row.element for row in rows}}
 
-    def place(row: ProblemRow) -> tuple[int, int, int]:
+    def field_order(row: ProblemRow) -> int:
         key = str(row.fault.path[len(row.element)]) if len(row.fault.path) > len(row.element) else ""
-        return places.line(row.element) or 0, orders[row.element].get(key, -1), row.line or 0
+        return orders[row.element].get(key, -1)
 
-    return tuple(sorted(rows, key=place))
+    return tuple(sorted(rows, key=lambda row: (places.line(row.element) or 0, field_order(row), row.line or 0)))
 
 
 def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ...]:

@@ -871,7 +871,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
-    (r"No analysis was planned \(the study file has no table \[analysis\]\), so all results are exploratory\.",
+    (r"No analysis was planned \(the table \[analysis\] is missing\), so all results are exploratory\.",
      when(lambda told: not told.results["decided"]["made"])),
     (r"The decisions about the analysis changed between sessions, so all results are exploratory; the decisions from "
      r"the first session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
