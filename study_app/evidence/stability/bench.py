@@ -24,6 +24,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.plant import new_handle, new_schedule
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Scene
@@ -55,6 +56,7 @@ class Bench:
         limits: DampingLimits | None = None,
         scene: Scene | None = None,
         dynamics: Dynamics | None = None,
+        rules: ForceRules = CURRENT,
     ) -> None:
         self.safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
         self.safety[0].fade, self.safety[0].fade_s = 1.0, 0.0
@@ -94,7 +96,9 @@ class Bench:
             quantum_m=case.quantum_um * 1e-6,
             **device,
         )
-        self.model: Model = pack(scene or scene_of(case), limits=limits, dynamics=dynamics or _dynamics_of(case))
+        self.model: Model = pack(
+            scene or scene_of(case), limits=limits, dynamics=dynamics or _dynamics_of(case), rules=rules
+        )
         self.pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
         self.sample = records(SAMPLE, 1)
 

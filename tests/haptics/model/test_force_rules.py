@@ -41,6 +41,7 @@ def test_released_versions_keep_their_numbers():
         "shaken_reversal_s": 0.06,
         "trusts_gaps": 0.0,
     }
+    assert VERSIONS[8]._asdict() == {**VERSIONS[7]._asdict(), "version": 8, "known_force_ticks": 0}
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():
