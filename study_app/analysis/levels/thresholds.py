@@ -617,8 +617,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
                 yield f"{title}: {words} ({_named_people(own, some)})."
         if some := [estimate for estimate in own if estimate.open_end]:
             yield (
-                f"{title}: the answers do not determine one or both ends of the 95 % interval, marked “<” or “>” "
-                f"({_named_people(own, some)})."
+                f"{title}: the answers do not determine one or both ends of the 95 % interval, marked “<” or “>” in "
+                f"the table ({_named_people(own, some)})."
             )
         for row in self.rows:
             if row.participant is None and row.learned:

@@ -88,10 +88,12 @@ def presented_sentences(study: Study) -> dict[str, str]:
             details.append(delay)
         elif has_delays:
             details.append("no visual delay")
+        design = f" ({block.design.paper_name})" if isinstance(block, LevelBlock) else ""
         displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
         sentences[block.id] = (
-            f"In the block “{block.title}”, the liquid{'s were' if len(liquids) > 1 else ' was'} {listed(liquids)}"
-            f"{f', with {listed(details)}' if details else ''}{''.join(f', {words}' for words in displays)}."
+            f"In the block “{block.title}”{design}, the liquid{'s were' if len(liquids) > 1 else ' was'} "
+            f"{listed(liquids)}{f', with {listed(details)}' if details else ''}"
+            f"{''.join(f', {words}' for words in displays)}."
         )
     return sentences
 
@@ -116,7 +118,7 @@ def cards(
     ``numbers`` are those of `numbers_of` and ``presented`` those of `presented_sentences`.
     """
     levels = _levels(results, presented)
-    return (*_hypotheses(results, presented), *_statements(results), *levels, *_questions(results, numbers))
+    return (*_hypotheses(results, presented), *_statements(results, presented), *levels, *_questions(results, numbers))
 
 
 def _hypotheses(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
@@ -157,18 +159,21 @@ def _cell_words(contrast: ContrastResult) -> Iterator[str]:
             yield f"Mean{'s' * (len(means) > 1)} in the group {group} (95 % intervals): {listed(means)}."
 
 
-def _statements(results: Results) -> Iterator[Card]:
+def _statements(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
+    told = {block for contrast in results.contrasts for block in contrast.contrast.blocks}
     findings = {finding.key: finding for finding in all_findings() if finding.question}
     kinds = {block.id: block.kind for block in results.blocks}
     for given in answers(results):
         finding = findings[given.question]
+        new = () if given.block in told else filter(None, [presented.get(given.block)])
         yield Card(
             question=f"{given.title}: {finding.question.format(kind=kinds[given.block])}",
             verdict=given.verdict,
-            sentences=(given.text,),
+            sentences=(given.text, *new),
             block=given.block,
             figures=finding.answer_figures,
         )
+        told.add(given.block)
     for result in results.blocks:
         if result.n and len(result.names) == 1:
             yield Card(

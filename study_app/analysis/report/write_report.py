@@ -3,6 +3,7 @@
 import hashlib
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, fields, is_dataclass
 from functools import partial
@@ -56,12 +57,13 @@ from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
 from study_app.store.columns import TRIALS_MISSING
 from study_app.store.csv_files import Column, csv_bytes, optional
+from study_app.store.exclusions import MISSING_RULE
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import MANIFEST, folders_of
 from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
 from study_app.store.study_runs import recorded_contents
-from study_app.store.unblinding import reveals_of
+from study_app.store.unblinding import CATCH_RULE, reveals_of
 from study_app.workers.forked import Forked
 
 _OF_FORMAT_2: Final = {
@@ -460,12 +462,34 @@ def _facts(study: Study) -> str:
     planned = (study.protocol.get("analysis") or {}).get("participants")
     notes = ["all were included"] if study.n == took_part > 1 else []
     if took_part > study.n:
-        notes = [
-            f"{took_part - study.n} of {took_part} were not included (for the reasons, see “How the study was run”)"
-        ]
+        notes = [f"{took_part - study.n} of {took_part} were not included ({_why_not_included(study)})"]
     notes += [] if planned is None else [f"{planned} were planned"]
     others = f" {capitalised('; '.join(notes))}." if notes else ""
     return f"Study {study.name}, {version_words(study)}. {people[:1].upper()}{people[1:]}{of_groups}.{others} {when}"
+
+
+_WHY: Final = {
+    "below_chance": "answers below chance",
+    "threshold_beyond_levels": "thresholds beyond the levels",
+    "constant_answers": "constant answers",
+    "fast_answers": "fast answers",
+    CATCH_RULE: "errors in catch trials",
+    MISSING_RULE: "trials that could not be delivered",
+}
+
+
+def _why_not_included(study: Study) -> str:
+    """Return the number of participants without an included session, by reason."""
+    rows = study.participants
+    absent = rows[~rows["participant"].isin(study.people)]
+    rules = {row.participant: row.rule_or_person for row in study.exclusions if row.trial is None}
+    excluded = set(absent.loc[absent["excluded"], "participant"])
+    why = [
+        _WHY.get(rules.get(person, ""), "a researcher's decision") if person in excluded else "unfinished session"
+        for person in sorted(set(absent["participant"]))
+    ]
+    counts = ", ".join(f"{words}: {count}" for words, count in Counter(why).most_common())
+    return f"{counts}; see “How the study was run”"
 
 
 def _marks(study: Study) -> list[tuple[str, str]]:

@@ -136,20 +136,30 @@ def test_the_page_says_what_each_block_presented() -> None:
         return Setting(code="L1", condition="c", liquid=liquid, delay_ms=delay_ms, link=link)
 
     settings = (presented(("slime", 73.0)),)
-    late = LevelBlock("late", "Liquids (late)", "main", default_design("abx"), None, settings)
+    late = LevelBlock("late", "Liquids late", "main", default_design("abx"), None, settings)
     blocks = [
         replace(late, reference=presented(("gear_oil", 73.0))),
         replace(late, id="b", settings=(presented(("slime", 0.0)), presented(("slime", 41.0)))),
         replace(late, id="c", title="On time", settings=(presented(("slime", 0.0), link="force 20 ms late"),)),
-        replace(late, id="d", settings=(Setting(code="L1", condition="8/1", of=presented(("slime", None))),)),
+        replace(
+            late,
+            id="d",
+            design=default_design("2ifc"),
+            settings=(Setting(code="L1", condition="8/1", of=presented(("slime", None))),),
+        ),
         replace(late, id="e", settings=(Setting(code="L1"),)),
     ]
     study: Any = SimpleNamespace(blocks=(), levels=blocks)
     assert presented_sentences(study) == {
-        "late": "In the block “Liquids (late)”, the liquids were “slime” and “gear oil”, with a visual delay of 73 ms.",
-        "b": "In the block “Liquids (late)”, the liquid was “slime”, with visual delays of 0 and 41 ms.",
-        "c": "In the block “On time”, the liquid was “slime”, with no visual delay, force 20 ms late.",
-        "d": "In the block “Liquids (late)”, the liquid was “slime”, with a varied visual delay.",
+        "late": (
+            "In the block “Liquids late” (ABX), the liquids were “slime” and “gear oil”, with a visual delay of 73 ms."
+        ),
+        "b": "In the block “Liquids late” (ABX), the liquid was “slime”, with visual delays of 0 and 41 ms.",
+        "c": "In the block “On time” (ABX), the liquid was “slime”, with no visual delay, force 20 ms late.",
+        "d": (
+            "In the block “Liquids late” (two-interval forced choice), the liquid was “slime”, with a varied visual "
+            "delay."
+        ),
     }
 
 

@@ -104,9 +104,26 @@ def test_the_exclusions_and_what_was_not_completed_are_listed(rek: Results, tmp_
     assert "participant P001, session 1: fell <asleep> & left" in told
     assert "participant P002, session 1, trial 2: the phone rang" in told
     assert "1 session was not completed and therefore not analysed" in told
-    reasons = "(for the reasons, see “How the study was run”)"
+    reasons = "(a researcher's decision: 1, unfinished session: 1; see “How the study was run”)"
     assert f"Five participants (5 x). 2 of 7 were not included {reasons}. Sessions on" in told
     assert numbers(tmp_path / "report")["study"]["participants"] == 5
+
+
+@pytest.mark.usefixtures("figures_of_the_page")
+def test_the_page_begins_with_the_number_of_participants_who_were_not_included_by_reason(
+    small: Results, tmp_path: Path
+) -> None:
+    answered_by_two(small)
+    decisions = (("catch", ""), ("AK", "fast_answers"), ("catch", ""), ("BL", ""), ("missing", ""))
+    for number, (by, rule) in enumerate(decisions, start=3):
+        small.add(f"P00{number}", lambda _condition, _item: 4)
+        exclude(small.folder, f"P00{number}", 1, by=by, rule=rule, reason="a reason")
+    small.open()
+    report(small.folder, tmp_path / "report")
+    reasons = (
+        "errors in catch trials: 2, fast answers: 1, a researcher's decision: 1, trials that could not be delivered: 1"
+    )
+    assert f"Two participants (2 x). 5 of 7 were not included ({reasons}; see “How" in read(tmp_path / "report")
 
 
 def test_an_exclusion_that_was_reversed_is_told_with_both_persons_and_reasons(small: Results) -> None:
