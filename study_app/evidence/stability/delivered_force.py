@@ -1,8 +1,8 @@
 """The force that acts on the hand, after the device's delay, against the law on the handle's true motion.
 
 An arm that holds a handle through its tissue (`closed_loop.Arm`) follows a sine and random motion at 1 kHz, each with
-the power of ±20 mm; the force moves arm and handle, so the handle itself moves less. The law is the same scene on the
-handle's true motion, with exact velocities. Buoyancy, which needs no velocity, is left out.
+the power of ±20 mm, and repeated reaches; the force moves arm and handle, so the handle itself moves less. The law is
+the same scene on the handle's true motion, with exact velocities. Buoyancy, which needs no velocity, is left out.
 
 - *error*: RMS of acting force less law over RMS of the law;
 - *least*: the error of the best linear estimator for this random motion: least squares of the law at the time when the
@@ -26,7 +26,7 @@ from study_app.evidence.reference_solutions import with_effects, without_buoyanc
 from study_app.evidence.stability.bench import DIRECTION, Bench, law_along, sine_path
 from study_app.evidence.stability.case_groups import peak_mps
 from study_app.evidence.stability.stability_cases import DAMPER, SECOND, SINE, Case, scene_of, scenes
-from study_app.evidence.stability.velocity import COUNT_M, WHOLE, random_path
+from study_app.evidence.stability.velocity import COUNT_M, WHOLE, Stroke, random_path
 from study_app.evidence.table import Evidence, Table, run
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Effect, Scene
@@ -43,6 +43,7 @@ _LASTS_S: Final = 8.0
 _SETTLED_S: Final = 3.0
 _TAPS: Final = (*range(200), *range(200, 1200, 40))
 """Ages [ticks] of the positions that the best linear estimator uses."""
+_REACH: Final = Stroke(0.03, reach_s=0.3)
 _EVERY: Final = 2
 """Only every second row is fitted."""
 
@@ -60,7 +61,8 @@ class Delivered(NamedTuple):
     """The acting force of one liquid in one loop; errors and proportions in %.
 
     ``parts`` are the proportions of the law's parts on the sine, ``withheld`` that of the force held back by the safety
-    layer, ``least`` the error of the best linear estimator on the random motion.
+    layer, ``least`` the error of the best linear estimator on the random motion, ``reach`` the error in repeated
+    reaches of 60 mm in 0.3 s (only with the frequency 1.6 Hz).
     """
 
     case: Case
@@ -70,6 +72,13 @@ class Delivered(NamedTuple):
     least: float
     parts: Mapping[str, float]
     withheld: float
+    reach: float | None = None
+
+    @property
+    def values(self) -> Mapping[str, float]:
+        """The quantities that may have limits, by name [%]."""
+        reach = {} if self.reach is None else {"reach": self.reach}
+        return {"sine": self.sine, "random": self.random, "least": self.least, **reach, **self.parts}
 
     @property
     def limits(self) -> Mapping[str, _Range]:
@@ -86,7 +95,7 @@ class Delivered(NamedTuple):
         if quick:
             limits["drag"] = (70.0, 130.0) if honey else (80.0, 120.0)
         else:
-            limits["inertia"] = (85.0, 115.0)
+            limits |= {"inertia": (85.0, 115.0), "reach": (0.0, error)}
             if case.delay in {1, 3}:
                 limits["random"] = (0.0, self.least * (2.0 if name in _THICK else 1.5))
         return limits
@@ -94,8 +103,7 @@ class Delivered(NamedTuple):
     @property
     def exceeded(self) -> tuple[str, ...]:
         """The quantities outside their permitted range."""
-        values = {"sine": self.sine, "random": self.random, **self.parts}
-        return tuple(name for name, (low, high) in self.limits.items() if not low <= values[name] <= high)
+        return tuple(name for name, (low, high) in self.limits.items() if not low <= self.values[name] <= high)
 
 
 @cache
@@ -143,6 +151,7 @@ def delivered(
         least=random.least,
         parts=sine.parts,
         withheld=sine.withheld,
+        reach=error_in_reaches(case, scene) if frequency_hz == WHOLE.frequency_hz else None,
     )
 
 
@@ -211,6 +220,13 @@ def acting_on_sine(case: Case, scene: Scene, frequency_hz: float = WHOLE.frequen
     )
 
 
+def error_in_reaches(case: Case, scene: Scene) -> float:
+    """Return the error of the acting force [%] of ``scene`` while the hand reaches back and forth, with rests."""
+    t_s = np.arange(round(_LASTS_S * case.rate_hz)) / case.rate_hz
+    trace = Bench(case, scene=scene).follow(np.outer(_REACH.places_m(t_s), DIRECTION))
+    return _error(trace, law_along(scene, trace) @ DIRECTION)
+
+
 def _error(trace: Any, law_n: Floats) -> float:
     """Return the RMS of acting force less law (n,) over the RMS of the law [%], along the motion."""
     counted = trace.t_s >= _SETTLED_S
@@ -269,29 +285,27 @@ def evidence(found: Sequence[Delivered]) -> Evidence:
 
 def _lines(found: Sequence[Delivered]) -> Iterator[str]:
     yield "Force on the hand, including the delay, compared with the law for the handle's true motion; 1 kHz, 38 µm."
-    yield (
-        "The hand follows a sine, then random motion with the power of a ±20 mm sine. Columns: RMS error [% of "
-        "the law],"
-    )
-    yield "smallest possible error of a linear estimator in the random motion, proportion of each part of the law that"
-    yield "reaches the hand during the sine [%] (inertia includes history), and proportion of the force held back [%]."
+    yield "The hand follows a sine, random motion with the power of a ±20 mm sine, and reaches of 60 mm in 0.3 s."
+    yield "Columns: RMS error in each [% of the law], smallest possible error of a linear estimator in the random"
+    yield "motion, proportion of each part of the law that reaches the hand during the sine [%] (inertia includes"
+    yield "history), and proportion of the force held back [%]."
     yield "A limit follows its value after a slash; * marks a value beyond it."
     yield ""
-    headings = ("liquid", "estimator", "hand", "kg", "Hz", "ticks", "sine", "random", "least", "drag", "wake")
+    headings = ("liquid", "estimator", "hand", "kg", "Hz", "ticks", "sine", "random", "least", "reach", "drag", "wake")
     rows = []
     for row in found:
-        case, values = row.case, {"sine": row.sine, "random": row.random, "least": row.least, **row.parts}
+        case = row.case
         described = (case.liquid, case.estimator, case.hand, f"{case.mass_kg:g}", f"{row.frequency_hz:g}", case.delay)
-        cells = [_cell(name, values, row) for name in (*headings[6:], "inertia")]
+        cells = [_cell(name, row) for name in (*headings[6:], "inertia")]
         rows.append((*described, *cells, f"{row.withheld:.0f}"))
     yield Table((*headings, "inertia", "withheld"), rows, left=3).text()
     yield ""
 
 
-def _cell(name: str, values: Mapping[str, float], row: Delivered) -> str:
-    if name not in values:
+def _cell(name: str, row: Delivered) -> str:
+    if (value := row.values.get(name)) is None:
         return "–"
-    text = f"{values[name]:.1f}" if name in {"sine", "random", "least"} else f"{values[name]:.0f}"
+    text = f"{value:.0f}" if name in row.parts else f"{value:.1f}"
     if name not in row.limits:
         return text
     low, high = row.limits[name]

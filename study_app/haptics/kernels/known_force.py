@@ -16,8 +16,9 @@ solved for a: the inertia is implicit. F₀ is compared with the force asked for
 sent, so that a force that safety withholds does not count as a change.
 
 A hand that lets go changes the acceleration faster than the filter learns of it, and θ would take the change for an
-effect of the force. Such a surprise resets the motion. For a second, and after accelerations above a limit, inertial
-forces are smoothed and limited as without the known force, which then returns within another second.
+effect of the force. Such a surprise resets the motion. Afterwards, and after accelerations above a limit, inertial
+forces are smoothed and limited for ``rules.unused_s`` as without the known force, which then returns within
+``rules.regained_s``.
 """
 
 from __future__ import annotations
@@ -63,10 +64,6 @@ _SURPRISED: Final = 1.5
 3 Hz in glycerin and honey at times. [choice]"""
 _MOST_ACCELERATION_MPS2: Final = 15.0
 """Likewise of the handle: a sine of 3 Hz ±42 mm. In faster reversals the passivity controller interrupted the force."""
-_REGAINED_S: Final = 1.0
-"""Time in which `trust` returns afterwards."""
-_WITHHELD: Final = 1.0
-"""Time before it begins to return, in multiples of that."""
 _NOTHING: Final = 1e-30
 
 
@@ -159,14 +156,15 @@ def track_motion(parameters: Record, state: Record, interval_s: float) -> float:
     filtered.compliance_per_kg = min(max(per_kg, _LEAST_SHARE / parameters.mass_kg), 1.0 / parameters.mass_kg)
     learned = uncertain - gain * uncertain * responses_m2 + LEARNING_PKG2S * t
     filtered.compliance_variance = min(learned, _MOST_VARIANCE_PKG2)
+    rules = parameters.rules
     if filtered.surprise > _SURPRISED:
-        filtered.trust = -_WITHHELD
+        filtered.trust = -rules.unused_s / rules.regained_s
         _begin_motion(parameters, filtered)
         copy(filtered.sent_n, filtered.asked_n)
     elif square_m2ps4 > _MOST_ACCELERATION_MPS2 * _MOST_ACCELERATION_MPS2:
-        filtered.trust = -_WITHHELD
+        filtered.trust = -rules.unused_s / rules.regained_s
     else:
-        filtered.trust = min(filtered.trust + t / _REGAINED_S, 1.0)
+        filtered.trust = min(filtered.trust + t / rules.regained_s, 1.0)
     return float(squares_m2 / (variance_m2 + responses_m2 * uncertain))
 
 

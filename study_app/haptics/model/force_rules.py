@@ -33,8 +33,10 @@ class ForceRules(NamedTuple):
     ``known_force_ticks`` is the shortest delay at which "kalman" computes inertial forces with the known force instead
     of smoothing and limiting them (`kernels.known_force`), up to an inertia of ``most_known_inertia`` times the least
     mass of the device and a scale of ``most_known_scale``: beyond, the force was noisy. Without it, the passivity
-    controller withheld 13 to 41 % of oils of 1 to 10 Pa s in reaches without delay. ``swing_mps`` is the
-    least speed at which reversals count as an oscillation of the handle, which lowers the gain (`passivity`).
+    controller withheld 13 to 41 % of oils of 1 to 10 Pa s in reaches without delay. After a surprise, it is not used
+    for ``unused_s``, and returns within ``regained_s``: with a second each, the controller withheld 17 to 79 % of
+    repeated reaches at three and four ticks. ``swing_mps`` is the least speed at which reversals count as an
+    oscillation of the handle, which lowers the gain (`passivity`).
     After a peak of more than 40 mm/s, faster than any tremor, a reversal may take ``shaken_reversal_s``: a released
     handle of 50 g oscillated at 10 Hz.
     ``trusts_gaps`` is 1 if the energy balance counts a step over a gap in full, 0 if only the energy that it cost: the
@@ -62,6 +64,8 @@ class ForceRules(NamedTuple):
     known_force_ticks: int = 99
     most_known_inertia: float = 7.0
     most_known_scale: float = 3.0
+    unused_s: float = 1.0
+    regained_s: float = 1.0
     swing_mps: float = math.inf
     shaken_reversal_s: float = 0.05
     trusts_gaps: float = 1.0
@@ -96,7 +100,7 @@ VERSIONS[4] = VERSIONS[3]._replace(version=4, known_force_ticks=1)
 VERSIONS[5] = VERSIONS[4]._replace(version=5, swing_mps=0.01)
 VERSIONS[6] = VERSIONS[5]._replace(version=6, acting_share=0.25)
 VERSIONS[7] = VERSIONS[6]._replace(version=7, shaken_reversal_s=0.06, trusts_gaps=0.0)
-VERSIONS[8] = VERSIONS[7]._replace(version=8, known_force_ticks=0)
+VERSIONS[8] = VERSIONS[7]._replace(version=8, known_force_ticks=0, unused_s=0.05, regained_s=0.1)
 
 FORCE_RULES: Final = 8
 """The version by which this program computes forces. Receipts state it: released numbers never change, new numbers are

@@ -111,7 +111,8 @@ def test_the_acceleration_is_its_definition_and_the_force_solves_its_equation(de
     assert np.array(found)[acts] == pytest.approx(expected[acts], abs=1e-6 * np.abs(expected).max())
     assert np.abs(expected[acts]).max() > 5
     assert 10 < len(surprises) < 100
-    assert np.flatnonzero(~acts).tolist() == list(range(surprises[0], surprises[-1] + 1000))
+    unused = {tick + later for tick in surprises for later in range(50)}  # 50 ms after each
+    assert set(np.flatnonzero(~acts)) == unused
 
 
 def acting_error(name, delay, *, hz=1.6, rules=CURRENT):
@@ -204,7 +205,7 @@ def test_after_a_fault_the_inertial_force_goes_on_smoothed():
 
 
 @pytest.mark.parametrize(("amplitude_m", "is_limited"), [(0.025, False), (0.06, True)])
-def test_in_reversals_of_more_than_15_mps2_the_limit_applies_for_a_second(amplitude_m, is_limited):
+def test_in_reversals_of_more_than_15_mps2_the_limit_applies(amplitude_m, is_limited):
     """A sine of 3 Hz: 25 mm are 8.9 m/s², 60 mm are 21 m/s²; both begin gently, within half a second."""
     hand = Hand(WATER, dynamics=Dynamics(delay_s=T, count_m=0.0, mass_kg=0.1))
     hand.safety[0].delay_ticks = 4
@@ -214,7 +215,7 @@ def test_in_reversals_of_more_than_15_mps2_the_limit_applies_for_a_second(amplit
     local, share = hand.model.liquid_states[0], hand.model.liquids[0].inertia_share[4]
     assert local.inertia_share == (share if is_limited else 1.0)
     assert share < 0.2
-    for _ in range(2100):
+    for _ in range(200):
         hand.tick((place_m, 0.0, 0.0))
     assert local.inertia_share == 1.0
 

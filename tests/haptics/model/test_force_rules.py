@@ -23,6 +23,8 @@ RELEASED = {
     "known_force_ticks": 99,
     "most_known_inertia": 7.0,
     "most_known_scale": 3.0,
+    "unused_s": 1.0,
+    "regained_s": 1.0,
     "swing_mps": math.inf,
     "shaken_reversal_s": 0.05,
     "trusts_gaps": 1.0,
@@ -41,7 +43,13 @@ def test_released_versions_keep_their_numbers():
         "shaken_reversal_s": 0.06,
         "trusts_gaps": 0.0,
     }
-    assert VERSIONS[8]._asdict() == {**VERSIONS[7]._asdict(), "version": 8, "known_force_ticks": 0}
+    assert VERSIONS[8]._asdict() == {
+        **VERSIONS[7]._asdict(),
+        "version": 8,
+        "known_force_ticks": 0,
+        "unused_s": 0.05,
+        "regained_s": 0.1,
+    }
 
 
 def test_the_present_version_is_the_newest_and_has_its_own_numbers():

@@ -92,16 +92,14 @@ def test_all_short_trials_with_slime_are_delivered_as_predicted(device: str, tmp
     assert (row["status"], row["responses"], row["trials_missing"]) == ("completed", str(TRIALS), "0")
 
 
-@pytest.mark.parametrize("viscosity", [1.3, 4.7])
-def test_a_device_without_delay_delivers_the_force_of_oils_in_reaches(viscosity: float, tmp_path: Path) -> None:
-    """Version 7 of the force rules lost 2 and 3 of the 4 trials."""
+@pytest.mark.parametrize(("viscosity", "delay", "limit"), [(1.3, 0, 10), (4.7, 0, 10), (1.3, 3, 25)])
+def test_the_force_of_oils_is_delivered_in_reaches(viscosity: float, delay: int, limit: int, tmp_path: Path) -> None:
+    """Version 7 of the force rules lost 2, 3 and 4 of the 4 trials."""
     oil = f"[liquids.oil]\neffects = 'auto'\ndensity_kg_m3 = 1030\nviscosity_pa_s = {viscosity}\n"
-    text = study_of("oil", tmp_path).read_text("utf-8")
+    text = study_of("oil", tmp_path).read_text("utf-8").replace("[tasks.short]", oil + "[tasks.short]")
     text = text.replace('scene.velocity = { kind = "ewma", alpha = 0.1 }\n', "").replace("max_s = 2", "max_s = 6")
-    text = text.replace("withheld_percent = 25", "withheld_percent = 10").replace(
-        "[tasks.short]", oil + "[tasks.short]"
-    )
-    assert predicted_delivery(parse(text.encode(), "study"), 0).missing == 0
+    text = text.replace("withheld_percent = 25", f"withheld_percent = {limit}")
+    assert predicted_delivery(parse(text.encode(), "study"), delay).missing == 0
 
 
 @pytest.mark.parametrize(("design", "missing"), [("3ifc", 38), ("4ifc", 48)])
