@@ -115,7 +115,7 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     standard = (
         "the liquid was “damper”, with varied damping at the hand (standard: 8 N·s/m) and a visual delay of 60 ms."
     )
-    assert f"In the block “Late”, {standard}" in first
+    assert f"In the block “Late” (two-interval forced choice), {standard}" in first
     asked = "Threshold is higher in Late than in Prompt, with an equivalence bound of 1.25"
     assert first.index(asked) < first.index("Prompt: ")
     assert f"; mean ratio {found.effect:.2f}, two-sided 95 % confidence interval" in first
