@@ -546,9 +546,17 @@ def _difference_words(contrast: ContrastResult) -> str:
     size = "" if contrast.standardised is None else f", {_effect_size_words(contrast.standardised)}"
     return (
         f"{said} (means {means}; {effect}, {unadjusted}95 % confidence interval {interval(contrast.interval)}{size}, "
-        f"{p_kind}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n})."
+        f"{p_kind}{p_equals(contrast.p_adjusted or 0.0)}, n = {contrast.n}).{_adjustment_words(contrast)}"
         f"{higher}{_bayes_words(contrast)}"
     )
+
+
+def _adjustment_words(contrast: ContrastResult) -> str:
+    """Return p before the adjustment, if only the adjustment makes it larger than 0.05, with a leading space, or ""."""
+    p = contrast.largest_p
+    if contrast.verdict in FOUND or contrast.members < 2 or p is None or p > 0.05:
+        return ""
+    return f" Before the adjustment for {contrast.members} hypotheses, {p_equals(p)}."
 
 
 def _ties(contrast: ContrastResult) -> str:

@@ -658,7 +658,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
 @click.option(
     "--studies",
     type=click.IntRange(10, 1_000_000),
-    default=60,
+    default=40,
     show_default=True,
     help="Number of studies with 20 participants for each protocol and seed.",
 )
@@ -678,7 +678,7 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
 
     For each protocol (default: viscosityjnd, delaydetect, delayjnd, thickness, forcedelay), the command simulates and
     analyses many studies with 20 observers whose thresholds differ by a factor of 1.2. For magnitude estimation, the
-    exponent is known instead of a threshold. The command then runs complete sessions with three simulated
+    exponent is known instead of a threshold. The command then runs complete sessions with two simulated
     participants, including the servo, files, unblinding and analysis. Every value is printed with its limit; the
     interval in brackets is corrected for the number of values. The exit code is 3 if an interval lies beyond its limit.
     """

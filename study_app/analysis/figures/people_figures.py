@@ -267,7 +267,8 @@ def draw_people(
     head = _HEAD_PT + (10.0 if groups else 0.0)
     height = head + sum(title_pt) + sum(name_pt) + len(rows) * (panel_pt + _ROW_GAP_PT) + (8.0 if below else 2.0)
     sheet = look.sheet(height, width_pt)
-    sheet.text(MARGIN_PT, 28, above, size=SMALL, colour=style.TEXT_SOFT)
+    logarithmic = " (logarithmic scale)" if any(panel.log for panel in panels) else ""
+    sheet.text(MARGIN_PT, 28, f"{above}{logarithmic}", size=SMALL, colour=style.TEXT_SOFT)
     _legend(sheet, groups, _interval_words(panels))
     y = head
     for row, wide, of_titles, of_names, title, name in zip(rows, widths, titles, names, title_pt, name_pt, strict=True):
@@ -310,9 +311,10 @@ def _names(ruler: Sheet, panel: Panel, width: float) -> list[list[str]]:
 
 
 def _legend(sheet: Sheet, groups: Sequence[str], interval: str) -> None:
-    """Draw the legend of points, diamonds and groups at the right."""
+    """Draw the legend of diamonds and points at the right; those of participants have the colours of their groups."""
     x = sheet.width_pt - MARGIN_PT
-    for words, marker, size in ((f"mean, {interval}", "D", 3.6), ("participant", "o", POINT["markersize"])):
+    marks = ((f"mean, {interval}", "D", 3.6), ("participant", "o", POINT["markersize"]))
+    for words, marker, size in marks[: 1 if groups else 2]:
         x -= sheet.text_width(words, SMALL)
         sheet.text(x, 28, words, size=SMALL, colour=style.TEXT_SOFT)
         colour = style.TEXT if marker == "D" else style.PARTICIPANT

@@ -186,7 +186,9 @@ def _hits_words(named: RecognitionResult) -> str:
     hits = f"named {number(tested.statistic, 0)} of {sum(rate.n for rate in tested.rates)} liquids correctly"
     chance = f"given how often each name was used; {p_equals(tested.p or 0.0)}"
     if named.verdict in FOUND:
-        return f"Overall, participants {hits}, more than expected by chance ({number(tested.expected, 1)}, {chance})."
+        return (
+            f"Overall, participants {hits}, more than the {number(tested.expected, 1)} expected by chance ({chance})."
+        )
     return f"Participants {hits} ({number(tested.expected, 1)} expected by chance, {chance})."
 
 

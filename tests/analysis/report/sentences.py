@@ -279,7 +279,7 @@ def names_are_counted(match: re.Match[str], told: Told) -> bool:
     is_shown = told.block["named"]["verdict"] in DECIDED
     rates, found = told.block["named"]["found"]["rates"], told.block["named"]["found"]
     return (
-        (overall, more) == (("Overall, p", ", more than expected by chance (") if is_shown else ("P", " ("))
+        (overall, more) == (("Overall, p", ", more than the ") if is_shown else ("P", " ("))
         and int(hits) == sum(rate["hits"] for rate in rates)
         and int(n) == sum(rate["n"] for rate in rates)
         and is_number(expected, found["expected"])
@@ -366,6 +366,18 @@ def agreed(match: re.Match[str], told: Told) -> bool:
 def short_of(told: Told, item: str) -> str:
     """Return the short text of a statement."""
     return next(one["short"] for one in told.block["items"] if one["id"] == item)
+
+
+def p_before_the_adjustment(match: re.Match[str], told: Told) -> bool:
+    """Check the largest p of the tests of a hypothesis, which the adjustment alone makes too large."""
+    (one,) = told.contrasts
+    ps = [one[name] for name in ("p", "p_bootstrap", "p_skewed") if one[name] is not None]
+    return (
+        int(match[1]) == len(told.results["contrasts"])
+        and is_p(match[2], max(ps))
+        and max(ps) <= 0.05
+        and one["verdict"] not in DECIDED
+    )
 
 
 def contrast_is_tested(match: re.Match[str], told: Told) -> bool:
@@ -797,8 +809,8 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"The largest mean difference is {R} points \(({ITEM}) at {R} ms, (?:> )?{R} % confidence interval {ENDS}, "
      r"n = (\d+)\)\.", largest_difference),
     # First page: liquids
-    (rf"(P|Overall, p)articipants named (\d+) of (\d+) liquids correctly(, more than expected by chance \(| \(){R}"
-     rf"(?: expected by chance)?, given how often each name was used; {P}\)\.", names_are_counted),
+    (rf"(P|Overall, p)articipants named (\d+) of (\d+) liquids correctly(, more than the | \(){R}"
+     rf" expected by chance(?: \(|, )given how often each name was used; {P}\)\.", names_are_counted),
     (r"We could not show for any single liquid that it was recognised above chance\.",
      when(lambda told: not recognised(told) and told.block["named"]["verdict"] in DECIDED)),
     (r"Recognised above chance: (.*)\.", lambda match, told: listed_in(match[1]) == recognised(told)),
@@ -819,6 +831,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      rf", (?P<unadjusted>unadjusted )?(?P<two>two-sided )?95 % confidence interval \[(?P<low>{R}), (?P<high>{R})\], "
      rf"(?P<name>d_z|g) (?P<size>{R}) {ENDS}, "
      r"(?P<adjusted>adjusted )?(?P<one>one-sided )?p (?P<p>[<>=] \.\d{3}), n = (?P<n>\d+)\)\.", contrast_is_tested),
+    (rf"Before the adjustment for (\d+) hypotheses, {P}\.", p_before_the_adjustment),
     (r"It was higher in (\S+) for (\d+) of (\d+) participants(?: and equal for (\d+))?\.", higher_for_so_many),
     (r"The data are ([\d.]+) times as likely (with|without) a difference as (?:with one|without one) \(JZS Bayes "
      r"factor, Cauchy prior with scale 0\.707\)(, which is weak evidence)?\.", bayes_factor),
