@@ -1,0 +1,28 @@
+"""What counts as a success of the psychometric function, by design and kind of level."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from study_app.protocol.tracks import success_name
+from study_app.protocol.trials.designs import default_design
+
+
+@pytest.mark.parametrize(
+    ("design", "of_ratios", "of_values"),
+    [
+        ("2ifc", "correct", "comparison chosen"),
+        ("4ifc", "correct", "comparison chosen"),
+        ("abx", "correct", "correct"),
+        ("oddity", "correct", "correct"),
+        ("yesno", "yes", "yes"),
+    ],
+)
+def test_a_level_above_or_below_the_standard_makes_no_forced_choice_correct(
+    design: str, of_ratios: str, of_values: str
+) -> None:
+    weber: Any = SimpleNamespace(level_kind="weber")
+    value: Any = SimpleNamespace(level_kind="value")
+    names = [success_name(default_design(design), stimulus) for stimulus in (None, weber, value)]
+    assert names == [of_ratios, of_ratios, of_values]
