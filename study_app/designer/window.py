@@ -6,7 +6,7 @@ from functools import cmp_to_key, partial
 from typing import Any
 
 from PySide6.QtCore import QEvent, QRect, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QResizeEvent
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QResizeEvent
 from PySide6.QtWidgets import QAbstractScrollArea, QAbstractSlider, QApplication, QSizePolicy, QStackedWidget, QWidget
 from shiboken6 import isValid
 
@@ -355,6 +355,12 @@ class _Arrangement(QWidget):
         super().resizeEvent(event)
         if self.drawer:
             self._place_drawer()
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        """Close the drawer on a click next to it, also where nothing takes the keyboard focus."""
+        if not self.outline.geometry().contains(event.position().toPoint()):
+            self.close_drawer()
+        super().mousePressEvent(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if self.drawer and self.outline.isVisible() and event.key() == Qt.Key.Key_Escape:

@@ -283,6 +283,16 @@ def test_escape_in_the_drawer_returns_the_keyboard_to_the_field(qtbot: Any, smal
         assert not small.place.outline.isVisible()
 
 
+def test_a_click_next_to_the_drawer_closes_it_although_nothing_takes_the_keyboard(qtbot: Any, small: Any) -> None:
+    small.editing.select(("blocks", "liquids"))
+    open_drawer(qtbot, small)
+    right = QPoint(small.place.form.width() - 6, 6)
+    assert small.place.outline.isVisible()
+    assert not small.place.outline.geometry().contains(small.place.form.mapTo(small.place.parts, right))
+    qtbot.mouseClick(small.place.form, LEFT, pos=right)
+    assert not small.place.outline.isVisible()
+
+
 def test_a_step_of_the_path_keeps_the_keyboard_when_it_is_clicked_after_an_id_was_typed(designer: Any) -> None:
     designer.open("kitchen", "conditions", "thin", width=1366)
     designer.fill(designer.place.form.head.id, "thinner")
