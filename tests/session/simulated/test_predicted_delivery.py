@@ -94,7 +94,7 @@ def test_all_short_trials_with_slime_are_delivered_as_predicted(device: str, tmp
 
 @pytest.mark.parametrize(("viscosity", "delay", "limit"), [(1.3, 0, 10), (4.7, 0, 10), (1.3, 3, 25)])
 def test_the_force_of_oils_is_delivered_in_reaches(viscosity: float, delay: int, limit: int, tmp_path: Path) -> None:
-    """Version 7 of the force rules lost 2, 3 and 4 of the 4 trials."""
+    """Version 7 of the force rules lost 2, 3 and 1 of the 4 trials."""
     oil = f"[liquids.oil]\neffects = 'auto'\ndensity_kg_m3 = 1030\nviscosity_pa_s = {viscosity}\n"
     text = study_of("oil", tmp_path).read_text("utf-8").replace("[tasks.short]", oil + "[tasks.short]")
     text = text.replace('scene.velocity = { kind = "ewma", alpha = 0.1 }\n', "").replace("max_s = 2", "max_s = 6")
