@@ -553,8 +553,8 @@ def _difference_words(contrast: ContrastResult) -> str:
 
 def _adjustment_words(contrast: ContrastResult) -> str:
     """Return p before the adjustment, if only the adjustment makes it larger than 0.05, with a leading space, or ""."""
-    p = contrast.largest_p
-    if contrast.verdict in FOUND or contrast.members < 2 or p is None or p > 0.05:
+    p, adjusted = contrast.largest_p, contrast.p_adjusted
+    if contrast.verdict in FOUND or p is None or adjusted is None or not p <= 0.05 < adjusted:
         return ""
     return f" Before the adjustment for {contrast.members} hypotheses, {p_equals(p)}."
 

@@ -55,9 +55,9 @@ from study_app.store.progress import trial_results
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.study_files import has_sealed_columns, refuse_earlier_columns, write_study_files
 
-CATCH_RULE: Final = "catch"
-RULES: Final = (CATCH_RULE, MISSING_RULE)
-"""The automatic rules that exclude sessions; every other exclusion is decided by a person."""
+RULE: Final = "catch"
+RULES: Final = {RULE: "errors in catch trials", MISSING_RULE: "trials that could not be delivered"}
+"""The automatic rules that exclude sessions, with their reasons; every other exclusion is decided by a person."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,7 +215,7 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
     """
     study, key = StudyFolder(folder), read_key(folder)
     decided = {row.what[:2] for row in exclusions(folder) if row.trial is None}
-    decided |= {row.what[:2] for row in reversals(folder) if row.rule_or_person == CATCH_RULE}
+    decided |= {row.what[:2] for row in reversals(folder) if row.rule_or_person == RULE}
     added: list[Exclusion] = []
     for session in study.sessions():
         if (session.participant, session.number) in decided or is_open(session.path):
@@ -224,7 +224,7 @@ def exclude_inattentive(folder: Path) -> tuple[Exclusion, ...]:
         with contextlib.suppress(StoreError, KeyError, TypeError, ValueError, AttributeError):  # `verify` names it
             reason = "; ".join(_missed_catch_trials(session, key))
         if reason:
-            added.append(exclude(folder, session.participant, session.number, by=CATCH_RULE, reason=reason))
+            added.append(exclude(folder, session.participant, session.number, by=RULE, reason=reason))
     return tuple(added)
 
 

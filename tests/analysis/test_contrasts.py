@@ -4,6 +4,8 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -12,6 +14,7 @@ from pydantic import ValidationError
 from scipy.stats import t as student
 from scipy.stats import ttest_ind, ttest_rel
 
+from study_app.analysis import contrasts
 from study_app.analysis.contrasts import answer, contrast_section
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
@@ -729,3 +732,20 @@ def test_an_order_that_is_the_same_for_all_is_a_limit_of_a_comparison_of_blocks(
         "effects of the order, such as practice."
     ]
     assert told(block_order="balanced") == []
+
+
+@pytest.mark.parametrize(
+    ("p", "adjusted", "verdict", "sentence"),
+    [
+        (0.031, 0.093, "not shown", " Before the adjustment for 3 hypotheses, p = .031."),
+        (0.031, 0.031, "shown", ""),
+        (0.062, 0.186, "not shown", ""),
+        (0.013, 0.039, "not shown", ""),
+        (None, None, "not tested", ""),
+    ],
+)
+def test_p_before_the_adjustment_is_given_if_only_the_adjustment_makes_it_larger_than_5_percent(
+    p: float | None, adjusted: float | None, verdict: str, sentence: str
+) -> None:
+    contrast: Any = SimpleNamespace(largest_p=p, p_adjusted=adjusted, verdict=verdict, members=3)
+    assert contrasts._adjustment_words(contrast) == sentence

@@ -409,8 +409,20 @@ def _draw_panel(
         if column.mean is not None:
             aside = x + (_ASIDE * step if column.values else 0.0)
             axes.plot([aside], [column.mean.value], "D", color=ink, markersize=4, zorder=5, gid="mean")
-            if column.mean.low is not None and column.mean.high is not None:
-                axes.plot([aside] * 2, [column.mean.low, column.mean.high], color=ink, linewidth=1.5, zorder=4)
+            _draw_interval(axes, aside, column.mean, ink)
+
+
+def _draw_interval(axes: Axes, x: float, mean: Mean, colour: str) -> None:
+    """Draw the interval of a mean; an arrow marks an end beyond the scale."""
+    if mean.low is None or mean.high is None:
+        return
+    bottom, top = axes.get_ylim()
+    low, high = max(mean.low, bottom), min(mean.high, top)
+    axes.plot([x] * 2, [low, high], color=colour, linewidth=1.5, zorder=4, gid="interval")
+    arrows = (("v", low, low > mean.low), ("^", high, high < mean.high))
+    for marker, end, is_cut in arrows:
+        if is_cut:
+            axes.plot([x], [end], marker, color=colour, markersize=4, markeredgewidth=0, zorder=4)
 
 
 def _offsets_of_points(axes: Axes, panel: Panel, most: float) -> dict[str, float]:

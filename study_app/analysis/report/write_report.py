@@ -57,13 +57,12 @@ from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
 from study_app.store.columns import TRIALS_MISSING
 from study_app.store.csv_files import Column, csv_bytes, optional
-from study_app.store.exclusions import MISSING_RULE
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import MANIFEST, folders_of
 from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
 from study_app.store.study_runs import recorded_contents
-from study_app.store.unblinding import CATCH_RULE, reveals_of
+from study_app.store.unblinding import RULES, reveals_of
 from study_app.workers.forked import Forked
 
 _OF_FORMAT_2: Final = {
@@ -473,8 +472,7 @@ _WHY: Final = {
     "threshold_beyond_levels": "thresholds beyond the levels",
     "constant_answers": "constant answers",
     "fast_answers": "fast answers",
-    CATCH_RULE: "errors in catch trials",
-    MISSING_RULE: "trials that could not be delivered",
+    **RULES,
 }
 
 

@@ -77,21 +77,10 @@ _BETWEEN_SESSIONS: Final = 10**SESSION_SD
 PEOPLE: Final = 20
 """Of a study: so many, and ±`_NEAR`, are planned in the shipped studies (``analysis.participants``, ``precision``)."""
 _REHEARSED: Final = 2
+_ERROR_MOST: Final = 0.05
 _NEAR: Final = 0.15
 _NEAR_SHARE: Final = 0.95
 COVERAGE_LEAST: Final = 0.93
-
-
-class _Limits(NamedTuple):
-    """The largest mean error of thresholds, and the least coverage of intervals of groups and of participants."""
-
-    error: float = 0.05
-    of_groups: float = COVERAGE_LEAST
-    of_people: float = COVERAGE_LEAST
-
-
-_LIMITS: Final = {"psychometric function 2.5 times as wide": _Limits(error=0.3, of_groups=0.6, of_people=0.75)}
-"""Of kinds of people whom the prior on the width nearly excludes. [choice]"""
 _OWN_COVERAGE_MOST: Final = 0.98
 _SLOPE_ERROR_MOST: Final = 0.15
 _EXPONENT_ERROR_MOST: Final = 0.03
@@ -524,15 +513,15 @@ def _normal_half(confidence: float) -> float:
 
 def _error_measure(study: str, errors: Array) -> Measure:
     """Return the mean error of thresholds from their ln errors in each study."""
-    ends, most = mean_interval(errors), _LIMITS.get(study, _Limits()).error
+    ends = mean_interval(errors)
     return Measure(
         study=study,
         what="mean error of the threshold",
         value=math.expm1(float(errors.mean())),
         interval=lambda sure: (math.expm1(ends(sure)[0]), math.expm1(ends(sure)[1])),
-        least=-most,
-        most=most,
-        limit=f"within ±{100 * most:.0f} %",
+        least=-_ERROR_MOST,
+        most=_ERROR_MOST,
+        limit="within ±5 %",
         written=lambda share: f"{100 * share:+.1f} %",
     )
 
@@ -544,11 +533,7 @@ def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
         [estimate.covered for person in study.own for estimate in person if not math.isnan(estimate.low)]
         for study in studies
     ]
-    limits = _LIMITS.get(name, _Limits())
-    for whose, covered, least, most in (
-        ("the group's", of_groups, limits.of_groups, 1.0),
-        ("participants'", of_people, limits.of_people, _OWN_COVERAGE_MOST),
-    ):
+    for whose, covered, most in (("the group's", of_groups, 1.0), ("participants'", of_people, _OWN_COVERAGE_MOST)):
         shares = [float(np.mean(of_study)) for of_study in covered if of_study]
         if not shares:
             continue
@@ -557,9 +542,9 @@ def coverage(name: str, studies: Sequence[StudyFound]) -> Iterator[Measure]:
             what=f"coverage of {whose} 95 % intervals",
             value=float(np.mean(shares)),
             interval=share_interval(shares, max(map(len, covered))),
-            least=least,
+            least=COVERAGE_LEAST,
             most=most,
-            limit=f"at least {100 * least:.0f} %" if most == 1.0 else f"{100 * least:.0f} to {100 * most:.0f} %",
+            limit="at least 93 %" if most == 1.0 else f"93 to {100 * most:.0f} %",
             written=percent,
         )
 
@@ -604,8 +589,11 @@ def validate(
     every: list[StudyFound] = []
     rehearsals = [executor.submit(rehearsed, one, source, seeds[0]) for source, one in known]
     for (_, one), rehearsal in zip(known, rehearsals, strict=True):
-        line = f"{one.name}: {_REHEARSED} simulated participants rehearsed"
-        rehearsal.add_done_callback(lambda _done, line=line: say(line))  # type: ignore[misc]
+
+        def finished(_rehearsal: object, name: str = one.name) -> None:
+            say(f"{name}: {_REHEARSED} simulated participants rehearsed")
+
+        rehearsal.add_done_callback(finished)
     cases = [(number, seed) for seed in dict.fromkeys(seeds) for number in range(studies)]
     for (_, one), rehearsal in zip(known, rehearsals, strict=True):
 

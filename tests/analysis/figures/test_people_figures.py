@@ -12,7 +12,7 @@ from matplotlib.text import Text
 
 from study_app import figure_style as style
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.people_figures import Column, Panel, draw_people, mean_of, numbers_of_panels
+from study_app.analysis.figures.people_figures import Column, Mean, Panel, draw_people, mean_of, numbers_of_panels
 from study_app.analysis.page_layout import POINT, Look
 from tests.analysis.made_up import liquids, study
 
@@ -153,6 +153,17 @@ def test_the_legend_names_each_group_beside_the_marker_and_in_the_colour_of_its_
         key = _left_of(texts[group], keys, lambda line: line.get_window_extent().x0)
         assert texts[group].get_color() == key.get_color() == points[person].get_color(), (person, group)
         assert key.get_marker() == points[person].get_marker(), (person, group)
+    assert "participant" not in texts, "no participant is grey"
+
+
+def test_an_interval_beyond_the_scale_ends_at_its_edge_with_an_arrow() -> None:
+    mean, within = Mean(value=6.5, low=0.1, high=12.9), Mean(value=4.0, low=3.2, high=4.9)
+    two = [Column(name="a", values={}, mean=mean), Column(name="b", values={}, mean=within)]
+    (axes,) = draw_people([Panel(columns=two, ends=(1.0, 7.0))], LOOK, above="Points").figure.axes
+    bottom, top = axes.get_ylim()
+    drawn = [list(line.get_ydata()) for line in axes.lines if line.get_gid() == "interval"]
+    arrows = {line.get_marker(): line.get_ydata()[0] for line in axes.lines if line.get_marker() in {"v", "^"}}
+    assert (drawn, arrows) == ([[bottom, top], [3.2, 4.9]], {"v": bottom, "^": top})
 
 
 def test_the_legend_of_levels_has_the_colours_of_the_bars() -> None:

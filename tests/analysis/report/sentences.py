@@ -375,7 +375,7 @@ def p_before_the_adjustment(match: re.Match[str], told: Told) -> bool:
     return (
         int(match[1]) == len(told.results["contrasts"])
         and is_p(match[2], max(ps))
-        and max(ps) <= 0.05
+        and max(ps) <= 0.05 < one["p_adjusted"]
         and one["verdict"] not in DECIDED
     )
 

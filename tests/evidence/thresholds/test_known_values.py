@@ -232,21 +232,6 @@ def test_a_coverage_that_is_too_low_is_found(share: float, holds: bool) -> None:
     assert (verdict.holds, verdict.limit) == (holds, "at least 93 %")
 
 
-def test_people_outside_the_prior_have_wider_limits() -> None:
-    """Thresholds are underestimated by a quarter, and 80 % of the intervals contain the true value."""
-    wide, usual = "psychometric function 2.5 times as wide", "learning"
-    errors = np.log([0.74, 0.76, 0.75, 0.73])
-    held, missed = (Estimated(value=1.0, low=0.5, high=high, truth=1.0) for high in (2.0, 0.9))
-    studies = [StudyFound((one,), ((one,),)) for one in [held] * 160 + [missed] * 40]
-    rows = {
-        kind: verdicts_on([known_values._error_measure(kind, errors), *coverage(kind, studies)])
-        for kind in (wide, usual)
-    }
-    assert [row.limit for row in rows[wide]] == ["within ±30 %", "at least 60 %", "75 to 98 %"]
-    assert [row.limit for row in rows[usual]] == ["within ±5 %", "at least 93 %", "93 to 98 %"]
-    assert [[row.holds for row in rows[kind]] for kind in (wide, usual)] == [[True] * 3, [False] * 3]
-
-
 @pytest.mark.slow
 def test_studies_of_all_seeds_count_together_and_each_seed_once(
     threshold: KnownThreshold, monkeypatch: pytest.MonkeyPatch
