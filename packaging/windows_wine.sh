@@ -210,7 +210,7 @@ windows() {
     step "Windows: home, a new study, results, and a session with the mouse"
     unset QT_QPA_PLATFORM
     rm -rf "$studies"/work/{protocols,results/demo,*-tables,*-report}
-    if [ ! -e "/tmp/.X11-unix/X${DISPLAY#:}" ]; then
+    if ! xdotool getdisplaygeometry >/dev/null 2>&1; then # no server; a dead one may have left its socket
         Xvfb "$DISPLAY" -screen 0 1600x1000x24 -nolisten tcp >/dev/null 2>&1 &
         server=$!
         trap 'kill "$server" 2>/dev/null || true' EXIT

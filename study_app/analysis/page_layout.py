@@ -247,12 +247,14 @@ class Picture:
     numbers: str = ""
 
 
-def try_figures(
-    pictures: Iterable[tuple[str, str, Callable[[], Picture | None]]], failures: Failures | None
-) -> Iterator[Picture]:
-    """Yield figures from block, name and drawing function; a failure is added to ``failures`` instead."""
+FigureTask: TypeAlias = tuple[str, str, Callable[[], Picture | None]]
+"""The ID of a block, a file name, and what draws the figure if there are data."""
+
+
+def draw_figures(tasks: Iterable[FigureTask], failures: Failures | None = None) -> Iterator[Picture]:
+    """Yield the figures; one that fails is omitted and added to ``failures``."""
     held = Failures() if failures is None else failures
-    for block, name, draw in pictures:
+    for block, name, draw in tasks:
         drawn = held.attempt(f"figure {name}", draw, block=block)
         if drawn is not None and not isinstance(drawn, Failure):
             yield drawn

@@ -147,10 +147,11 @@ def _read(folder: Path, send: Send, stop: Callable[[], bool]) -> None:
 
 def _question_pictures(study: Study) -> Iterator[Picture]:
     """Draw the figures of questions outside blocks of statements."""
-    from study_app.analysis.figures.question_figures import question_pictures  # noqa: PLC0415
+    from study_app.analysis.figures.question_figures import question_figure_tasks  # noqa: PLC0415
+    from study_app.analysis.page_layout import draw_figures  # noqa: PLC0415
     from study_app.analysis.questions import question_results  # noqa: PLC0415
 
-    return question_pictures(study, question_results(study), ("svg",))
+    return draw_figures(question_figure_tasks(study, question_results(study), ("svg",)))
 
 
 def _groups(study: Study) -> tuple[str, ...]:
@@ -235,9 +236,10 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     ``drawn`` are the figures of questions.
     """
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
-    from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures  # noqa: PLC0415
+    from study_app.analysis.figures.summary_figures import numbers_of, summary_figure_tasks  # noqa: PLC0415
+    from study_app.analysis.page_layout import draw_figures  # noqa: PLC0415
     from study_app.analysis.report.first_page import cards, presented_sentences  # noqa: PLC0415
-    from study_app.analysis.report.study_figures import pictures  # noqa: PLC0415
+    from study_app.analysis.report.study_figures import block_figure_tasks  # noqa: PLC0415
     from study_app.analysis.results import Failures  # noqa: PLC0415
 
     going = partial(_going, send, stop)
@@ -245,8 +247,8 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     results = evaluate(study, progress=lambda what, share: going(what, _EVALUATION * share))
     _send_proposed(study, results, send)
     numbers = numbers_of(study)
-    found = chain(pictures(study, results, ("svg",)), summary_pictures(study, results, numbers, ("svg",)))
-    for number, picture in enumerate(found, start=1):
+    tasks = chain(block_figure_tasks(study, results, ("svg",)), summary_figure_tasks(study, results, numbers, ("svg",)))
+    for number, picture in enumerate(draw_figures(tasks), start=1):
         drawn.append(picture)
         send(_figure(picture))
         going("drawing", _EVALUATION + (1 - _EVALUATION) * min(1.0, number / 8))
@@ -269,8 +271,9 @@ def _draw_groups(
 ) -> None:
     """Draw the figures by group; ``questions`` are those of the first page. Tests are of all participants."""
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
-    from study_app.analysis.figures.summary_figures import numbers_of, summary_pictures  # noqa: PLC0415
-    from study_app.analysis.report.study_figures import pictures  # noqa: PLC0415
+    from study_app.analysis.figures.summary_figures import numbers_of, summary_figure_tasks  # noqa: PLC0415
+    from study_app.analysis.page_layout import draw_figures  # noqa: PLC0415
+    from study_app.analysis.report.study_figures import block_figure_tasks  # noqa: PLC0415
 
     for number, part in enumerate(_split(study)):
         _going(send, stop, "drawing the groups", number / (1 + len(_groups(study))))
@@ -278,11 +281,10 @@ def _draw_groups(
         if part.split != EACH_GROUP:
             blocks = evaluate(replace(part, levels=(), contrasts=()), recordings=False).blocks
             own = replace(results, blocks=blocks)
-        for picture in chain(
-            _question_pictures(part),
-            pictures(part, own, ("svg",)),
-            summary_pictures(part, own, numbers_of(part), ("svg",)),
-        ):
+        tasks = chain(
+            block_figure_tasks(part, own, ("svg",)), summary_figure_tasks(part, own, numbers_of(part), ("svg",))
+        )
+        for picture in chain(_question_pictures(part), draw_figures(tasks)):
             send(_figure(picture, split=part.split, question=questions.get(picture.name, "")))
             _go_on(stop)
 

@@ -224,5 +224,4 @@ def figures_of_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw PNG alone, which the page holds: every form is drawn anew, by the same code."""
     from study_app.analysis.report import write_report
 
-    monkeypatch.setattr(write_report, "ON_PAGE", ("png",))
-    monkeypatch.setattr(write_report, "BESIDE_PAGE", ())
+    monkeypatch.setattr(write_report, "FORMATS", ("png",))

@@ -22,8 +22,7 @@ def figures_as_lines() -> Iterator[None]:
     """Let files of figures hold what these show."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(figure_style, "file_bytes", stub_png)
-        patched.setattr(write_report, "ON_PAGE", ("png",))
-        patched.setattr(write_report, "BESIDE_PAGE", ())
+        patched.setattr(write_report, "FORMATS", ("png",))
         yield
 
 

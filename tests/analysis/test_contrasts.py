@@ -18,9 +18,10 @@ from study_app.analysis import contrasts
 from study_app.analysis.contrasts import answer, contrast_section
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.evaluate import evaluate
-from study_app.analysis.figures.level_figures import level_pictures
+from study_app.analysis.figures.level_figures import level_figure_tasks
 from study_app.analysis.levels.thresholds import Thresholds, thresholds_compared
 from study_app.analysis.levels.tracks import tracks
+from study_app.analysis.page_layout import draw_figures
 from study_app.analysis.planning.power_curves import (
     Powers,
     detectable,
@@ -397,7 +398,7 @@ def test_an_interaction_compares_groups_in_the_difference_of_each_participant() 
     assert [len(side.values) for side in result.sides] == [len(one), len(two)]
     figure = next(
         picture
-        for picture in write_report.summary_pictures(made, evaluate(made), {}, ("svg",))
+        for picture in draw_figures(write_report.summary_figure_tasks(made, evaluate(made), {}, ("svg",)))
         if "hypothesis" in picture.name
     )
     drawn = figure.files["svg"].decode()
@@ -715,7 +716,7 @@ def test_a_mean_d_prime_that_may_be_chance_is_a_limit(
 
 def test_a_single_comparison_shows_participants_as_points(guessed: tuple[Study, Results]) -> None:
     made, results = guessed
-    captions = [picture.caption for picture in level_pictures(made, results.levels, forms=())]
+    captions = [picture.caption for picture in draw_figures(level_figure_tasks(made, results.levels, forms=()))]
     assert len(captions) == 2
     assert all("; small points show individual participants. Other panels" in caption for caption in captions)
 

@@ -33,8 +33,8 @@ from study_app.analysis.levels.thresholds import (
     psychometric_bands,
 )
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.page_layout import MARGIN_PT, SMALL, Look, Picture, Sheet, picture_of, sample_words, try_figures
-from study_app.analysis.results import Failures, LevelsResult
+from study_app.analysis.page_layout import MARGIN_PT, SMALL, FigureTask, Look, Picture, Sheet, picture_of, sample_words
+from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.wording import counted
 from study_app.psychophysics.families import Family, success
@@ -666,20 +666,13 @@ _FIGURES: Final[tuple[tuple[str, Callable[[LevelsResult], object], _Draw], ...]]
 """What a figure is called, of which blocks there is one, and what draws it."""
 
 
-def level_pictures(
-    study: Study, levels: Sequence[LevelsResult], forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
-) -> Iterator[Picture]:
-    """Draw all figures of all blocks of levels in each of ``forms``.
-
-    A figure that fails is omitted and added to ``failures``.
-    """
+def level_figure_tasks(
+    study: Study, levels: Sequence[LevelsResult], forms: Sequence[str] = style.FORMATS
+) -> Iterator[FigureTask]:
+    """Yield all figures of all blocks of levels, to draw in each of ``forms``."""
     tracked = cache(partial(tracks, study))
-    yield from try_figures(
-        (
-            (level.block, name := f"{what}-{level.block}", partial(draw, study, level, forms, name, tracked))
-            for what, applies, draw in _FIGURES
-            for level in levels
-            if applies(level)
-        ),
-        failures,
-    )
+    for what, applies, draw in _FIGURES:
+        for level in levels:
+            if applies(level):
+                name = f"{what}-{level.block}"
+                yield level.block, name, partial(draw, study, level, forms, name, tracked)

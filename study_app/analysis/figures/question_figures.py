@@ -16,6 +16,7 @@ from study_app.analysis.page_layout import (
     MARGIN_PT,
     POINT,
     SMALL,
+    FigureTask,
     Look,
     Picture,
     Sheet,
@@ -24,9 +25,8 @@ from study_app.analysis.page_layout import (
     sample_words,
     spread_points,
     tab_separated,
-    try_figures,
 )
-from study_app.analysis.results import Failures, QuestionResult
+from study_app.analysis.results import QuestionResult
 from study_app.discovery import by_name
 
 _LEFT_PT: Final = 120.0
@@ -205,30 +205,18 @@ _FIGURES: Final = {figure.id: figure for figure in (_RATINGS, _OPTIONS, _DISTRIB
 """Every figure by the id that a kind of question names it by."""
 
 
-def question_pictures(
-    study: Study,
-    answered: Sequence[QuestionResult],
-    forms: Sequence[str] = style.FORMATS,
-    failures: Failures | None = None,
-) -> Iterator[Picture]:
-    """Draw the figure of every answered question that has one, in each of ``forms``.
+def question_figure_tasks(
+    study: Study, answered: Sequence[QuestionResult], forms: Sequence[str] = style.FORMATS
+) -> Iterator[FigureTask]:
+    """Yield the figure of every answered question that has one, to draw in each of ``forms``.
 
-    A figure that fails is omitted and added to ``failures``; blocks of levels have their own figures once the key is
-    open.
+    Blocks of levels have their own figures once the key is open.
     """
     of_levels = {block.id for block in study.levels if block.design.adjusts or study.revealed}
-    yield from try_figures(
-        (
-            (
-                result.where,
-                name := f"question-{result.where}-{result.item}",
-                partial(_picture, study, asked, result, forms, name),
-            )
-            for asked, result in zip(study.others.questions, answered, strict=True)
-            if result.figure is not None and result.n and result.where not in of_levels
-        ),
-        failures,
-    )
+    for asked, result in zip(study.others.questions, answered, strict=True):
+        if result.figure is not None and result.n and result.where not in of_levels:
+            name = f"question-{result.where}-{result.item}"
+            yield result.where, name, partial(_picture, study, asked, result, forms, name)
 
 
 def _picture(study: Study, asked: PlacedQuestion, result: QuestionResult, forms: Sequence[str], name: str) -> Picture:

@@ -1,6 +1,6 @@
 """The figures of the first page: hypotheses, estimates of levels, ratings and scores, each with its participants."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, Final, NamedTuple
@@ -16,9 +16,9 @@ from study_app.analysis.levels.exponents import Exponents
 from study_app.analysis.levels.sensitivities import Sensitivities
 from study_app.analysis.levels.statistic import LevelStatistic, level_words
 from study_app.analysis.levels.thresholds import Thresholds
-from study_app.analysis.page_layout import Picture, sample_words, try_figures
+from study_app.analysis.page_layout import FigureTask, Picture, sample_words
 from study_app.analysis.questions import scored
-from study_app.analysis.results import ContrastResult, Failures, LevelsResult, Results
+from study_app.analysis.results import ContrastResult, LevelsResult, Results
 from study_app.number_text import capitalised
 from study_app.protocol.groups import EACH_GROUP
 
@@ -79,20 +79,10 @@ def place_of(one: Any) -> float | str | None:
     return next((place for place in places if place is not None), None)
 
 
-def summary_pictures(
-    study: Study,
-    results: Results,
-    numbers: Mapping[str, Sequence[Numbers]],
-    forms: Sequence[str] = style.FORMATS,
-    failures: Failures | None = None,
-) -> Iterator[Picture]:
-    """Draw the figures of every hypothesis, of the estimates of blocks of levels, and of ``numbers`` (`numbers_of`)."""
-    yield from try_figures(_pictures(study, results, numbers, forms), failures)
-
-
-def _pictures(
-    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], forms: Sequence[str]
-) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
+def summary_figure_tasks(
+    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], forms: Sequence[str] = style.FORMATS
+) -> Iterator[FigureTask]:
+    """Yield the figures of hypotheses, of the estimates of blocks of levels, and of ``numbers`` (`numbers_of`)."""
     for number, contrast in enumerate(results.contrasts, start=1):
         compares_groups = contrast.contrast.groups is not None
         if any(side.values for side in contrast.sides) and not (compares_groups and _is_one_group(study)):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import pandas as pd
-from scipy.stats import binom
+from scipy.special import bdtr
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import Study
@@ -97,7 +97,7 @@ def below_chance(frame: pd.DataFrame, blocks: Iterable[LevelBlock]) -> Iterator[
         if (chance := by_id[block].design.guess_rate) is None:
             continue
         right, n = int(rows["right"].sum()), len(rows)
-        p = float(binom.cdf(right, n, chance))
+        p = float(bdtr(right, n, chance))
         if p < BELOW_CHANCE_P:
             yield BelowChance(participant=str(who), session=int(session), block=str(block), right=right, n=n, p=p)
 

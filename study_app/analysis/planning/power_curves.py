@@ -16,8 +16,7 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 from scipy.optimize import brentq
-from scipy.stats import chi2, nct, norm
-from scipy.stats import t as student
+from scipy.special import chdtri, nctdtr, ndtr, stdtrit
 
 from study_app import __version__
 from study_app import figure_style as style
@@ -692,10 +691,10 @@ def detectable(n: int, second: int | None = None, *, tail: float) -> tuple[float
     """
     root, freedom = _precision(n, second)
     tested = min(n, second or n) - 1  # the report's degrees of freedom are those of the smaller group
-    critical = float(student.isf(tail, tested))
+    critical = float(-stdtrit(tested, tail))
     most = (2 * critical + 10) / root  # more than 80 % of studies show such a large difference
-    least = float(brentq(lambda size: nct.sf(critical, freedom, size * root) - WANTED, 0.0, most))
-    return float(student.ppf(0.975, tested)) / root, least
+    least = float(brentq(lambda size: 1 - nctdtr(freedom, size * root, critical) - WANTED, 0.0, most))
+    return float(stdtrit(tested, 0.975)) / root, least
 
 
 def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float) -> float:
@@ -705,9 +704,9 @@ def shown_equal(bound: float, n: int, second: int | None = None, *, alpha: float
     the estimated SD.
     """
     root, freedom = _precision(n, second)
-    spreads = np.sqrt(chi2.ppf((np.arange(_SPREADS) + 0.5) / _SPREADS, freedom) / freedom)
-    inside = bound * root - float(student.isf(alpha, min(n, second or n) - 1)) * spreads
-    return float(np.maximum(2 * norm.cdf(inside) - 1, 0.0).mean())
+    spreads = np.sqrt(chdtri(freedom, 1 - (np.arange(_SPREADS) + 0.5) / _SPREADS) / freedom)
+    inside = bound * root - float(-stdtrit(min(n, second or n) - 1, alpha)) * spreads
+    return float(np.maximum(2 * ndtr(inside) - 1, 0.0).mean())
 
 
 def _precision(n: int, second: int | None) -> tuple[float, int]:

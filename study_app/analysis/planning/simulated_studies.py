@@ -16,7 +16,6 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import ttest_1samp
 
 from study_app.analysis.data.blocks import Block as StatementBlock
 from study_app.analysis.data.blocks import Decided, Item, Setting, read_decided
@@ -297,6 +296,8 @@ def trend(ranked: _Single, both_ways: NDArray[np.bool_], rng: np.random.Generato
 
 def slopes(rising: Array, block: Planned, both_ways: NDArray[np.bool_]) -> Array:
     """Return the p (studies, items) of increasing slopes over the delay; like `trend`, by t tests of the slopes."""
+    from scipy.stats import ttest_1samp  # noqa: PLC0415 - half a second, and a report does not need it
+
     delays = np.array(block.delays_ms) - np.mean(np.array(block.delays_ms))
     own = np.einsum("snki,k->sin", rising, delays)
     rising_p, falling_p = np.ones((2, *own.shape[:2]))

@@ -2,37 +2,27 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import chain
 from pathlib import Path
 
 from study_app import figure_style as style
 from study_app.analysis.data.blocks import KINDS, Block
 from study_app.analysis.data.study_tables import Study, load_study
 from study_app.analysis.figures import answer_figures
-from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.figures.question_figures import question_pictures
+from study_app.analysis.figures.level_figures import level_figure_tasks
+from study_app.analysis.figures.question_figures import question_figure_tasks
 from study_app.analysis.findings import all_findings
 from study_app.analysis.findings.delays import LowestDelay
 from study_app.analysis.levels.evaluate import level_results
-from study_app.analysis.page_layout import Drawing, Picture, try_figures
+from study_app.analysis.page_layout import Drawing, FigureTask, draw_figures
 from study_app.analysis.questions import question_results
 from study_app.analysis.results import Failures, Results
 from study_app.errors import AnalysisError
 from study_app.store.output_files import write_output
 
 
-def pictures(
-    study: Study, results: Results, forms: Sequence[str] = style.FORMATS, failures: Failures | None = None
-) -> Iterator[Picture]:
-    """Draw every figure with data, block by block, in each of ``forms``.
-
-    A figure that fails is omitted and added to ``failures``.
-    """
-    yield from try_figures(_of_blocks(study, results, forms), failures)
-
-
-def _of_blocks(
-    study: Study, results: Results, forms: Sequence[str]
-) -> Iterator[tuple[str, str, Callable[[], Picture | None]]]:
+def block_figure_tasks(study: Study, results: Results, forms: Sequence[str] = style.FORMATS) -> Iterator[FigureTask]:
+    """Yield the figures of answers and findings, block by block, to draw in each of ``forms``."""
     for block, result in zip(study.blocks, results.blocks, strict=True):
         if not result.n:
             continue
@@ -75,13 +65,15 @@ def plot(folder: Path, to: Path, *, warn: Callable[[str], object] | None = None)
         )
     files: dict[str, bytes] = {}
     failures = Failures()
-    questions = question_pictures(study, question_results(study), failures=failures)
+    tasks = chain(
+        question_figure_tasks(study, question_results(study)), level_figure_tasks(study, level_results(study))
+    )
     statements = (
         answer_figures.answers_picture(study, block, block_name(study, block))
         for kind in KINDS
         for block in study.blocks_of(kind)
     )
-    for picture in (*statements, *questions, *level_pictures(study, level_results(study), failures=failures)):
+    for picture in (*statements, *draw_figures(tasks, failures)):
         files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
         files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
     if failures.found:

@@ -22,14 +22,14 @@ from study_app.analysis.data.study_tables import Study, group_counts, load_study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.export.table_files import credit_lines, study_head, table_files
 from study_app.analysis.export.tables import exported_tables
-from study_app.analysis.figures.level_figures import level_pictures
-from study_app.analysis.figures.question_figures import question_pictures
-from study_app.analysis.figures.summary_figures import Numbers, numbers_of, summary_pictures
+from study_app.analysis.figures.level_figures import level_figure_tasks
+from study_app.analysis.figures.question_figures import question_figure_tasks
+from study_app.analysis.figures.summary_figures import Numbers, numbers_of, summary_figure_tasks
 from study_app.analysis.findings import FINDINGS, all_findings
 from study_app.analysis.findings.finding import TESTS
 from study_app.analysis.html_page import box, bullets, chunks, font_face, heading, paragraph, render, table, try_part
 from study_app.analysis.levels.evaluate import level_entries
-from study_app.analysis.page_layout import Picture
+from study_app.analysis.page_layout import FigureTask, Picture, draw_figures
 from study_app.analysis.planned_exclusions import PlannedExclusions, Proposal, planned_exclusions
 from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations, preregistration_folders
@@ -38,7 +38,7 @@ from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import cards, figures_shown, first_page, presented_sentences
 from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.questions_in_full import appendix
-from study_app.analysis.report.study_figures import pictures
+from study_app.analysis.report.study_figures import block_figure_tasks
 from study_app.analysis.results import (
     BlockResult,
     ContrastResult,
@@ -52,6 +52,7 @@ from study_app.analysis.results import (
 )
 from study_app.analysis.wording import counted, listed, with_d_z
 from study_app.errors import AnalysisError
+from study_app.figure_style import FORMATS
 from study_app.number_text import capitalised
 from study_app.protocol.model import Contrast, Published
 from study_app.store.checksums import sha256
@@ -63,7 +64,7 @@ from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
 from study_app.store.study_runs import recorded_contents
 from study_app.store.unblinding import RULES, reveals_of
-from study_app.workers.forked import Forked
+from study_app.workers.shared_tasks import SharedTasks
 
 _OF_FORMAT_2: Final = {
     Results: frozenset({"questions", "scores", "levels", "contrasts"}),
@@ -296,11 +297,6 @@ def has_questions(study: Study) -> bool:
     return bool(study.blocks or study.others.questions)
 
 
-ON_PAGE: Final = ("svg",)
-BESIDE_PAGE: Final = ("png", "pdf")
-"""Formats of figures: the page contains the first ones; another process draws the others meanwhile."""
-
-
 def report_files(study: Study, progress: Progress = report_no_progress) -> tuple[dict[str, bytes], tuple[Failure, ...]]:
     """Return the files of a study's report by name, ``report.html`` first, and the sections that failed.
 
@@ -309,12 +305,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     results = evaluate(study, progress=lambda what, share: progress(what, 0.1 + 0.6 * share))
     failures = Failures(results.failures)
     numbers = failures.value("the participants' values", lambda: numbers_of(study), {})
-    beside = Forked(lambda: _files_beside_page(study, results, numbers))
-    drawn = []
-    for picture in _drawn(study, results, numbers, failures, ON_PAGE):
-        drawn.append(picture)
-        progress(f"drawing: {picture.name}", 0.7 + 0.2 * min(1.0, len(drawn) / 4))
-
+    figure_tasks = SharedTasks([partial(_draw, task) for task in _figure_tasks(study, results, numbers)])
     texts: dict[str, Any] = {
         "findings": failures.value("texts: findings", lambda: sections.of_levels(results), ()),
         "limits": failures.value("texts: limits", lambda: sections.limits(study, results), ()),
@@ -334,39 +325,31 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
     ):
         content = failures.value(file, make, None)
         files |= {} if content is None else {file: content}
-    others, failed = beside.result()
-    failures.found += [failure for failure in failed if failure not in failures.found]
-    files |= _files_of(drawn) | others
-    files |= {f"{picture.name}.txt": f"{picture.caption}\n".encode() for picture in drawn}
     files |= failures.value("exported tables", lambda: table_files(study, exported_tables(study)), {})
+    figures = figure_tasks.results(lambda _: progress("drawing", 0.9))
+    failures.found += [figure for figure in figures if isinstance(figure, Failure)]
+    drawn = [figure for figure in figures if isinstance(figure, Picture)]
+    for picture in drawn:
+        files |= {f"{picture.name}.{form}": content for form, content in picture.files.items()}
+        files[f"{picture.name}.txt"] = f"{picture.caption}\n".encode()
     page_ = _page(study, results, numbers, drawn, texts, planned, failures).encode()
     return {"report.html": page_, "report.json": document(study, results, texts, failures), **files}, tuple(
         failures.found
     )
 
 
-def _files_beside_page(
-    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]]
-) -> tuple[dict[str, bytes], list[Failure]]:
-    """Return the files of all figures that the page does not contain, and the figures that failed."""
-    failures = Failures()
-    files = _files_of(_drawn(study, results, numbers, failures, BESIDE_PAGE))
-    return files, failures.found
-
-
-def _drawn(
-    study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]], failures: Failures, forms: Sequence[str]
-) -> Iterator[Picture]:
-    yield from pictures(study, results, forms, failures)
+def _figure_tasks(study: Study, results: Results, numbers: Mapping[str, Sequence[Numbers]]) -> Iterator[FigureTask]:
+    yield from block_figure_tasks(study, results, FORMATS)
     if results.questions:
-        yield from question_pictures(study, results.questions, forms, failures)
-    yield from summary_pictures(study, results, numbers, forms, failures)
+        yield from question_figure_tasks(study, results.questions, FORMATS)
+    yield from summary_figure_tasks(study, results, numbers, FORMATS)
     if results.levels:
-        yield from level_pictures(study, results.levels, forms, failures)
+        yield from level_figure_tasks(study, results.levels, FORMATS)
 
 
-def _files_of(drawn: Iterable[Picture]) -> dict[str, bytes]:
-    return {f"{picture.name}.{form}": content for picture in drawn for form, content in picture.files.items()}
+def _draw(task: FigureTask) -> Picture | Failure | None:
+    failures = Failures()
+    return next(draw_figures([task], failures), next(iter(failures.found), None))
 
 
 def _proposed(proposals: Sequence[Proposal]) -> Iterator[str]:

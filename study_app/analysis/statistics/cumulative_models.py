@@ -16,9 +16,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import OptimizeResult, minimize
-from scipy.special import expit, logsumexp
-from scipy.stats import f as variance_ratio
-from scipy.stats import t as student
+from scipy.special import expit, fdtrc, logsumexp, stdtrit
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked_values
 from study_app.analysis.statistics.slope_tests import student_test
@@ -120,9 +118,9 @@ def _fitted(model: CumulativeModel, likelihood: "_Likelihood", direction: Direct
         p, reference = student_test(math.copysign(math.sqrt(statistic), betas[0]), model.n - 1, direction)
     else:
         freedom = several * (model.n - 1)
-        p = float(variance_ratio.sf(statistic / several, several, freedom))
+        p = float(fdtrc(several, freedom, statistic / several))
         reference = f"F({several}, {freedom})"
-    reach = float(student.ppf((1 + _SURE) / 2, model.n - 1)) * errors
+    reach = float(stdtrit(model.n - 1, (1 + _SURE) / 2)) * errors
     ends = zip((betas - reach).tolist(), (betas + reach).tolist(), strict=True)
     intervals = tuple(Interval(low=low, high=high, level=_SURE, method="Wald, with Student's t") for low, high in ends)
     return replace(
@@ -224,8 +222,10 @@ class _Likelihood:
         density = below * (1.0 - below)
         at_upper, at_lower = density[:, 1:] / share, density[:, :-1] / share
         logs = self._counts @ np.log(share).reshape(self._counts.shape[1], -1) + self._log_weights
-        each = logsumexp(logs, axis=1)
-        weights = (self._counts.T @ np.exp(logs - each[:, None])).reshape(share.shape)
+        largest = logs.max(axis=1, keepdims=True)
+        likelihoods = np.exp(logs - largest)
+        of_people = likelihoods.sum(axis=1, keepdims=True)
+        weights = (self._counts.T @ (likelihoods / of_people)).reshape(share.shape)
         of_upper, of_lower = (weights * at_upper).sum(axis=2), (weights * at_lower).sum(axis=2)
         of_cuts = of_upper[:, :-1].sum(axis=0) - of_lower[:, 1:].sum(axis=0)
         steps = np.exp(parameters[1 : self.categories - 1])
@@ -239,7 +239,7 @@ class _Likelihood:
                 [float((of_shift * deviation).sum()) for deviation in self._deviations],
             ]
         )
-        return float(-each.sum()), -gradient
+        return float(-(largest + np.log(of_people)).sum()), -gradient
 
     def standard_errors(self, parameters: Array) -> Array | None:
         """Return the standard errors of the effects, from the observed information; None if it is singular."""

@@ -12,9 +12,7 @@ from typing import Final
 import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
-from scipy.special import gammaln
-from scipy.stats import nct
-from scipy.stats import t as student
+from scipy.special import gammaln, nctdtr, stdtrit
 
 from study_app.analysis.statistics.outcome import Array
 
@@ -75,7 +73,7 @@ def _noncentrality(t: float, freedom: int) -> tuple[float, float]:
     tail, reach = (1 - _LEVEL) / 2, 10.0 + 3 * abs(t)
 
     def away(shift: float, p: float) -> float:
-        below = float(nct.cdf(t, freedom, shift))
+        below = float(nctdtr(freedom, shift, t))
         return (float(shift < t) if math.isnan(below) else below) - p
 
     def end(p: float) -> float:
@@ -123,7 +121,7 @@ def _of_signs(delta: float, variance: float, freedom: int, cases: int) -> Effect
         end = 2 * ((1 - _LEVEL) / 2) ** (1 / cases) - 1
         ends = (end, 1.0) if delta > 0 else (-1.0, -end)
         return EffectSize(name="Cliff's delta", value=delta, low=ends[0], high=ends[1])
-    t = float(student.ppf((1 + _LEVEL) / 2, freedom))
+    t = float(stdtrit(freedom, (1 + _LEVEL) / 2))
     reach = t * math.sqrt(variance) * math.sqrt((1 - delta**2) ** 2 + t**2 * variance)
     middle, below = delta - delta**3, 1 - delta**2 + t**2 * variance
     low, high = (middle - reach) / below, (middle + reach) / below

@@ -14,8 +14,7 @@ from typing import Final, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
-from scipy.stats import binomtest, false_discovery_control, norm, pearson3, rankdata, skew
-from scipy.stats import t as student
+from scipy.special import betaincinv, ndtr, ndtri, stdtrit
 
 from study_app.errors import AnalysisError
 
@@ -127,15 +126,15 @@ def alpha_of_looks(looks: tuple[int, ...], alpha: float, spending: str) -> tuple
     shares = np.array(looks) / looks[-1]
     spent = alpha * np.log1p((math.e - 1) * shares)
     if spending == "obrien-fleming":
-        spent = 4 * norm.sf(norm.isf(alpha / 4) / np.sqrt(shares))
+        spent = 4 * ndtr(ndtri(alpha / 4) / np.sqrt(shares))
     nodes, of_nodes = np.polynomial.legendre.leggauss(_NODES)
     alphas, places, weights, before = [], np.zeros(1), np.ones(1), 0.0
     for share, due in zip(shares, np.diff(spent, prepend=0.0), strict=True):
         end = float(brentq(_excess, 0.0, 40.0, (places, weights, math.sqrt(share - before), due)))
         inside = end * nodes
-        density = norm.pdf(inside[:, None], places, math.sqrt(share - before)) @ weights
+        density = _normal_density(inside[:, None], places, math.sqrt(share - before)) @ weights
         places, weights, before = inside, density * end * of_nodes, share
-        alphas.append(float(2 * norm.sf(end / math.sqrt(share))))
+        alphas.append(float(2 * ndtr(-end / math.sqrt(share))))
     return tuple(alphas)
 
 
@@ -155,24 +154,30 @@ def error_of_every_report(looks: tuple[int, ...], alpha: float, spending: str) -
     nodes, of_nodes = np.polynomial.legendre.leggauss(_NODES)
     error, places, weights, before = 0.0, np.zeros(1), np.ones(1), 0.0
     for share, level in zip(every / looks[-1], levels[reached], strict=True):
-        end, step = float(norm.isf(level / 2)) * math.sqrt(share), math.sqrt(share - before)
+        end, step = float(-ndtri(level / 2)) * math.sqrt(share), math.sqrt(share - before)
         error += _excess(end, places, weights, step, 0.0)
         inside = end * nodes
-        density = norm.pdf(inside[:, None], places, step) @ weights
+        density = _normal_density(inside[:, None], places, step) @ weights
         places, weights, before = inside, density * end * of_nodes, share
     return error
 
 
+def _normal_density(values: Array, means: Array, sd: float) -> Array:
+    density: Array = np.exp(-(((values - means) / sd) ** 2) / 2) / (sd * math.sqrt(2 * math.pi))
+    return density
+
+
 def _excess(end: float, places: Array, weights: Array, step: float, due: float) -> float:
     """Return the probability beyond ``due`` that a walk from ``places`` leaves ± ``end`` in a ``step``."""
-    return float(weights @ (norm.sf(end, places, step) + norm.cdf(-end, places, step))) - due
+    return float(weights @ (ndtr((places - end) / step) + ndtr((-end - places) / step))) - due
 
 
 @lru_cache(maxsize=4096)
 def clopper_pearson(count: int, n: int) -> Interval:
     """Return the exact 95 % interval of the proportion ``count`` / ``n``."""
-    ends = binomtest(count, n).proportion_ci(0.95, method="exact")
-    return Interval(low=float(ends.low), high=float(ends.high), level=0.95, method="Clopper-Pearson")
+    low = float(betaincinv(count, n - count + 1, 0.025)) if count else 0.0
+    high = float(betaincinv(count + 1, n - count, 0.975)) if count < n else 1.0
+    return Interval(low=low, high=high, level=0.95, method="Clopper-Pearson")
 
 
 def bootstrap(n: int, seed: int | None, sampled: Callable[[Whole], Array], alike: str) -> tuple[Interval | None, str]:
@@ -213,6 +218,8 @@ def p_of_draws(drawn: NDArray[np.floating], seen: NDArray[np.floating]) -> Array
     If there are none, p is at most that of one, and follows from a Pearson type III distribution with the first three
     moments of the draws, so that the verdict at a small alpha does not depend on the number of draws.
     """
+    from scipy.stats import pearson3, skew  # noqa: PLC0415 - half a second, and a report needs neither
+
     p = np.asarray((1 + (drawn >= seen).sum(axis=0)) / (1 + len(drawn)))
     if (alone := p * (1 + len(drawn)) < 1.5).any():
         few = drawn[:, alone].astype(np.float64)
@@ -261,9 +268,8 @@ def of_values(values: Iterable[int]) -> Lattice:
 
 def doubled_ranks(values: Array) -> Whole:
     """Return twice the ranks (n, k) within each row of ``values`` (n, k): whole numbers, with mid-ranks for ties."""
-    if not values.size:
-        return np.zeros(values.shape, dtype=np.int64)
-    ranks: Whole = np.rint(2 * rankdata(values, axis=1)).astype(np.int64)
+    of_others = values[:, None, :]
+    ranks: Whole = 1 + 2 * (values[:, :, None] > of_others).sum(axis=2) + (values[:, :, None] == of_others).sum(axis=2)
     return ranks
 
 
@@ -276,7 +282,7 @@ def student_interval(values: Array, level: float = 0.95) -> tuple[float | None, 
     n = len(values)
     if n < 2 or (spread := float(np.std(values, ddof=1))) <= _ROUNDING * float(np.abs(values).max()):
         return None, None
-    half = float(student.ppf((1 + level) / 2, n - 1)) * spread / math.sqrt(n)
+    half = float(stdtrit(n - 1, (1 + level) / 2)) * spread / math.sqrt(n)
     return float(values.mean()) - half, float(values.mean()) + half
 
 
@@ -302,8 +308,11 @@ def false_discovery(ps: Sequence[float | None]) -> tuple[float | None, ...]:
     known = _known(ps)
     if not known:
         return (None,) * len(ps)
-    adjusted = false_discovery_control(np.array([known.get(member, 1.0) for member in range(len(ps))]))
-    return tuple(float(adjusted[member]) if member in known else None for member in range(len(ps)))
+    adjusted: list[float | None] = [None] * len(ps)
+    lowest = 1.0
+    for rank, member in reversed(list(enumerate(sorted(known, key=lambda member: known[member]), start=1))):
+        lowest = adjusted[member] = min(lowest, known[member] * len(ps) / rank)
+    return tuple(adjusted)
 
 
 def _known(ps: Sequence[float | None]) -> dict[int, float]:

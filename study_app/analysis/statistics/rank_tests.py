@@ -17,8 +17,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import chdtrc, fdtrc
-from scipy.stats import norm
+from scipy.special import chdtrc, fdtrc, ndtr, ndtri
 
 from study_app.analysis.statistics.outcome import (
     DRAWS,
@@ -116,7 +115,7 @@ def signed_p(ranks: Whole, v: int, alternative: Alternative = "two-sided") -> tu
     tail = v if alternative == "greater" else below if alternative == "less" else max(v, below)
     if n > _EXACT_UP_TO:
         deviation = (tail - ranks.sum() / 2) / math.sqrt(float((ranks.astype(float) ** 2).sum()) / 4)
-        return min(1.0, both * float(norm.sf(deviation))), None, "normal approximation, corrected for ties"
+        return min(1.0, both * float(ndtr(-deviation))), None, "normal approximation, corrected for ties"
     sums = _sums(tuple(sorted(ranks.tolist())))
     return min(1.0, both * sums.at_least(tail)), min(1.0, both * sums.highest), "exact permutation of signs"
 
@@ -144,7 +143,7 @@ def _fisher(effect: float | None, n: int) -> tuple[Interval | None, str]:
     if abs(effect) == 1.0:
         return None, f"no interval: all {n} differing pairs differ in the same direction"
     deviation = math.sqrt((2 * n**3 + 3 * n**2 + n) / 6) / (n * (n + 1) / 2)
-    reach = float(norm.ppf(0.975)) * deviation
+    reach = float(ndtri(0.975)) * deviation
     low, high = math.tanh(math.atanh(effect) - reach), math.tanh(math.atanh(effect) + reach)
     return Interval(
         low=low, high=high, level=0.95, method="Fisher z (approximate: coverage of about 90 % for up to 24 pairs)"

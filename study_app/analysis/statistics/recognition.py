@@ -17,7 +17,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import binom
+from scipy.special import bdtr
 
 from study_app.analysis.statistics.outcome import (
     SAMPLES,
@@ -245,7 +245,7 @@ def _p_more_often(named: _Flags, named_other: _Flags, answered: _Flags) -> float
     """
     both = answered.all(axis=1)
     more, less = int((named & ~named_other & both).sum()), int((named_other & ~named & both).sum())
-    return float(binom.sf(more - 1, more + less, 0.5)) if more + less else 1.0
+    return float(bdtr(less, more + less, 0.5)) if more + less else 1.0
 
 
 def _note(n: int, undecided: int, smallest: float) -> str:

@@ -13,8 +13,7 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import f as variance_ratio
-from scipy.stats import t as student
+from scipy.special import fdtrc, stdtr, stdtrit
 
 from study_app.analysis.statistics.outcome import FEW, NO_VARIATION, Array, Interval, Outcome, complete_rows
 from study_app.analysis.statistics.trend import Direction
@@ -77,8 +76,8 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
         p, method = student_test(statistic, n - 1, direction)
     else:
         statistic = float(means @ np.linalg.solve(covariance, means)) * n * (n - several) / (several * (n - 1))
-        p, method = float(variance_ratio.sf(statistic, several, n - several)), f"F({several}, {n - several})"
-    reach = float(student.ppf((1 + _SURE) / 2, n - 1)) * errors
+        p, method = float(fdtrc(several, n - several, statistic)), f"F({several}, {n - several})"
+    reach = float(stdtrit(n - 1, (1 + _SURE) / 2)) * errors
     ends = zip((means - reach).tolist(), (means + reach).tolist(), strict=True)
     intervals = tuple(Interval(low=low, high=high, level=_SURE, method="Student's t") for low, high in ends)
     return replace(
@@ -100,7 +99,7 @@ def slope_test(values: ArrayLike, columns: ArrayLike | None = None, direction: D
 
 def student_test(t: float, freedom: int, direction: Direction | None) -> tuple[float, str]:
     """Return p of a ``t`` with ``freedom`` degrees of freedom, and the name of the test with its sides."""
-    upper, lower = float(student.sf(t, freedom)), float(student.cdf(t, freedom))
+    upper, lower = float(stdtr(freedom, -t)), float(stdtr(freedom, t))
     p = {"increasing": upper, "decreasing": lower, None: 2 * min(upper, lower)}[direction]
     return p, f"t({freedom}), " + (f"one-sided ({direction})" if direction else "two-sided")
 

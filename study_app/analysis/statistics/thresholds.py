@@ -17,8 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
-from scipy.special import xlogy
-from scipy.stats import t as student
+from scipy.special import stdtrit, xlogy
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked_values
 from study_app.psychophysics.grid import Z_95, Grid, Posterior, Values, evenly, fit, geometric, tables
@@ -175,7 +174,7 @@ def _pooled(levels: Array, yes: Array, asked: Array) -> tuple[Posterior, float, 
     return (
         posterior,
         dispersion,
-        _ends(posterior, dispersion * float(student.ppf((1 + _SURE) / 2, people - 1) / Z_95) ** 2),
+        _ends(posterior, dispersion * float(stdtrit(people - 1, (1 + _SURE) / 2) / Z_95) ** 2),
     )
 
 
@@ -334,6 +333,6 @@ def group_mean(
     if n < FEWEST:
         return GroupMean(n=n, mean=mean, low=None, high=None, between=between)
     variance = float((weights * (y - mean) ** 2).sum()) / ((n - 1) * float(weights.sum()))
-    half, (below, above) = float(student.ppf(0.975, n - 1)) * math.sqrt(variance), shared
+    half, (below, above) = float(stdtrit(n - 1, 0.975)) * math.sqrt(variance), shared
     low, high = mean - math.hypot(half, below), mean + math.hypot(half, above)
     return GroupMean(n=n, mean=mean, low=low, high=high, between=between)

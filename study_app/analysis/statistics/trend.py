@@ -17,7 +17,7 @@ from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from study_app.analysis.statistics.outcome import (
     NO_VARIATION,
@@ -169,7 +169,7 @@ def _page(ranks: Whole, found: int) -> float:
     if n > EXACT_UP_TO or k > _MOST:
         mean = n * k * (k + 1) ** 2 / 2
         spread = ((ranks - (k + 1.0)) ** 2).sum() / (k - 1) * k * (k * k - 1) / 12
-        return float(norm.sf((found - mean) / math.sqrt(spread)))
+        return float(ndtr((mean - found) / math.sqrt(spread)))
     return _sums(tuple(sorted(tuple(sorted(row)) for row in ranks.tolist()))).at_least(found)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from study_app import figure_style
 from study_app.analysis.data.blocks import LevelBlock, OwnDynamics
-from study_app.analysis.figures.level_figures import level_pictures
+from study_app.analysis.figures.level_figures import level_figure_tasks
 from study_app.analysis.figures.summary_figures import estimates_of
 from study_app.analysis.levels.answers import Answers, LevelAnswers, SettingEstimate
 from study_app.analysis.levels.evaluate import level_findings, level_limits, level_methods, level_section
@@ -19,6 +19,7 @@ from study_app.analysis.levels.exponents import ExponentEstimate
 from study_app.analysis.levels.sensitivities import SensitivityEstimate
 from study_app.analysis.levels.statistic import LevelStatistic, statistics
 from study_app.analysis.levels.thresholds import ThresholdEstimate, Thresholds
+from study_app.analysis.page_layout import draw_figures
 from study_app.analysis.report import first_page
 from study_app.analysis.results import Failures, GroupAnswers, LevelsResult
 from study_app.protocol.model import Published
@@ -239,7 +240,7 @@ def lines_of(number: int) -> Iterator[str]:
         drawable = not Thresholds.own(found) or (
             len({one.standard for one in Answers.of(found)}) > 1 and not found.adaptive
         )
-        pictures = list(level_pictures(around, [found], ("png",), failures)) if drawable else []
+        pictures = list(draw_figures(level_figure_tasks(around, [found], ("png",)), failures)) if drawable else []
     assert not failures.found, str(failures.found)
     for picture in pictures:
         yield from (picture.caption, *figure_words(picture.files["png"]))

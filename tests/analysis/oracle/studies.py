@@ -76,10 +76,12 @@ def write(name: str, study: Path, to: Path, *, figures: bool = False) -> Written
     """Write the report of a study, its figures as texts alone or not at all."""
     with figures_as_lines(), pytest.MonkeyPatch.context() as patched:
         if not figures:
-            for pictures in ("pictures", "summary_pictures", "level_pictures", "question_pictures"):
-                patched.setattr(write_report, pictures, lambda *_, **__: ())
+            for what in ("block", "summary", "level", "question"):
+                patched.setattr(write_report, f"{what}_figure_tasks", lambda *_, **__: ())
         write_report.report(study, to, failed=pytest.fail)
-    assert write_report.pictures is study_figures.pictures, "a patch that stays would change later reports"
+    assert write_report.block_figure_tasks is study_figures.block_figure_tasks, (
+        "a patch that stays would change later reports"
+    )
     return Written(study, to, FILES[name])
 
 

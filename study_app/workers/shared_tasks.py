@@ -1,0 +1,65 @@
+"""Tasks that this process shares with a copy of itself."""
+
+import multiprocessing
+import sys
+import threading
+from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence
+from multiprocessing.connection import Connection
+from typing import Generic, TypeVar
+
+Result = TypeVar("Result")
+
+
+class SharedTasks(Generic[Result]):
+    """Computes tasks in this process and in a forked one, which inherits all values; only results are pickled.
+
+    The forked process begins at once with the last task, this process later with the first one. All tasks are computed
+    here if the system cannot fork (Windows, macOS) or if this process has other threads, whose locks a fork would copy;
+    so are those that a forked process leaves if it dies.
+    """
+
+    def __init__(self, tasks: Sequence[Callable[[], Result]]) -> None:
+        """Start the process, if it is safe."""
+        self._tasks = tasks
+        self._begun: MutableSequence[int] = bytearray(len(tasks))
+        self._other_results: Connection | None = None
+        if sys.platform == "linux" and threading.active_count() == 1 and len(tasks) > 1:
+            context = multiprocessing.get_context("fork")
+            # Without a lock: if both processes begin a task at the same moment, both compute the same result.
+            self._begun = context.RawArray("b", len(tasks))
+            self._other_results, sender = context.Pipe(duplex=False)
+            self._process = context.Process(target=self._send_results, args=(sender,), daemon=True)
+            self._process.start()
+            sender.close()
+
+    def results(self, tell: Callable[[Result], object] = bool) -> list[Result]:
+        """Compute the remaining tasks, and return all results in the order of the tasks.
+
+        ``tell`` is called with each result that is computed in this process.
+        """
+        computed: dict[int, Result] = {}
+
+        def compute(indices: Iterable[int]) -> None:
+            for index in indices:
+                computed[index] = self._tasks[index]()
+                tell(computed[index])
+
+        compute(self._not_begun(range(len(self._tasks))))
+        if self._other_results is not None:
+            try:
+                computed |= self._other_results.recv()
+            except (EOFError, OSError):
+                compute(index for index in range(len(self._tasks)) if index not in computed)
+            finally:
+                self._other_results.close()
+                self._process.join()
+        return [computed[index] for index in range(len(self._tasks))]
+
+    def _send_results(self, sender: Connection) -> None:
+        sender.send({index: self._tasks[index]() for index in self._not_begun(reversed(range(len(self._tasks))))})
+
+    def _not_begun(self, indices: Iterable[int]) -> Iterator[int]:
+        for index in indices:
+            if not self._begun[index]:
+                self._begun[index] = 1
+                yield index
