@@ -133,13 +133,15 @@ def _fitted(model: CumulativeModel, likelihood: "_Likelihood", direction: Direct
         no_interval="" if several == 1 else _SEVERAL,
         log_odds_ratios=tuple(betas.tolist()),
         intervals=intervals,
-        sds=tuple(whole.x[likelihood.where.stop :].tolist()),
+        sds=tuple(sd if sd > _LEAST_SD else 0.0 for sd in whole.x[likelihood.where.stop :].tolist()),
         thresholds=tuple(likelihood.thresholds(whole.x).tolist()),
         log_likelihood=float(-whole.fun),
     )
 
 
 _MOST_LOG_ODDS: Final = 15.0
+_LEAST_SD: Final = 1e-3
+"""The search stops here, since at 0 the gradient is 0 even if the likelihood rises with the SD; it is reported as 0."""
 _SEPARATED: Final = "the conditions or the participants separate the answers completely"
 _SEVERAL: Final = "there is no single effect size, because there is one log odds ratio per condition"
 
@@ -191,7 +193,7 @@ class _Likelihood:
         bounds = [(-_MOST_LOG_ODDS, _MOST_LOG_ODDS)] * len(start)
         if null:
             bounds[self.where] = [(0.0, 0.0)] * self.effects
-        bounds[self.where.stop :] = [(0.0, _MOST_LOG_ODDS)] * sds
+        bounds[self.where.stop :] = [(_LEAST_SD, _MOST_LOG_ODDS)] * sds
         options = {"maxiter": 500, "ftol": 1e-12, "gtol": 1e-6}
         for nodes in _NODES:
             self._integrate(nodes)
@@ -243,7 +245,7 @@ class _Likelihood:
 
     def standard_errors(self, parameters: Array) -> Array | None:
         """Return the standard errors of the effects, from the observed information; None if it is singular."""
-        free = [place for place in range(len(parameters)) if place < self.where.stop or parameters[place] > 1e-3]
+        free = [place for place in range(len(parameters)) if place < self.where.stop or parameters[place] > _LEAST_SD]
         step = 1e-4
         columns = []
         for change in step * np.eye(len(parameters)):

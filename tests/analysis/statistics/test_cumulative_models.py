@@ -61,6 +61,18 @@ def test_the_model_is_the_maximum_of_an_independent_likelihood(seed: int, over_d
     assert (model.n, model.dropped, model.incomplete, model.answers) == (13, 1, 1, (~np.isnan(values)).sum())
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1011, 1066])
+def test_a_search_does_not_end_at_a_standard_deviation_of_0_that_is_no_maximum(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    levels = np.arange(5.0)[:, None]
+    own = 4 + 0.5 * rng.normal(size=(12, 1, 1)) + 0.1 * rng.normal(size=(12, 1, 1)) * levels
+    values = np.clip(np.round(own + rng.logistic(size=(12, 5, 2))), 1, 7)
+    model = cumulative_model(values, levels)
+    oracle = fitted(rows_of(values), levels, None, slopes=True)
+    assert (model.statistic, model.p) == pytest.approx((oracle["statistic"], oracle["p"]), abs=5e-3)
+
+
 def test_sides_are_those_of_the_signed_root() -> None:
     values = drawn(81, effect=0.5, people=10)
     two, rising, falling = (cumulative_model(values, DELAYS, side) for side in (None, "increasing", "decreasing"))
