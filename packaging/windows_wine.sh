@@ -51,6 +51,10 @@ linux_study() {
         LIQUID_STUDY_WORKSPACE=$folder/linux QT_QPA_PLATFORM=offscreen "$here/.venv/bin/python" -m study_app "$@" 2>&1
 }
 
+# End all programs of this prefix, and the screen: what is left would draw on a screen that no longer exists.
+end_programs() { (cd "$folder" && wine /usr/lib/wine/wineserver -k) 2>/dev/null || true; }
+trap 'end_programs; kill "${server:-}" 2>/dev/null || true' EXIT
+
 # make_prefix NAME: make an empty Windows in this folder.
 make_prefix() {
     rm -rf "${folder:?}/$1"
@@ -213,7 +217,6 @@ windows() {
     if ! xdotool getdisplaygeometry >/dev/null 2>&1; then # no server; a dead one may have left its socket
         Xvfb "$DISPLAY" -screen 0 1600x1000x24 -nolisten tcp >/dev/null 2>&1 &
         server=$!
-        trap 'kill "$server" 2>/dev/null || true' EXIT
         sleep 3
     fi
     study >"$folder/shots/home.log" &
@@ -238,7 +241,7 @@ windows() {
     wait_for has_event item_shown && picture questions
     xdotool key 5 && sleep 1 && xdotool key 3 && sleep 1 && xdotool key Return
     wait_for has_event responses && picture next-trial
-    (cd "$folder" && wine /usr/lib/wine/wineserver -k) || true # of this prefix
+    end_programs
     wait %% 2>/dev/null || true
     if [ -s "$folder/shots/home.log" ]; then cat "$folder/shots/home.log"; fi
 }
