@@ -238,7 +238,7 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
     from study_app.analysis.evaluate import evaluate  # noqa: PLC0415
     from study_app.analysis.figures.summary_figures import numbers_of, summary_figure_tasks  # noqa: PLC0415
     from study_app.analysis.page_layout import draw_figures  # noqa: PLC0415
-    from study_app.analysis.report.first_page import cards, presented_sentences  # noqa: PLC0415
+    from study_app.analysis.report.first_page import cards, presented_in  # noqa: PLC0415
     from study_app.analysis.report.study_figures import block_figure_tasks  # noqa: PLC0415
     from study_app.analysis.results import Failures  # noqa: PLC0415
 
@@ -252,7 +252,7 @@ def _evaluate(study: Study, drawn: list[Picture], send: Send, stop: Callable[[],
         drawn.append(picture)
         send(_figure(picture))
         going("drawing", _EVALUATION + (1 - _EVALUATION) * min(1.0, number / 8))
-    presented = Failures().value("the presented liquids", lambda: presented_sentences(study), {})
+    presented = Failures().value("the presented liquids", lambda: presented_in(study), {})
     page = []
     for place, card in enumerate(cards(results, numbers, presented)):
         figure, answer = card.figure_of(drawn), " ".join(card.sentences)

@@ -128,7 +128,7 @@ def test_the_first_page_is_shown_if_the_presented_liquids_cannot_be_named(
         raise LookupError("no such liquid")
 
     told(OpenKey(study, "AK", "done"))
-    monkeypatch.setattr("study_app.analysis.report.first_page.presented_sentences", fail)
+    monkeypatch.setattr("study_app.analysis.report.first_page.presented_in", fail)
     (first,) = of_kind(FirstPage, told(ReadStudy(study)))
     assert len(first.names) == 3
 

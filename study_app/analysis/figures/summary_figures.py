@@ -50,13 +50,15 @@ class Estimates(NamedTuple):
 class Numbers(NamedTuple):
     """A score or a question: the name of each setting with each participant's number.
 
-    ``bounds`` are the ends of its answer scale.
+    ``bounds`` are the ends of its answer scale, ``codes`` those of the settings.
     """
 
     title: str
     bounds: tuple[float, float] | None
     is_score: bool
     by_setting: tuple[tuple[str, dict[str, float]], ...]
+    id: str = ""
+    codes: tuple[str, ...] = ()
 
 
 def estimates_of(result: LevelsResult) -> Estimates | None:
@@ -220,10 +222,16 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
     Two settings that a hypothesis compares are in its order.
     """
     scores = [score for score in study.others.scores if score.where.id == where]
-    tables: list[tuple[str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
+    tables: list[tuple[str, str, tuple[float, float] | None, QuestionPlace, pd.DataFrame]]
     if scores:
         tables = [
-            (score.title, score.bounds, score.where, scored(study, score).rename(columns={"score": "value"}))
+            (
+                score.name,
+                score.title,
+                score.bounds,
+                score.where,
+                scored(study, score).rename(columns={"score": "value"}),
+            )
             for score in scores
         ]
     else:
@@ -233,11 +241,12 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
             if question.where.id == where and question.bounds is not None
         ]
         tables = [
-            (question.short, question.scale_ends, question.where, study.answers_to(question)) for question in asked
+            (question.id, question.short, question.scale_ends, question.where, study.answers_to(question))
+            for question in asked
         ]
     numbers = []
     in_hypotheses = [contrast.within for contrast in study.contrasts]
-    for title, bounds, place, rows in tables:
+    for name, title, bounds, place, rows in tables:
         settings: list[tuple[str | None, str]] = [(it.code, place.name(it)) for it in place.settings]
         if tuple(it.condition for it in reversed(place.settings)) in in_hypotheses:
             settings.reverse()
@@ -247,7 +256,17 @@ def _numbers_at(study: Study, where: str) -> list[Numbers]:
             means = here.astype({"value": float}).groupby("participant")["value"].mean()
             by_setting.append((words, {str(who): float(value) for who, value in means.items()}))
         if any(values for _, values in by_setting):
-            numbers.append(Numbers(title, bounds, bool(scores), tuple(by_setting)))
+            codes = tuple(code for code, _ in settings if code is not None)
+            numbers.append(
+                Numbers(
+                    id=name,
+                    title=title,
+                    bounds=bounds,
+                    is_score=bool(scores),
+                    by_setting=tuple(by_setting),
+                    codes=codes,
+                )
+            )
     return numbers
 
 

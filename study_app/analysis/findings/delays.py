@@ -248,18 +248,21 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
 
     def limits(self) -> Iterator[str]:
         against, result = self.value, self.found
-        if against and result.n < fewest_participants((first := against[0].found).alpha, first.bound):
+        if not against:
+            return
+        first, lead, control = against[0].found, lead_phrase(result), ms(against[0].control_ms)
+        if result.n < fewest_participants(first.alpha, first.bound):
             yield (
-                f"{lead_phrase(result)}: equivalence can only be concluded with "
-                f"{min_sample_reason(first.alpha, first.bound)}. This study has {counted(result.n, 'participant')}."
+                f"{lead}: to show that a mean answer stays within {bound_text(first.bound)} of that at {control}, a "
+                f"study needs {min_sample_reason(first.alpha, first.bound)}. This study has "
+                f"{counted(result.n, 'participant')}, so it can show only that a mean answer differs by more."
             )
-        open_ones = [tested for tested in against if tested.verdict in ("inconclusive", "out of reach")]
+        open_ones = sum(tested.verdict in ("inconclusive", "out of reach") for tested in against)
         if open_ones:
-            verdicts = " or ".join(sorted({tested.verdict for tested in open_ones}))
             yield (
-                f"{lead_phrase(result)}: {len(open_ones)} of {number_text.counted(len(against), 'comparison')} with "
-                f"{ms(open_ones[0].control_ms)} {'is' if len(open_ones) == 1 else 'are'} {verdicts}: neither "
-                "equivalence nor a mean difference beyond the bounds can be concluded."
+                f"{lead}: in {open_ones} of {number_text.counted(len(against), 'comparison')} with {control} (one "
+                f"for each statement and delay), the data show neither that the mean answer stays within "
+                f"{bound_text(first.bound)} nor that it differs by more."
             )
 
     def methods(self) -> Iterator[str]:

@@ -2,15 +2,15 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from markupsafe import Markup
 
 from study_app.analysis.contrasts import RATIOS, answer, mean_words, question
-from study_app.analysis.data.blocks import AFTER, Block, LevelBlock
+from study_app.analysis.data.blocks import AFTER, Block, LevelBlock, Setting
 from study_app.analysis.data.measures import AGREEMENT
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.figures.people_figures import Mean, mean_of, panel_rows
@@ -19,20 +19,36 @@ from study_app.analysis.findings import all_findings
 from study_app.analysis.html_page import picture, render
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.report.sections import answers, empty_studies, none_found, place_title
-from study_app.analysis.results import BADGES, BlockResult, ContrastResult, LevelsResult, QuestionResult, Results
+from study_app.analysis.results import (
+    BADGES,
+    BlockResult,
+    ContrastResult,
+    LevelsResult,
+    QuestionResult,
+    Results,
+    lead_phrase,
+)
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, ms, number, significant
+from study_app.number_text import capitalised
 from study_app.protocol.model import quoted_title
 from study_app.protocol.quantities import quantity, quantity_words
 
 _BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] |\b(?:d_z|g) (?=[−\d])")
 """Where a line must not break: in an interval, before a percent sign, in "n = 12" and "p < .001"."""
-_LIMITS_SHOWN: Final = 6
-"""So many limits are listed on the first page; the others are folded."""
+_IN_PARENTHESES: Final = re.compile(r" \(([^()]*)\)\.$")
+"""The end of a limitation that applies to some participants."""
+
+
+class Presented(NamedTuple):
+    """What a block presented: a sentence, and by condition ("": all of them) its liquids, delays and displays."""
+
+    sentence: str
+    of: Mapping[str, tuple[str, ...]] = MappingProxyType({})
 
 
 _NO_NUMBERS: Final[Mapping[str, Sequence[Numbers]]] = MappingProxyType({})
-_NOT_PRESENTED: Final[Mapping[str, str]] = MappingProxyType({})
+_NOT_PRESENTED: Final[Mapping[str, Presented]] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,20 +80,17 @@ class Card:
         return None
 
 
-def presented_sentences(study: Study) -> dict[str, str]:
-    """Return, by block, a sentence on the liquids and delays of its conditions; sealed blocks have none."""
-    sentences: dict[str, str] = {}
+def presented_in(study: Study) -> dict[str, Presented]:
+    """Return, by block, what its conditions presented; sealed blocks have nothing."""
+    presented: dict[str, Presented] = {}
     blocks: list[Block | LevelBlock] = [*study.blocks, *study.levels]
     has_delays = any((setting.of or setting).delay_ms != 0.0 for block in blocks for setting in block.settings)
     for block in blocks:
         stimulus, reference = (block.stimulus, block.reference) if isinstance(block, LevelBlock) else (None, None)
         conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
-        liquids = [
-            f"“{liquid.replace('_', ' ')}”" for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid
-        ]
+        liquids, delays, displays = _liquids(conditions), _delays(conditions), _displays(conditions)
         if not liquids:
             continue
-        delays = sorted({condition.delay_ms for condition in conditions if condition.delay_ms is not None})
         delay = f"visual delays of {listed([f'{delay_ms:g}' for delay_ms in delays])} ms"
         if len(delays) < 2:
             delay = "a varied visual delay" if not delays else f"a visual delay of {ms(delays[0])}"
@@ -89,13 +102,58 @@ def presented_sentences(study: Study) -> dict[str, str]:
         elif has_delays:
             details.append("no visual delay")
         design = f" ({block.design.paper_name})" if isinstance(block, LevelBlock) else ""
-        displays = dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words)
-        sentences[block.id] = (
+        by_condition: dict[str, list[Setting]] = {"": conditions}
+        for one in conditions:
+            by_condition.setdefault(one.condition or "", []).append(one)
+        presented[block.id] = Presented(
             f"In the block “{block.title}”{design}, the liquid{'s were' if len(liquids) > 1 else ' was'} "
             f"{listed(liquids)}{f', with {listed(details)}' if details else ''}"
-            f"{''.join(f', {words}' for words in displays)}."
+            f"{''.join(f', {words}' for words in displays)}.",
+            {name: _presented_words(of) for name, of in by_condition.items()},
         )
-    return sentences
+    return presented
+
+
+def _liquids(conditions: Sequence[Setting]) -> list[str]:
+    return [f"“{liquid.replace('_', ' ')}”" for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid]
+
+
+def _delays(conditions: Sequence[Setting]) -> list[float]:
+    return sorted({condition.delay_ms for condition in conditions if condition.delay_ms is not None})
+
+
+def _displays(conditions: Sequence[Setting]) -> list[str]:
+    return list(dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words))
+
+
+def _presented_words(conditions: Sequence[Setting]) -> tuple[str, ...]:
+    """Return the liquids, delays and displays of conditions in the words that tell two names apart."""
+    delays = [f"{delay_ms:g}" for delay_ms in _delays(conditions)]
+    delay = f"{listed(delays)} ms of visual delay" if delays != ["0"] else "no visual delay"
+    return listed(_liquids(conditions)), delay if delays else "", listed(_displays(conditions))
+
+
+def _told_apart(names: Sequence[str], presented: Sequence[tuple[str, ...]]) -> list[str]:
+    """Return, for each name, its differing liquids, delays and displays in parentheses unless the name says them.
+
+    Each result has a leading space; it is "" if there is nothing to add.
+    """
+    differing = [len({*words}) > 1 for words in zip(*presented, strict=False)]
+    added = []
+    for name, of in zip(names, presented, strict=True):
+        words = [
+            part for part, differs in zip(of, differing, strict=False) if differs and part and not _is_said(part, name)
+        ]
+        added.append(f" ({', '.join(words)})" if words else "")
+    return added
+
+
+def _is_said(part: str, name: str) -> bool:
+    """Return whether a name says a liquid or delay: "60 ms late" says "60 ms of visual delay"."""
+    if part == "no visual delay":
+        return re.search(r"\b(no|without|zero)\b.*\b(delay|latency|lag)|\b0 ms", name, re.IGNORECASE) is not None
+    said = part.removesuffix(" ms of visual delay").strip("“”")
+    return re.search(rf"\b{re.escape(said)}\b", name, re.IGNORECASE) is not None
 
 
 def _standards(block: Block | LevelBlock) -> str:
@@ -111,27 +169,34 @@ def _standards(block: Block | LevelBlock) -> str:
 def cards(
     results: Results,
     numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS,
-    presented: Mapping[str, str] = _NOT_PRESENTED,
+    presented: Mapping[str, Presented] = _NOT_PRESENTED,
 ) -> tuple[Card, ...]:
     """Return the answers of a study, those to its hypotheses first.
 
-    ``numbers`` are those of `numbers_of` and ``presented`` those of `presented_sentences`.
+    ``numbers`` are those of `numbers_of` and ``presented`` those of `presented_in`.
     """
-    levels = _levels(results, presented)
-    return (*_hypotheses(results, presented), *_statements(results, presented), *levels, *_questions(results, numbers))
+    return (
+        *_hypotheses(results, numbers, presented),
+        *_statements(results, presented),
+        *_levels(results, presented),
+        *_questions(results, numbers, presented),
+    )
 
 
-def _hypotheses(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
+def _hypotheses(
+    results: Results, numbers: Mapping[str, Sequence[Numbers]], presented: Mapping[str, Presented]
+) -> Iterator[Card]:
     told: set[str] = set()
     for place, contrast in enumerate(results.contrasts, start=1):
         blocks = contrast.contrast.blocks
-        new = [presented[block] for block in blocks if block in presented and block not in told]
+        new = [presented[block].sentence for block in blocks if block in presented and block not in told]
         told.update(blocks)
+        lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"
         yield Card(
-            question=f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}: {question(contrast)}",
+            question=f"{lead}: {_question_words(contrast, presented)}",
             verdict=contrast.verdict,
             sentences=(
-                f"{answer(contrast)}{_unit_words(contrast, results)}",
+                f"{answer(contrast)}{_scale_words(contrast, results, numbers)}",
                 *_cell_words(contrast),
                 *filter(None, [" ".join(new)]),
             ),
@@ -140,14 +205,36 @@ def _hypotheses(results: Results, presented: Mapping[str, str]) -> Iterator[Card
         )
 
 
-def _unit_words(contrast: ContrastResult, results: Results) -> str:
-    """Return a sentence on the unit of thresholds or points of subjective equality, with a leading space, or ""."""
-    of = next((level for level in results.levels if level.block == contrast.contrast.blocks[0]), None)
-    if of is None or contrast.contrast.measure not in RATIOS:
-        return ""
-    if of.level_kind == "weber":
-        return " Values are Weber fractions."
-    return f" Values are in {of.unit}." if of.unit else ""
+def _question_words(contrast: ContrastResult, presented: Mapping[str, Presented]) -> str:
+    """Return the hypothesis, with the liquids and delays that distinguish what it compares."""
+    of = contrast.contrast
+    names = (contrast.within_names or of.within or ("", "")) if of.is_interaction else contrast.compared
+    if of.within is None:
+        return question(contrast)
+    blocks = of.blocks if len(of.blocks) == 2 else of.blocks * 2
+    by_condition = [presented[block].of if block in presented else {} for block in blocks]
+    sides = [held.get(name, ()) for held, name in zip(by_condition, of.conditions or ("", ""), strict=True)]
+    added = _told_apart(names, sides)
+    first, second = (f"{quoted_title(name)}{words}" for name, words in zip(names, added, strict=True))
+    if of.is_interaction:
+        return question(replace(contrast, within_names=(first, second)))
+    return question(replace(contrast, compared=(first, second)))
+
+
+def _scale_words(contrast: ContrastResult, results: Results, numbers: Mapping[str, Sequence[Numbers]]) -> str:
+    """Return a sentence on the unit or scale of the compared values, with a leading space; "" if there is none."""
+    of = contrast.contrast
+    level = next((level for level in results.levels if level.block == of.blocks[0]), None)
+    if level is not None and of.measure in RATIOS:
+        if level.level_kind == "weber":
+            return " Values are Weber fractions."
+        return f" Values are in {level.unit}." if level.unit else ""
+    if level is not None and of.measure == "d_prime":
+        return " At chance, d′ is 0."
+    bounds = [one.bounds for one in numbers.get(of.form or "", ()) if one.id == of.measure]
+    if bounds and bounds[0] is not None:
+        return " The scale ranges from {:g} to {:g}.".format(*bounds[0])
+    return ""
 
 
 def _cell_words(contrast: ContrastResult) -> Iterator[str]:
@@ -159,13 +246,13 @@ def _cell_words(contrast: ContrastResult) -> Iterator[str]:
             yield f"Mean{'s' * (len(means) > 1)} in the group {group} (95 % intervals): {listed(means)}."
 
 
-def _statements(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
+def _statements(results: Results, presented: Mapping[str, Presented]) -> Iterator[Card]:
     told = {block for contrast in results.contrasts for block in contrast.contrast.blocks}
     findings = {finding.key: finding for finding in all_findings() if finding.question}
     kinds = {block.id: block.kind for block in results.blocks}
     for given in answers(results):
         finding = findings[given.question]
-        new = () if given.block in told else filter(None, [presented.get(given.block)])
+        new = [presented[given.block].sentence] if given.block in presented and given.block not in told else []
         yield Card(
             question=f"{given.title}: {finding.question.format(kind=kinds[given.block])}",
             verdict=given.verdict,
@@ -198,26 +285,26 @@ def _agreement_words(result: BlockResult) -> Iterator[str]:
         yield f"{agreed} of {n} {who} with “{item.short}” ({100 * agreed / n:.0f} %{ends}; median {row['median']:g})."
 
 
-def _levels(results: Results, presented: Mapping[str, str]) -> Iterator[Card]:
-    """Yield the estimates of blocks of levels, except those that a hypothesis already shows."""
+def _levels(results: Results, presented: Mapping[str, Presented]) -> Iterator[Card]:
+    """Yield the estimates of blocks of levels, except those that a hypothesis already shows; one card if sealed."""
+    if sealed := [level for level in results.levels if not level.revealed]:
+        yield Card(
+            question=listed([level.title for level in sealed]),
+            verdict="sealed",
+            sentences=("The standards, levels and correct answers are shown after unblinding.",),
+            block=sealed[0].block,
+            figures=(),
+        )
     shown = {(block, contrast.contrast.measure) for contrast in results.contrasts for block in contrast.contrast.blocks}
     for level in results.levels:
-        estimates = estimates_of(level)
-        if not level.revealed:
-            yield Card(
-                question=level.title,
-                verdict="sealed",
-                sentences=("The standards, levels and correct answers are shown after unblinding.",),
-                block=level.block,
-                figures=(),
-            )
-        elif estimates is not None and (level.block, estimates.attribute) not in shown:
+        estimates = estimates_of(level) if level.revealed else None
+        if estimates is not None and (level.block, estimates.attribute) not in shown:
             yield Card(
                 question=f"{level.title}: {estimates.words}",
                 verdict="",
                 sentences=(
                     *_estimate_words(level, estimates.group, estimates.attribute, estimates.words),
-                    *filter(None, [presented.get(level.block)]),
+                    *([presented[level.block].sentence] if level.block in presented else ()),
                 ),
                 block=level.block,
                 figures=(f"estimates-{level.block}",),
@@ -245,42 +332,64 @@ def _ends(low: float, high: float) -> str:
     return f"[{significant(low)}, {significant(high)}]"
 
 
-def _questions(results: Results, numbers_at: Mapping[str, Sequence[Numbers]]) -> Iterator[Card]:
-    """Yield the answers to questions other than statements, by place; scores replace their questions."""
+def _questions(
+    results: Results, numbers_at: Mapping[str, Sequence[Numbers]], presented: Mapping[str, Presented]
+) -> Iterator[Card]:
+    """Yield the answers to questions other than statements, by place; scores replace their questions.
+
+    Numbers that a hypothesis already shows are left out.
+    """
     levels, scores = {level.block for level in results.levels}, {score.where for score in results.scores}
     asked_at = [result for result in results.questions if result.where not in levels]
     in_order = sorted(asked_at, key=lambda one: one.is_form + (one.is_form and one.where not in scores))
     for where in dict.fromkeys(result.where for result in in_order):
         asked = [result for result in results.questions if result.where == where and result.n]
-        numbers = numbers_at.get(where, ())
+        numbers = [one for one in numbers_at.get(where, ()) if not _is_in_hypotheses(one, where, results)]
         if not asked:
             continue
-        figures = [f"answers-{where}"]
-        sentences = [_number_words(one) for one in numbers[:MOST_PANELS]]
+        sentences = [
+            _number_words(one, presented if place == 0 else _NOT_PRESENTED)
+            for place, one in enumerate(numbers[:MOST_PANELS])
+        ]
         chosen = [result for result in asked if result.measure == "counts"]
         sentences += [_choice_words(result) for result in chosen]
-        figures += [f"question-{where}-{result.item}" for result in chosen]
         if sentences:
             yield Card(
                 question=place_title(asked[0], results),
                 verdict="",
                 sentences=tuple(sentences),
                 block=where,
-                figures=tuple(figures),
-                is_small=asked[0].is_form,
+                figures=(
+                    *([f"answers-{where}"] if numbers else ()),
+                    *(f"question-{where}-{result.item}" for result in chosen),
+                ),
+                is_small=asked[0].is_form or all(len(one.by_setting) < 2 for one in numbers),
             )
 
 
-def _number_words(numbers: Numbers) -> str:
+def _is_in_hypotheses(numbers: Numbers, where: str, results: Results) -> bool:
+    """Return whether hypotheses show a number of a form after all blocks, and for all its participants."""
+    shown = [one for one in results.contrasts if (one.contrast.form, one.contrast.measure) == (where, numbers.id)]
+    blocks = {block for one in shown for block in one.contrast.blocks}
+    people = {who for one in shown for who in (*one.left_out, *(who for side in one.sides for who in side.values))}
+    held = {who for _, values in numbers.by_setting for who in values}
+    return bool(shown) and blocks >= {*numbers.codes} and people >= held
+
+
+def _number_words(numbers: Numbers, presented: Mapping[str, Presented] = _NOT_PRESENTED) -> str:
     """Return the means of a score or question by setting, and for two settings the mean difference.
 
     A number that is entered once describes the sample, so its SD and range are stated instead of an interval.
     """
     what = f"The mean {numbers.title} score" if numbers.is_score else f"The mean of “{numbers.title}”"
-    means = [(name, mean, len(held)) for name, held in numbers.by_setting if (mean := mean_of(held.values()))]
-    parts = [
-        f"{number(mean.value)}{_mean_ends(mean)}{f' {_setting_words(name)}' if name else ''}" for name, mean, _ in means
+    blocks = [presented[code].of[""] if code in presented else () for code in numbers.codes]
+    added = _told_apart([name for name, _ in numbers.by_setting], blocks) if blocks else [""] * len(numbers.by_setting)
+    means = [
+        (f" {_setting_words(name)}{words}" if name else "", mean, len(held))
+        for (name, held), words in zip(numbers.by_setting, added, strict=True)
+        if (mean := mean_of(held.values()))
     ]
+    parts = [f"{number(mean.value)}{_mean_ends(mean)}{where}" for where, mean, _ in means]
     n = max(count for *_, count in means)
     if numbers.bounds is None and not numbers.is_score and len(means) == 1:
         values = [*next(held for _, held in numbers.by_setting if held).values()]
@@ -337,7 +446,7 @@ def first_page(
     limits: Sequence[str],
     numbers: Mapping[str, Sequence[Numbers]] = _NO_NUMBERS,
     drawn: Sequence[Picture] = (),
-    presented: Mapping[str, str] = _NOT_PRESENTED,
+    presented: Mapping[str, Presented] = _NOT_PRESENTED,
 ) -> Markup:
     """Return the answers next to their figures, the limitations, and the error rate of the page."""
     given = cards(results, numbers, presented)
@@ -359,8 +468,7 @@ def first_page(
             for (card, figure), is_small in zip(shown, _in_pairs(given), strict=True)
         ],
         sentences=[*filter(None, [look]), *(() if given else (none_found(results),))],
-        limits=_limits_once(limits),
-        shown=_LIMITS_SHOWN,
+        limits=_limits_by_subject(limits, results),
         empty=empty_studies(max(block.n for block in results.blocks)) if claimed and not results.decided.looks else "",
     )
 
@@ -382,16 +490,26 @@ def _in_pairs(given: Sequence[Card]) -> list[bool]:
     return paired
 
 
-def _limits_once(limits: Sequence[str]) -> list[str]:
-    """Return the limitations without duplicates."""
-    blocks: dict[str, list[str]] = {}
+def _limits_by_subject(limits: Sequence[str], results: Results) -> list[tuple[str, list[str]]]:
+    """Return each hypothesis or block ("": the study) with its limitations, those of several blocks once."""
+    blocks = [words for block in results.blocks for words in (lead_phrase(block), block.title)]
+    hypotheses = [f"Hypothesis {place}" for place, _ in enumerate(results.contrasts, start=1)]
+    subjects = [*blocks, *(level.title for level in results.levels), "Hypothesis", *hypotheses]
+    alike: dict[str, list[tuple[str, str]]] = {}
     for line in limits:
-        title, colon, words = line.partition(": ")
-        blocks.setdefault(words if colon else line, []).append(title if colon else "")
-    return [
-        words if titles == [""] else f"{listed(list(dict.fromkeys(titles)))}: {words}"
-        for words, titles in blocks.items()
-    ]
+        subject = next((subject for subject in subjects if line.startswith(f"{subject}: ")), "")
+        words = line.removeprefix(f"{subject}: ") if subject else line
+        some = _IN_PARENTHESES.search(words) if subject else None
+        alike.setdefault(words[: some.start()] if some else words, []).append((subject, some[1] if some else ""))
+    by_subject: dict[str, list[str]] = {}
+    for words, of in alike.items():
+        is_same = len({some for _, some in of}) == 1
+        each = [of[0][1]] if is_same else [f"{subject}: {some}" for subject, some in of]
+        some_words = f" ({'; '.join(each)})." if of[0][1] else ""
+        subject = listed(list(dict.fromkeys(subject for subject, _ in of)))
+        by_subject.setdefault(subject, []).append(f"{capitalised(words)}{some_words}")
+    alone = [("", [line]) for line in by_subject.pop("", [])]
+    return [*alone, *by_subject.items()]
 
 
 def figures_shown(given: Sequence[Card], drawn: Sequence[Picture]) -> set[str]:

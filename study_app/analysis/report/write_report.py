@@ -35,7 +35,7 @@ from study_app.analysis.planning.preregistration import FILE as PREREGISTRATION
 from study_app.analysis.planning.preregistration import deviations, preregistration_folders
 from study_app.analysis.planning.preregistration import deviations_section as preregistration_section
 from study_app.analysis.report import sections
-from study_app.analysis.report.first_page import cards, figures_shown, first_page, presented_sentences
+from study_app.analysis.report.first_page import cards, figures_shown, first_page, presented_in
 from study_app.analysis.report.methods import methods, version_words
 from study_app.analysis.report.questions_in_full import appendix
 from study_app.analysis.report.study_figures import block_figure_tasks
@@ -376,7 +376,7 @@ def _page(
     failures: Failures,
 ) -> str:
     on_first = failures.value("figures on the first page", lambda: figures_shown(cards(results, numbers), drawn), set())
-    presented = failures.value("the presented liquids", lambda: presented_sentences(study), {})
+    presented = failures.value("the presented liquids", lambda: presented_in(study), {})
     others = [picture for picture in drawn if picture.name not in on_first]
     sections_: list[tuple[str, Callable[[], Iterable[str]]]] = [
         ("Hypotheses", lambda: contrast_section(results)),

@@ -535,7 +535,9 @@ def claims(match: re.Match[str], told: Told) -> bool:
 def too_few_for_equivalence(match: re.Match[str], told: Told) -> bool:
     """Check the least number of participants."""
     first = told.against[0]["found"]
-    return int(match[1]) == fewest(first["alpha"], min(1 / 5, first["bound"] / 6))
+    return is_number(match[1], first["bound"]) and int(match[2]) == fewest(
+        first["alpha"], min(1 / 5, first["bound"] / 6)
+    )
 
 
 def missed_minority(match: re.Match[str], told: Told) -> bool:
@@ -552,7 +554,9 @@ def missed_minority(match: re.Match[str], told: Told) -> bool:
 
 def nobody_is_left(match: re.Match[str], told: Told) -> bool:
     """Check that so many comparisons are inconclusive."""
-    return (int(match[1]), int(match[2])) == (inconclusive(told), len(told.against))
+    bound = told.against[0]["found"]["bound"]
+    counts = (int(match[1]), int(match[2])) == (inconclusive(told), len(told.against))
+    return counts and is_number(match[3], bound)
 
 
 def out_of_reach(match: re.Match[str], told: Told) -> bool:
@@ -902,14 +906,15 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"{LEAD}(.*) was in position (\d+) for all participants, so its effect cannot be distinguished from the effect "
      rf"of "
      r"that position\.", same_position),
-    (rf"{LEAD}equivalence can only be concluded with at least (\d+) participants\.", too_few_for_equivalence),
+    (rf"{LEAD}to show that a mean answer stays within ±{R} points? of that at .* ms, a study needs at least (\d+) "
+     r"participants\.", too_few_for_equivalence),
     (rf"A smaller sample has more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of the "
      rf"population; if the answers of such a minority differ by {R} points, they shift the mean by as much as the "
      r"bound\.", missed_minority),
-    (rf"This study has {N} participants?\.", lambda match, told: count(match[1]) == told.block["n"]),
-    (rf"{LEAD}(\d+) of (\d+) comparisons? with .* ms (?:is|are) (?:inconclusive|out of reach)(?: or out of reach)?: "
-     r"neither equivalence nor a mean "
-     r"difference beyond the bounds can be concluded\.", nobody_is_left),
+    (rf"This study has {N} participants?, so it can show only that a mean answer differs by more\.",
+     lambda match, told: count(match[1]) == told.block["n"]),
+    (rf"{LEAD}in (\d+) of (\d+) comparisons? with .* ms \(one for each statement and delay\), the data show "
+     rf"neither that the mean answer stays within ±{R} points? nor that it differs by more\.", nobody_is_left),
     # Methods
     (rf"{N} participants?(?: \(SIMULATED, not people\))? took part in “Made up” \(protocol made_up, version 1\)(, "
      r"each in all conditions|, but some did not complete all conditions)?\.",

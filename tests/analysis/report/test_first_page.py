@@ -12,6 +12,7 @@ from scipy.stats import binom
 
 from study_app.analysis.data.blocks import Block, Decided, Item, LevelBlock, Setting
 from study_app.analysis.evaluate import evaluate, evaluate_block
+from study_app.analysis.figures.summary_figures import Numbers
 from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, Lowest, LowestDelay
 from study_app.analysis.findings.finding import of_tables
 from study_app.analysis.findings.recognition import LiquidRecognition, RecognitionResult, recognised
@@ -19,7 +20,7 @@ from study_app.analysis.findings.statement_tests import DelayTrend, Effects, Pai
 from study_app.analysis.page_layout import Drawing
 from study_app.analysis.report import first_page as pages
 from study_app.analysis.report import sections
-from study_app.analysis.report.first_page import Card, first_page, presented_sentences
+from study_app.analysis.report.first_page import Card, Presented, first_page, presented_in
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
 from study_app.analysis.results import Results
 from study_app.analysis.statistics.recognition import recognition
@@ -150,7 +151,7 @@ def test_the_page_says_what_each_block_presented() -> None:
         replace(late, id="e", settings=(Setting(code="L1"),)),
     ]
     study: Any = SimpleNamespace(blocks=(), levels=blocks)
-    assert presented_sentences(study) == {
+    assert {block: presented.sentence for block, presented in presented_in(study).items()} == {
         "late": (
             "In the block “Liquids late” (ABX), the liquids were “slime” and “gear oil”, with a visual delay of 73 ms."
         ),
@@ -161,6 +162,57 @@ def test_the_page_says_what_each_block_presented() -> None:
             "delay."
         ),
     }
+
+
+_OF_DELAYS = (("“oil”", "60 ms of visual delay", ""), ("“oil”", "no visual delay", ""))
+
+
+@pytest.mark.parametrize(
+    ("names", "presented", "added"),
+    [
+        (("Late", "160 ms"), _OF_DELAYS, [" (60 ms of visual delay)", " (no visual delay)"]),
+        (("Oil 60 ms late", "Without delay"), _OF_DELAYS, ["", ""]),
+        (("A", "Water"), (("“oil”", "", "force 9 ms late"), ("“water”", "", "")), [" (“oil”, force 9 ms late)", ""]),
+        (("Sealed", "Late"), ((), _OF_DELAYS[0]), ["", ""]),
+    ],
+)
+def test_a_comparison_says_what_sets_its_sides_apart_unless_their_names_do(
+    names: tuple[str, str], presented: tuple[tuple[str, ...], ...], added: list[str]
+) -> None:
+    assert pages._told_apart(names, presented) == added
+
+
+_ASKED_AFTER = {"a": {"P1": 40.0, "P2": 50.0}, "b": {"P1": 20.0, "P2": 40.0}, "c": {"P1": 10.0, "P2": 20.0}}
+
+
+@pytest.mark.parametrize(("blocks", "people", "n"), [("ab", 2, 0), ("abc", 2, 1), ("ab", 1, 1)])
+def test_a_form_has_a_card_only_if_it_says_more_than_a_hypothesis(blocks: str, people: int, n: int) -> None:
+    held = [dict(list(_ASKED_AFTER[block].items())[:people]) for block in "ab"]
+    of_form = SimpleNamespace(form="load", measure="raw", blocks=("a", "b"))
+    tested = SimpleNamespace(contrast=of_form, left_out={}, sides=[SimpleNamespace(values=values) for values in held])
+    asked = SimpleNamespace(where="load", title="Load", is_form=True, item="i", n=2, measure="quartiles", groups=())
+    results: Any = SimpleNamespace(questions=[asked], levels=[], blocks=[], scores=[asked], contrasts=[tested])
+    by_setting = tuple((f"After {block}", _ASKED_AFTER[block]) for block in blocks)
+    raw = Numbers("raw", (0.0, 100.0), True, by_setting, "raw", tuple(blocks))
+    presented = {block: Presented("", {"": of}) for block, of in zip("ab", _OF_DELAYS, strict=True)}
+    made = list(pages._questions(results, {"load": [raw]}, presented))
+    assert len(made) == n
+    if blocks == "ab" and made:
+        assert "after a (60 ms of visual delay) and 30.0 [" in made[0].sentences[0]
+
+
+def test_all_limits_are_shown_by_subject() -> None:
+    lines = [
+        f"{subject}: {words.format(len(subject))}"
+        for words in ("few (P1).", "late (P{}).", "no key.")
+        for subject in ("Block", "Levels")
+    ]
+    results: Any = replace(rising(3), levels=tuple(SimpleNamespace(title=title) for title in ("Levels", "Tasks")))
+    assert pages._limits_by_subject([*lines, *map(str, range(9)), "Tasks: old."], results) == [
+        *(("", [str(place)]) for place in range(9)),
+        ("Block and Levels", ["Few (P1).", "Late (Block: P5; Levels: P6).", "No key."]),
+        ("Tasks", ["Old."]),
+    ]
 
 
 def test_each_answer_has_its_verdict_and_is_true_of_its_numbers() -> None:

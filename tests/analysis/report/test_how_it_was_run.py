@@ -230,8 +230,8 @@ def replace_decided(shown: Study, decided: Any) -> Any:
 
 
 def first_page_of_questions() -> Iterator[str]:
-    yield from first_page.presented_sentences(LIQUIDS).values()
-    yield from first_page.presented_sentences(DELAYS).values()
+    for of in (LIQUIDS, DELAYS):
+        yield from (presented.sentence for presented in first_page.presented_in(of).values())
     groups = [
         GroupAnswers(code, name, {"n": n, "counts": {"left": n - 2, "right": 2}})
         for code, name, n in (("L1", "Water", 9), ("L2", "Honey", 7), ("L3", "Oil", 0))
@@ -266,8 +266,9 @@ def first_page_of_questions() -> Iterator[str]:
     for main in (levels[1:], levels[2:]):
         yield sections.place_title(repeated, results(LIQUIDS, questions=asked[:1], levels=main, blocks=[]))
     yield from (first_page._setting_words(name) for name in ("Water", "After Stirring"))
-    lines = ["Oils: too few", "Waxes: too few", "sealed", "Oils: late"]
-    yield from first_page._limits_once(lines)
+    lines = ["Oils: too few (P1).", "Waxes: too few (P2).", "sealed", "Oils: late", "Waxes: late", "Oils: few (P1)."]
+    titles = [SimpleNamespace(title=title) for title in ("Oils", "Waxes")]
+    yield from map(str, first_page._limits_by_subject(lines, results(LIQUIDS, blocks=[], levels=titles)))
 
 
 def first_page_of_levels() -> Iterator[str]:
@@ -286,7 +287,7 @@ def first_page_of_levels() -> Iterator[str]:
             patch.setattr(first_page, "estimates_of", lambda _level, estimates=estimates: estimates)
             patch.setattr(first_page, "place_of", lambda one: one.standard)
             found = results(LIQUIDS, blocks=[], levels=[shown])
-            yield from map(str, first_page.cards(found, presented={"b": "With oil."}))
+            yield from map(str, first_page.cards(found, presented={"b": first_page.Presented("With oil.")}))
 
 
 def hypotheses() -> Iterator[str]:
