@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
+from study_app import number_text
 from study_app.analysis.contrasts import RATIOS, answer, mean_words, question
 from study_app.analysis.data.blocks import AFTER, Block, LevelBlock, Setting
 from study_app.analysis.data.measures import AGREEMENT
@@ -84,7 +85,6 @@ def presented_in(study: Study) -> dict[str, Presented]:
     """Return, by block, what its conditions presented; sealed blocks have nothing."""
     presented: dict[str, Presented] = {}
     blocks: list[Block | LevelBlock] = [*study.blocks, *study.levels]
-    has_delays = any((setting.of or setting).delay_ms != 0.0 for block in blocks for setting in block.settings)
     for block in blocks:
         stimulus, reference = (block.stimulus, block.reference) if isinstance(block, LevelBlock) else (None, None)
         conditions = [setting.of or setting for setting in (*block.settings, reference) if setting is not None]
@@ -97,11 +97,8 @@ def presented_in(study: Study) -> dict[str, Presented]:
         details = []
         if stimulus is not None and delays:
             details.append(f"varied {quantity_words(stimulus.vary)}{_standards(block)}")
-        if delays != [0.0]:
-            details.append(delay)
-        elif has_delays:
-            details.append("no visual delay")
-        design = f" ({block.design.paper_name})" if isinstance(block, LevelBlock) else ""
+        details.append("no visual delay" if delays == [0.0] else delay)
+        design = f" ({block.design.paper_name}{_trials(study, block)})" if isinstance(block, LevelBlock) else ""
         by_condition: dict[str, list[Setting]] = {"": conditions}
         for one in conditions:
             by_condition.setdefault(one.condition or "", []).append(one)
@@ -112,6 +109,16 @@ def presented_in(study: Study) -> dict[str, Presented]:
             {name: _presented_words(of) for name, of in by_condition.items()},
         )
     return presented
+
+
+def _trials(study: Study, block: LevelBlock) -> str:
+    """Return how many trials each participant had in a block, after a comma."""
+    counted = study.trials[study.trials["counted"] & (study.trials["block"] == block.id)]
+    trials = counted.groupby("participant").size()
+    if trials.empty:
+        return ""
+    least, most = int(trials.min()), int(trials.max())
+    return f", {number_text.counted(most, 'trial') if least == most else f'{least} to {most} trials'} per participant"
 
 
 def _liquids(conditions: Sequence[Setting]) -> list[str]:
@@ -227,7 +234,8 @@ def _scale_words(contrast: ContrastResult, results: Results, numbers: Mapping[st
     level = next((level for level in results.levels if level.block == of.blocks[0]), None)
     if level is not None and of.measure in RATIOS:
         if level.level_kind == "weber":
-            return " Values are Weber fractions."
+            at = "" if level.guess_rate is None else f" at {50 * (1 + level.guess_rate):.3g} % {level.counts}"
+            return f" Values are Weber fractions{at}; lower values mean better discrimination."
         return f" Values are in {level.unit}." if level.unit else ""
     if level is not None and of.measure == "d_prime":
         return " At chance, d′ is 0."

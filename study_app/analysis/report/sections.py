@@ -130,7 +130,7 @@ def _in_general(study: Study, results: Results) -> Iterator[str]:
     if study.pilot:
         yield "These are pilot sessions, so do not report them as results of the study."
     if not decided.made:
-        yield "No analysis was planned (the table [analysis] is missing), so all results are exploratory."
+        yield "No analysis was planned in the study file, so all results are exploratory."
     elif decided.changed:
         yield (
             "The decisions about the analysis changed between sessions, so all results are exploratory; the decisions "
