@@ -41,7 +41,7 @@ _BURST_ODDS: Final = 1 / 200
 MOST_CLUSTERED: Final = 0.8
 """Standard errors by which errors may cluster: at most 5 % of groups as the analysis assumes them exceed it. The fit
 takes up part of every cluster. [choice]"""
-_NEWTON_STEPS: Final = 10
+_SCORING_STEPS: Final = 10
 _STEP: Final = 0.01
 """By so many widths a threshold is moved to differentiate the function."""
 
@@ -254,20 +254,22 @@ def _moved(shares: ArrayLike, shift: ArrayLike) -> Floats:
 def _preferences(given: Given, fitted: Posterior) -> Floats:
     """Return the shift of each decision between two intervals towards the correct one due to preferences (n,) [SD].
 
-    It is a probit regression of the answers, with the contribution of the levels fixed. Its coefficients are the
+    It is a probit regression with lapses, in which the contribution of the levels is fixed. Its coefficients are the
     preference for the first interval and that for the previous answer, with a normal prior: removing chance preferences
-    would bias thresholds downwards. ``found`` is the posterior of these answers.
+    would bias thresholds downwards. Without lapses, errors in easy trials of people whose functions are wider than
+    assumed would appear to be preferences. ``fitted`` is the posterior of these answers.
     """
     (z, of_z), first, lapse = _normal_table(), given.towards, fitted.others.lapse
     unbiased = ((fitted.success(given.levels) - lapse) / (1.0 - 2.0 * lapse))[given.places]
     sensed, said = first * np.interp(np.clip(unbiased, 0.5, 0.999), of_z, z), np.where(given.successes, first, -first)
     both = np.abs(first) if np.ptp(first) else np.zeros(len(first))  # one order alone does not show which is preferred
     causes, weights = np.column_stack([both, given.before]), np.zeros(2)
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(_SCORING_STEPS):
         agreed = said * (sensed + causes @ weights)
-        hazard = np.exp(-0.5 * agreed**2) / (math.sqrt(2 * math.pi) * np.interp(agreed, z, of_z))
-        information = (causes.T * (hazard * (hazard + agreed))) @ causes + np.eye(2) / PREFERENCE_SD**2
-        weights += np.linalg.solve(information, causes.T @ (said * hazard) - weights / PREFERENCE_SD**2)
+        share = np.clip(lapse + (1.0 - 2.0 * lapse) * np.interp(agreed, z, of_z), CLIP, 1.0 - CLIP)
+        slope = (1.0 - 2.0 * lapse) * np.exp(-0.5 * agreed**2) / math.sqrt(2 * math.pi)
+        information = (causes.T * (slope**2 / (share * (1.0 - share)))) @ causes + np.eye(2) / PREFERENCE_SD**2
+        weights += np.linalg.solve(information, causes.T @ (said * slope / share) - weights / PREFERENCE_SD**2)
     return np.asarray(first * np.round(causes @ weights / _PREFERENCE_STEP) * _PREFERENCE_STEP + 0.0, float)
 
 

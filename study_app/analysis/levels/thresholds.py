@@ -59,9 +59,9 @@ _FEW_ANSWERS: Final = 40
 """The fewest answers for which the coverage of the intervals was tested."""
 _MOST_NAMED: Final = 6
 REMOVED: Final = (
-    "Bias towards one interval or towards repeating the previous answer {} estimated by probit regression and removed "
-    f"(the between-participant standard deviation is assumed to be {PREFERENCE_SD:g} times the standard deviation of "
-    "a single decision)."
+    "Bias towards one interval or towards repeating the previous answer {} estimated by probit regression with lapses "
+    f"and removed (the between-participant standard deviation is assumed to be {PREFERENCE_SD:g} times the standard "
+    "deviation of a single decision)."
 )
 
 

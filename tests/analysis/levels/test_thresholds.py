@@ -15,7 +15,14 @@ from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
-from study_app.protocol.trials.stimuli import SESSION_SD, WIDTH_PRIOR, Stimulus, analysis_grid, assumed_for
+from study_app.protocol.trials.stimuli import (
+    LINEAR_WIDTH,
+    SESSION_SD,
+    WIDTH_PRIOR,
+    Stimulus,
+    analysis_grid,
+    assumed_for,
+)
 from study_app.psychophysics.families import Floats, rise, success
 from study_app.psychophysics.grid import evenly, fit, group_priors
 from study_app.psychophysics.person_fit import (
@@ -193,10 +200,25 @@ def test_a_preference_for_an_interval_or_for_the_answer_before_moves_no_threshol
     assert group.threshold == pytest.approx(0.2, rel=0.1)
 
 
+def test_errors_in_easy_trials_of_people_with_wide_functions_are_no_preferences() -> None:
+    levels, n, draw, squares = np.log10([0.1, 0.2, 0.4]), 60, np.random.default_rng(31), []
+    sensed = norm.ppf(0.5 + 0.5 * rise("weibull", levels, math.log10(0.2), 2.5 * LINEAR_WIDTH))
+    for _ in range(40):
+        places, towards = draw.integers(0, len(levels), n), draw.permuted(np.tile((1.0, -1.0), n // 2))
+        right = sensed[places] + draw.normal(size=n) > 0
+        before = np.append(0.0, np.where(right, towards, -towards)[:-1])
+        given = Given(levels, places, right, towards, before, np.linspace(0, 1, n))
+        squares += (given.fit(GRID, two_intervals=True).shifts ** 2).tolist()
+    information = np.mean(norm.pdf(sensed) ** 2 / (norm.cdf(sensed) * norm.cdf(-sensed)))
+    by_chance = math.sqrt(2 / (n * information))  # the standard errors of two preferences
+    assert math.sqrt(np.mean(squares)) < 1.2 * by_chance
+
+
 def test_answers_of_two_sessions_tell_more_about_a_person_than_those_of_one() -> None:
     one = rows({"P001": 0.2}, trials=400)
     two = one.assign(session=np.where(one["trial"] <= 200, "01", "02"))
-    (_, alone), (_, both) = thresholds(block(), one), thresholds(block(), two)
+    abx = block("abx")  # without a preference for the answer before, which the first answer of a session does not have
+    (_, alone), (_, both) = thresholds(abx, one), thresholds(abx, two)
     assert both.threshold == alone.threshold
     assert both.variance == pytest.approx(alone.variance - SESSION_SD**2 / 2, rel=0.01)
 

@@ -91,14 +91,15 @@ class Fit:
         return preferred((psi - lapse) / (1 - 2 * lapse), lapse, self.shifts) if self.shifts.any() else psi
 
     def _preferences(self, rows: pd.DataFrame, weights: Floats) -> Floats:
-        """Return how far preferences move each decision: the mode of a probit regression with a normal prior."""
+        """Return how far preferences move each decision, by a probit regression with lapses and a prior."""
         towards = rows["order"].map({"cs": 1.0, "sc": -1.0}).to_numpy()
         said, lapse, self.shifts = np.where(self.success, towards, -towards), self.medians(weights)[2], 0 * self.u
         sensed = towards * special.ndtri(np.clip((self.expected(weights) - lapse) / (1 - 2 * lapse), 0.5, 0.999))
         causes = np.column_stack([np.ones(len(said)), rows["before"]])
 
         def loss(mode: Floats) -> float:
-            return float(mode @ mode / 2 / PREFERENCE_SD**2 - special.log_ndtr(said * (sensed + causes @ mode)).sum())
+            shares = lapse + (1 - 2 * lapse) * special.ndtr(said * (sensed + causes @ mode))
+            return float(mode @ mode / 2 / PREFERENCE_SD**2 - np.log(shares).sum())
 
         mode = optimize.minimize(loss, np.zeros(2), tol=1e-10).x
         return np.asarray(towards * np.round(causes @ mode, 1))
