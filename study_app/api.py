@@ -283,8 +283,7 @@ def fit(
     from pydantic import ValidationError
 
     from study_app.analysis.levels.thresholds import thresholds_of
-    from study_app.protocol.trials.designs import KINDS, default_design
-    from study_app.protocol.trials.stimuli import Stimulus
+    from study_app.protocol.trials import DESIGN_KINDS, Stimulus, default_design
 
     if not isinstance(trials, pd.DataFrame):
         raise AnalysisError(f"trials are a {type(trials).__name__}: specify a DataFrame")
@@ -292,7 +291,7 @@ def fit(
         raise AnalysisError(
             f"trials do not contain {' and '.join(sorted(missing))}: specify level and success in each row"
         )
-    kinds = [name for name, kind in KINDS.items() if kind.adaptive]
+    kinds = [name for name, kind in DESIGN_KINDS.items() if kind.adaptive]
     if design not in kinds:
         raise AnalysisError(f"no threshold can be fitted for design {design!r}: specify one of {', '.join(kinds)}")
     given = trials["level"]
@@ -593,7 +592,7 @@ def open_force(
     from study_app.haptics.runtime.pack import elements_needed
     from study_app.lab.live import WORKSPACE_M
     from study_app.protocol.load import load_scenes
-    from study_app.protocol.streams import stream
+    from study_app.protocol.randomization import stream
 
     if threading.current_thread() is not threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
         raise StudyError(

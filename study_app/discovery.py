@@ -25,8 +25,8 @@ _T = TypeVar("_T")
 REGISTRIES: Final = {
     "device": "study_app.devices.registry:DEVICES",
     "question": "study_app.protocol.questions:KINDS",
-    "task": "study_app.protocol.trials.tasks:KINDS",
-    "method": "study_app.protocol.trials.methods:KINDS",
+    "task": "study_app.protocol.trials.tasks:TASK_KINDS",
+    "method": "study_app.protocol.trials.methods:METHOD_KINDS",
     "finding": "study_app.analysis.findings:FINDINGS",
     "outlet": "study_app.outlets.session_outlets:SINKS",
 }

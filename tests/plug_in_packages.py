@@ -6,7 +6,7 @@ from pkgutil import resolve_name
 from textwrap import dedent
 
 from study_app.discovery import REGISTRIES
-from study_app.protocol.json_schema import schema
+from study_app.protocol.file_format.json_schema import schema
 
 EXAMPLES = Path(__file__).parents[1] / "docs" / "examples"
 TEMPLATE = EXAMPLES / "liquid_study_device"

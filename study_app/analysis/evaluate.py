@@ -28,7 +28,7 @@ from study_app.analysis.results import (
     Results,
     report_no_progress,
 )
-from study_app.protocol.orders.balance import Evenness, evenness
+from study_app.protocol.orders import Evenness, evenness
 
 SEED: Final = 1
 """Of all random rearrangements and resamples: the same results give the same numbers."""

@@ -22,7 +22,7 @@ from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.results import BlockResult, Failure, Failures, Results
 from study_app.analysis.wording import counted
 from study_app.number_text import capitalised
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 
 MARGIN_PT = 4.0
 SMALL = 7.2

@@ -18,7 +18,7 @@ from study_app.analysis.wording import listed, ms, number, percent, significant
 from study_app.discovery import explain_error
 from study_app.errors import PlugInError
 from study_app.protocol.model import Contrast, Published
-from study_app.protocol.orders.balance import Evenness
+from study_app.protocol.orders import Evenness
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,7 +31,7 @@ from study_app.analysis.worker_messages import (
     WriteTables,
 )
 from study_app.errors import StoreError
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 from study_app.store import receipt
 from study_app.store.atomic import cannot_read
 from study_app.store.exclusions import exclude, include, keep

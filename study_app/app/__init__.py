@@ -5,6 +5,8 @@
 two windows; read these first.
 
 Reading order: awake, compilation, timing; failures; lab_controller, session; delay_session, main_controller.
+
+Public modules: delay_session.
 """
 
 import gc

@@ -33,7 +33,7 @@ from study_app.devices.rig import open_rig, study_settings
 from study_app.errors import SessionError, StudyError
 from study_app.evidence.computer import LoadName, busy_cores
 from study_app.evidence.computer import machine as machine_here
-from study_app.evidence.timing.delays import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
+from study_app.evidence.timing import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
 from study_app.gui.application import application_here
 from study_app.gui.display.screens import WITHOUT_OPENGL, choose_screens, place_window
 from study_app.gui.operator.servo_health import ServoHealth
@@ -42,9 +42,9 @@ from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.load import load, load_scene, parse
-from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
-from study_app.protocol.trials.tasks import Explore
-from study_app.protocol.wording.languages import words
+from study_app.protocol.orders import Schedule, Trial, build_schedule
+from study_app.protocol.trials import Explore
+from study_app.protocol.wording import words
 from study_app.session.pages import TaskPage
 from study_app.session.resume import FIRST
 from study_app.session.start import NewSession, open_store

@@ -30,7 +30,7 @@ from study_app.gui.kit.devices import device_named, screen_number, settings_here
 from study_app.gui.settings.view import MachinePlace
 from study_app.gui.widgets.background import Background, wait_for_jobs
 from study_app.gui.widgets.main_view import Place
-from study_app.protocol.source.files import protocol_file
+from study_app.protocol.source import protocol_file
 from study_app.session.start import NewSession
 from study_app.store import workstation
 from study_app.store.study_runs import content_changes, recorded_contents
@@ -138,7 +138,7 @@ def load_modules() -> None:
     import study_app.gui.watch.window  # noqa: PLC0415
     import study_app.lab.live  # noqa: F401, PLC0415
     from study_app.gui.participant.tank.glass import brightness  # noqa: PLC0415
-    from study_app.protocol.json_schema import schema  # noqa: PLC0415
+    from study_app.protocol.file_format import schema  # noqa: PLC0415
 
     brightness()
     schema()

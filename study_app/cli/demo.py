@@ -50,7 +50,7 @@ def demo(context: click.Context, *, no_window: bool) -> None:
 
 def _run_sessions(study: Path) -> None:
     """Run or resume the session of each participant to its end."""
-    from study_app.protocol.source.files import shipped_file
+    from study_app.protocol.source import shipped_file
     from study_app.session.simulated.rehearsal import finish_session
     from study_app.store.folders import StudyFolder
     from study_app.store.sessions.begin import used_ids

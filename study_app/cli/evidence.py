@@ -98,8 +98,8 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
         exclude_each_other(liquids=every, path=None if path == _DEFAULT_PATH else path)
         _print_survey(scene, to)
         return
-    from study_app.evidence.accuracy.accuracy_report import evidence
-    from study_app.evidence.accuracy.comparison import accuracy as measure
+    from study_app.evidence.accuracy import accuracy as measure
+    from study_app.evidence.accuracy import accuracy_evidence
 
     numerical, physical, notes = _scenes_to_compare(scene, liquid)
     subject = numerical or physical
@@ -110,22 +110,22 @@ def accuracy(scene: str | None, liquid: str | None, path: str, to: Path | None, 
     named = "stirring" if path == _DEFAULT_PATH else path
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
         measured = measure(numerical, physical, motion, named=named, notes=notes, progress=show)
-    _present_evidence(evidence(measured), to, with_text=False)
+    _present_evidence(accuracy_evidence(measured), to, with_text=False)
 
 
 def _print_survey(file: str | None, to: Path | None) -> None:
     """Print or write the force error of every liquid of a file."""
-    from study_app.evidence.accuracy.survey import evidence, survey
+    from study_app.evidence.accuracy import survey_evidence, survey_scenes
     from study_app.protocol.load import load_scenes
 
     make_output_folder(to)
     with progress(lambda text: click.echo(f"{text} …", err=True)) as show:
-        errors = survey(load_scenes(file or _REAL), show)
+        errors = survey_scenes(load_scenes(file or _REAL), show)
     if not errors:
         raise click.UsageError(
             f"{file} does not specify the viscosity of any liquid, so there is no physical reference"
         )
-    _present_evidence(evidence(errors), to, with_text=False)
+    _present_evidence(survey_evidence(errors), to, with_text=False)
 
 
 def _scenes_to_compare(scene: str | None, liquid: str | None) -> tuple[Scene | None, Scene | None, tuple[str, ...]]:
@@ -212,9 +212,18 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     A 68 mm ball starts, moves at a constant speed of 0.2 or 0.6 m/s, and stops abruptly. Fitting takes about a minute.
     --refit also uses other motions, such as oscillations and a reversal.
     """
-    from study_app.evidence.cfd import fits, law_fit
-    from study_app.evidence.cfd.solver import solve as solve_all
-    from study_app.evidence.cfd.stored_flows import held_out, load_steady, load_tables, training
+    from study_app.evidence.cfd import (
+        fit_all,
+        fits_evidence,
+        held_out,
+        law_fit_evidence,
+        load_steady,
+        load_tables,
+        refit_law,
+        score_all,
+        training,
+    )
+    from study_app.evidence.cfd import solve as solve_all
 
     exclude_each_other(refit=refit, materials=materials, score=score)
     exclude_each_other(solve=solve, score=score)
@@ -223,7 +232,7 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
     make_output_folder(to)
     if score:
         with progress(lambda text: click.echo(text, err=True)) as show:
-            scored = fits.score_all(show)
+            scored = score_all(show)
         _present_evidence(scored, to)
         return
     if materials:
@@ -237,21 +246,21 @@ def cfd(to: Path | None, workers: Workers, *, solve: bool, refit: bool, material
         source = to if solve else None
         tables, drag = load_tables(source), load_steady(source)
         if refit:
-            result = law_fit.evidence(law_fit.refit((*tables, *training(source)), held_out(source), show))
+            result = law_fit_evidence(refit_law((*tables, *training(source)), held_out(source), show))
         else:
-            result = fits.evidence(tables, drag, fits.fit_all(tables, show))
+            result = fits_evidence(tables, drag, fit_all(tables, show))
     echo_files(solved)
     _present_evidence(result, to, with_text=False)
 
 
 def _print_material_errors(to: Path | None, workers: Workers, *, solve: bool) -> None:
     """Print or write the law's error in Herschel–Bulkley liquids, with the stored table or a new one."""
-    from study_app.evidence.cfd.yield_flow import evidence, solve_materials, stored_materials
+    from study_app.evidence.cfd import solve_materials, stored_materials, yield_flow_evidence
 
     if solve and to is not None:
         with progress(lambda text: click.echo(text, err=True)) as show, executor_for(workers) as executor:
             click.echo(solve_materials(to, executor, show))
-    _present_evidence(evidence(stored_materials(to if solve else None)), to, with_text=False)
+    _present_evidence(yield_flow_evidence(stored_materials(to if solve else None)), to, with_text=False)
 
 
 @click.command()
@@ -316,10 +325,20 @@ def stability(
     driver with an emulated Falcon. The exit code is 3 if a case is unstable with the safety layer on, or if more than 1
     in 10,000 cases are noisy.
     """
-    from study_app.evidence.stability import stability_report
-    from study_app.evidence.stability.case_groups import evenly_chosen, groups, sweep
-    from study_app.evidence.stability.stability_cases import parse
-    from study_app.evidence.stability.verdict import NOISY, UNSTABLE
+    from study_app.evidence.stability import (
+        NOISY,
+        UNSTABLE,
+        evenly_chosen,
+        fidelities,
+        groups,
+        parse_case,
+        run_sweep,
+        slope_limits_evidence,
+        stability_evidence,
+        sweep,
+        verdict_text,
+        verdicts_on,
+    )
 
     parts = {"withheld": withheld, "delivered": delivered, "velocity": velocity}
     exclude_each_other(to=to, case=line, table=table, delayed=delayed, only=only, **parts)
@@ -327,25 +346,25 @@ def stability(
         raise click.UsageError("--whole extends the table printed by --delivered, so add --delivered")
     make_output_folder(to)
     if line is not None:
-        case = parse(line)
+        case = parse_case(line)
         click.echo(str(case))
-        verdicts = stability_report.verdicts_on(case)
-        click.echo("\n".join(stability_report.in_words(verdict) for verdict in verdicts))
+        verdicts = verdicts_on(case)
+        click.echo("\n".join(verdict_text(verdict) for verdict in verdicts))
         exit_if(verdicts[-1].reasons)
         return
     if table is not None:
         with progress() as show, executor_for(workers) as executor:
-            limits = stability_report.limits(
+            limits = slope_limits_evidence(
                 executor, lambda done, of: show(f"{done} of {of} limits", done / of), table.name
             )
         _present_evidence(limits, table.parent)
         return
     if delayed is not None:
-        from study_app.evidence.stability import force_delay
+        from study_app.evidence.stability import force_delay_evidence, measure_force_delays
 
         with progress() as show:
-            entries = force_delay.measure(progress=lambda done: show(f"{done} delays"))
-        _present_evidence(force_delay.evidence(entries, delayed.name), delayed.parent)
+            entries = measure_force_delays(progress=lambda done: show(f"{done} delays"))
+        _present_evidence(force_delay_evidence(entries, delayed.name), delayed.parent)
         return
     if any(parts.values()):
         part = next(name for name, chosen in parts.items() if chosen)
@@ -359,15 +378,15 @@ def stability(
         names = ", ".join(group.name for group in groups(seed, cases))
         raise StudyError(f"no group has a name that contains {only!r}; choose from: {names}")
     with progress() as show, executor_for(workers) as executor:
-        swept = stability_report.run_sweep(
+        swept = run_sweep(
             evenly_chosen(sweep(seed), cases) if only is None else (),
             chosen,
             executor,
             lambda done, of: show(f"{done} of {of} verdicts", done / of),
         )
         show("comparing forces")
-        compared = stability_report.fidelities(executor=executor) if only is None else ()
-    shown = stability_report.evidence(swept, compared, seed)
+        compared = fidelities(executor=executor) if only is None else ()
+    shown = stability_evidence(swept, compared, seed)
     click.echo(shown.text, nl=False)
     if to is not None:
         click.echo()
@@ -381,14 +400,21 @@ def stability(
 
 def _measure(part: str, executor: Executor, show: ShowProgress, *, whole: bool) -> Evidence:
     """Return the evidence from one separate measurement."""
-    from study_app.evidence.stability import delivered_force, velocity, withheld_force
+    from study_app.evidence.stability import (
+        delivered_force_evidence,
+        measure_delivered_force,
+        measure_velocities,
+        measure_withheld_force,
+        velocity_evidence,
+        withheld_force_evidence,
+    )
 
     if part == "velocity":
-        return velocity.evidence(velocity.measure(lambda what: show(f"measuring {what}")))
+        return velocity_evidence(measure_velocities(lambda what: show(f"measuring {what}")))
     show(f"measuring the force {part}")
     if part == "withheld":
-        return withheld_force.evidence(withheld_force.measure(executor=executor))
-    return delivered_force.evidence(delivered_force.measure(whole=whole, executor=executor))
+        return withheld_force_evidence(measure_withheld_force(executor=executor))
+    return delivered_force_evidence(measure_delivered_force(whole=whole, executor=executor))
 
 
 _MOST_COMPARED_S = 300.0
@@ -473,38 +499,37 @@ def timing(
 
     def measured(ending: threading.Event, show: ShowProgress) -> Evidence:
         if other == "devices":
-            from study_app.evidence.timing import device_lateness as devices
+            from study_app.evidence.timing import emulated_devices, lateness_evidence, time_devices
 
-            names = devices.emulated_devices()
-            return devices.evidence(devices.time_devices(seconds, names, ending=ending, progress=show))
+            names = emulated_devices()
+            return lateness_evidence(time_devices(seconds, names, ending=ending, progress=show))
         if other == "lsl":
-            from study_app.evidence.outlets import streams
-            from study_app.evidence.outlets.localhost import localhost_only
+            from study_app.evidence.outlets import compare_streams, localhost_only, measure_streams, streams_evidence
 
             localhost_only()
-            lateness = streams.stream(seconds, ending=ending, progress=show)
-            compared = streams.compare(min(seconds, _MOST_COMPARED_S), ending=ending, progress=show)
-            return streams.evidence(lateness, compared)
-        from study_app.evidence.outlets import triggers as ports
+            lateness = measure_streams(seconds, ending=ending, progress=show)
+            compared = compare_streams(min(seconds, _MOST_COMPARED_S), ending=ending, progress=show)
+            return streams_evidence(lateness, compared)
+        from study_app.evidence.outlets import measure_triggers, triggers_evidence
 
-        return ports.evidence(ports.measure(triggers or "", seconds, ending=ending, progress=show))
+        return triggers_evidence(measure_triggers(triggers or "", seconds, ending=ending, progress=show))
 
     if other == "delays":
         from study_app.app.delay_session import measure_delays
-        from study_app.evidence.timing.delays import evidence
+        from study_app.evidence.timing import delays_evidence
 
         with progress(partial(click.echo, err=True)) as show:
-            result = evidence(measure_delays(seconds, load, progress=show))
+            result = delays_evidence(measure_delays(seconds, load, progress=show))
     else:
         windows = _windows_thread(load) if load != "none" or not other else None
         with _ending_by_signal() as (ending, _), progress(partial(click.echo, err=True)) as show:
             if other:
                 result = under_load(load, windows, partial(measured, ending, show))
             else:
-                from study_app.evidence.timing import measurement, report
+                from study_app.evidence.timing import measure_timing, timing_evidence
 
-                timed = measurement.timing(seconds, load, windows, spin_us=spin_us, ending=ending, progress=show)
-                result = report.evidence(timed)
+                timed = measure_timing(seconds, load, windows, spin_us=spin_us, ending=ending, progress=show)
+                result = timing_evidence(timed)
     _present_evidence(result, to)
 
 
@@ -564,7 +589,7 @@ def soak(
     FILE defines the liquids; default: rek2024. Ctrl+C ends the command and prints the report so far.
     """
     from study_app.evidence.computer import under_load
-    from study_app.evidence.soak.soak import soak as soak_servo
+    from study_app.evidence.soak import soak_servo
     from study_app.protocol.load import load_scenes
 
     scenes = load_scenes(protocol)
@@ -631,7 +656,7 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
     if a rate exceeds its limit; otherwise it is 4 if there are too few studies to decide on every rate.
     """
     from study_app.analysis.planning.simulated_studies import plan
-    from study_app.evidence.report_rates.simulation import Rate, evidence, validate
+    from study_app.evidence.report_rates import Rate, measure_report_rates, report_rates_evidence
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
 
@@ -645,12 +670,12 @@ def validate_report(studies: int, workers: Workers, seed: int, to: Path | None) 
             protocol = load("rek2024")
             studied = plan(protocol, condition_features(protocol, seed=seed))
             begun = time.perf_counter()
-            for done, so_far in validate(studied, studies, executor, seed=seed, progress=say):
+            for done, so_far in measure_report_rates(studied, studies, executor, seed=seed, progress=say):
                 rates = so_far
                 show(f"{done} studies")
     except KeyboardInterrupt:
         click.echo("ended early", err=True)
-    _present_evidence(evidence(rates, f"{done} studies in {time.perf_counter() - begun:.0f} s"), to)
+    _present_evidence(report_rates_evidence(rates, f"{done} studies in {time.perf_counter() - begun:.0f} s"), to)
 
 
 @click.command()
@@ -682,8 +707,8 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
     participants, including the servo, files, unblinding and analysis. Every value is printed with its limit; the
     interval in brackets is corrected for the number of values. The exit code is 3 if an interval lies beyond its limit.
     """
-    from study_app.evidence.thresholds.known_values import NAMES, evidence, known_value
-    from study_app.evidence.thresholds.known_values import validate as validate_values
+    from study_app.evidence.thresholds import NAMES, known_value, known_values_evidence
+    from study_app.evidence.thresholds import validate_known_values as validate_values
     from study_app.protocol.load import load, source_bytes
 
     try:
@@ -697,7 +722,7 @@ def validate(files: tuple[str, ...], studies: int, seeds: tuple[int, ...], worke
     used_s = sum(os.times()[:4])  # with the workers', which have ended
     took = f"{time.perf_counter() - begun:.0f} s, {used_s:.0f} s of processor time"
     heading = f"{studies} studies for each protocol and seed ({', '.join(map(str, seeds))}), in {took}"
-    _present_evidence(evidence(verdicts, heading), to)
+    _present_evidence(known_values_evidence(verdicts, heading), to)
 
 
 @click.command("delay-thresholds")
@@ -713,9 +738,9 @@ def delay_thresholds(people: int, seed: int, to: Path | None) -> None:
 
     The ratings depend on each participant's criterion; the forced choices do not.
     """
-    from study_app.evidence.thresholds.noticed_delays import compare, evidence
+    from study_app.evidence.thresholds import compare_delays, noticed_delays_evidence
 
     with progress() as show:
         show("simulating participants")
-        comparison = compare(people, seed)
-    _present_evidence(evidence(comparison), to)
+        comparison = compare_delays(people, seed)
+    _present_evidence(noticed_delays_evidence(comparison), to)

@@ -16,8 +16,8 @@ from study_app.haptics.model.layout import LIMITERS
 from study_app.outlets.markers import CODES
 from study_app.protocol import questions
 from study_app.protocol.questionnaires import instrument, instruments
-from study_app.protocol.trials import designs, methods
-from study_app.protocol.warnings import delayed_force
+from study_app.protocol.trials import DESIGN_KINDS, METHOD_KINDS
+from study_app.protocol.warnings import longest_delay_ms, stored_table
 
 _PROGRAM = "liquid-study"
 _LEAST_DELAY_MS = 10
@@ -30,8 +30,8 @@ def kinds_markdown() -> str:
     tables = (
         ("Questions", ("`kind`", "question", "additional keys", "value in the tables"), _question_rows()),
         ("Standard questionnaires", ("`instrument`", "texts", "scores", "source and comparison"), _instrument_rows()),
-        ("Designs", ("`kind`", "question or answer"), _kind_descriptions(designs.KINDS)),
-        ("Methods", ("`kind`", "next level"), _kind_descriptions(methods.KINDS)),
+        ("Designs", ("`kind`", "question or answer"), _kind_descriptions(DESIGN_KINDS)),
+        ("Methods", ("`kind`", "next level"), _kind_descriptions(METHOD_KINDS)),
         ("Effects", ("effect", "description", "`auto`", "not with"), _effect_rows()),
         ("Limiters", ("bit", "limiter", "column", "meaning"), _limiter_rows()),
         ("Trigger codes", ("code", "journal event"), ((str(code), f"`{name}`") for name, code in CODES.items())),
@@ -48,7 +48,7 @@ def kinds_markdown() -> str:
 
 def delayed_force_markdown() -> str:
     """Return the delivered share of a delayed force and the longest delay with 95 %, by liquid and hand."""
-    entries = [entry for entry in delayed_force.stored_table() if entry.estimator == "kalman"]
+    entries = [entry for entry in stored_table() if entry.estimator == "kalman"]
     delays = [delay for delay in sorted({entry.delay_ms for entry in entries}) if delay >= _LEAST_DELAY_MS]
     left = {(entry.liquid, entry.hand, entry.delay_ms): f"{entry.left_percent:.0f}" for entry in entries}
     liquids = dict.fromkeys(entry.liquid for entry in entries)
@@ -57,9 +57,7 @@ def delayed_force_markdown() -> str:
         (labels[name], *(f"{left[name, 'light', delay]} ({left[name, 'middle', delay]})" for delay in delays))
         for name in liquids
     )
-    longest = (
-        (labels[name], *(f"{delayed_force.longest_delay_ms(name, *how):g}" for how in _LOOPS)) for name in liquids
-    )
+    longest = ((labels[name], *(f"{longest_delay_ms(name, *how):g}" for how in _LOOPS)) for name in liquids)
     tables = (
         (
             "Remaining force [%], light grip (medium grip in brackets), `kalman`",

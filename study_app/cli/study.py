@@ -50,12 +50,12 @@ _OPERATOR = click.option("--operator", default="", metavar="INITIALS", help="Nam
 )
 def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None:
     """Describe the study or the scenes in a file, or list every problem in it with a line number and a hint."""
-    from study_app.protocol import describe, load
+    from study_app.protocol import descriptions, load
 
     if schema:
         import json
 
-        from study_app.protocol.json_schema import editor_schema
+        from study_app.protocol.file_format import editor_schema
         from study_app.store.journals.journal_events import journal_schema
 
         printed = editor_schema() if schema == "protocol" else journal_schema()
@@ -64,12 +64,12 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
     if protocol is None:
         raise click.UsageError("check needs a protocol: specify a file, or one of " + ", ".join(load.shipped()))
     if load.is_scene_file(protocol):
-        click.echo(describe.describe_scenes(load.load_scenes(protocol)))
+        click.echo(descriptions.describe_scenes(load.load_scenes(protocol)))
     else:
         import time
 
-        from study_app.protocol.source.files import protocol_file
-        from study_app.protocol.warnings.untranslated import describe_untranslated
+        from study_app.protocol.source import protocol_file
+        from study_app.protocol.warnings import describe_untranslated
         from study_app.session.simulated.paced_levels import undelivered_levels
         from study_app.session.simulated.predicted_delivery import predicted_delivery
         from study_app.store import workstation
@@ -79,7 +79,7 @@ def check(protocol: str | None, *, schema: str | None, delay_ticks: int) -> None
         camera = workstation.load_or_default()[0].camera
         file = protocol_file(protocol)
         missing = missing_on_computer(study, file.parent, camera, time.perf_counter_ns)
-        click.echo(describe.describe(study, delay_ticks, workstation.device_without_force()))
+        click.echo(descriptions.describe(study, delay_ticks, workstation.device_without_force()))
         document, _ = load.read_document(load.source_bytes(protocol), protocol)
         for sentence in (*undelivered_levels(study), *describe_untranslated(document, lists_places=True)):
             click.echo(f"\nNote: {sentence}.")
@@ -138,7 +138,7 @@ def new(name: str, template: str, *, no_window: bool) -> None:
 def edit(protocol: str) -> None:
     """Open a study in the study designer."""
     from study_app import app
-    from study_app.protocol.source.files import protocol_file
+    from study_app.protocol.source import protocol_file
 
     file = protocol_file(protocol)
     named = protocol if file.name != Path(protocol).name else str(file)
@@ -160,7 +160,7 @@ def edit(protocol: str) -> None:
 def design(protocol: str, participants: int, first: str, seed: int) -> None:
     """Count positions and carry-over in the trial orders for N participants before the study starts."""
     from study_app.protocol.load import load
-    from study_app.protocol.orders.balance import balances, describe_balance, numbered_participants
+    from study_app.protocol.orders import balances, describe_balance, numbered_participants
 
     judged = balances(load(protocol), numbered_participants(participants, first), seed)
     click.echo("\n\n".join(map(describe_balance, judged)))
@@ -329,7 +329,7 @@ def language(code: str) -> None:
     each text and the English original as a comment.
     """
     from study_app.errors import StudyError
-    from study_app.protocol.wording.languages import SHIPPED, language_template, read_language
+    from study_app.protocol.wording import SHIPPED, language_template, read_language
     from study_app.store.atomic import cannot_write, write_file
     from study_app.workspace import workspace as workspace_here
 

@@ -5,4 +5,7 @@
 
 Reading order: parts, templates; document; editing, outline, prompts, version_rows; problems; measures; form; file;
 header; new_study_page; window; measures_controller, participant, versions; saving; controller.
+
+Public modules: controller, document.document, header, new_study_page, participant.playable, problems, templates,
+version_rows, window.
 """

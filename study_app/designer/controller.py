@@ -40,8 +40,8 @@ from study_app.designer.saving import Saving
 from study_app.designer.versions import Changes, KnownRuns, Renaming
 from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
-from study_app.protocol.source.document import Path as Place
-from study_app.protocol.source.files import protocol_file
+from study_app.protocol.source import Path as Place
+from study_app.protocol.source import protocol_file
 from study_app.store.drafts import draft_of
 from study_app.store.study_settings import keep_original
 

@@ -26,7 +26,7 @@ from study_app.designer.document.steps import (
 from study_app.designer.document.study import Entry, Study, is_within
 from study_app.designer.document.toml_edits import Edit
 from study_app.designer.document.toml_text import Refused
-from study_app.protocol.source.document import Path as Place
+from study_app.protocol.source import Path as Place
 
 
 class Editing(QObject):

@@ -35,7 +35,7 @@ from study_app.gui.widgets.boxes import hbox
 from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.labels import label
 from study_app.protocol.load import located_problems
-from study_app.protocol.source.document import Path, places_of
+from study_app.protocol.source import Path, places_of
 
 
 class _VisibleLine(NamedTuple):

@@ -29,7 +29,7 @@ from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.gui.widgets.background import delayed_call
 from study_app.number_text import capitalised, counted
-from study_app.protocol.source.files import protocol_hash, source_bytes
+from study_app.protocol.source import protocol_hash, source_bytes
 from study_app.store.folders import study_folder
 from study_app.store.output_files import write_files
 from study_app.workers.server import Crashed

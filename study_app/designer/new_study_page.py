@@ -59,12 +59,10 @@ from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers, unclear_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import expected_duration_s, step_duration_s
-from study_app.protocol.source.document import Path as Place
-from study_app.protocol.source.document import names
-from study_app.protocol.source.files import protocol_file, shipped, shipped_file
-from study_app.protocol.wording.languages import LANGUAGES, languages_of
+from study_app.protocol.orders import expected_duration_s, orders_of, step_duration_s
+from study_app.protocol.source import Path as Place
+from study_app.protocol.source import names, protocol_file, shipped, shipped_file
+from study_app.protocol.wording import LANGUAGES, languages_of
 from study_app.store.drafts import draft_of, drafted_files, unsaved_files
 from study_app.store.study_settings import kept_original
 from study_app.workspace import workspace

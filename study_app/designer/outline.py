@@ -59,11 +59,11 @@ from study_app.gui.widgets.cards import Card, fill_rounded
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted, duration
-from study_app.protocol.checks.cross_references import OWN
+from study_app.protocol.checks import OWN
 from study_app.protocol.questionnaires import instrument, instruments
 from study_app.protocol.questions import STATEMENT
-from study_app.protocol.source.document import Path, names, value_at
-from study_app.protocol.wording.languages import language_name, languages_of
+from study_app.protocol.source import Path, names, value_at
+from study_app.protocol.wording import language_name, languages_of
 
 _ICONS: Final = {
     "pages": "file", "blocks": "layers", "tasks": "route", "questionnaires": "list", "liquids": "drop",

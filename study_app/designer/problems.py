@@ -25,10 +25,9 @@ from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
 from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
 from study_app.gui.widgets.labels import Clamped, Elided, label
 from study_app.number_text import capitalised, counted
-from study_app.protocol.source.document import Path, names, places_of
-from study_app.protocol.source.problems import Fault
-from study_app.protocol.warnings.untranslated import untranslated_texts
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.source import Fault, Path, names, places_of
+from study_app.protocol.warnings import untranslated_texts
+from study_app.protocol.wording import language_name
 
 _PLACE: Final = re.compile(r"([a-z]\w*(?:\.\w+)+): (.+)", re.DOTALL)
 """The place in the file that a warning begins with."""

@@ -17,7 +17,7 @@ from study_app.gui.widgets.cards import Card
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.number_text import capitalised, typed_numbers
-from study_app.protocol.source.document import Path, names, value_at
+from study_app.protocol.source import Path, names, value_at
 
 _HIGHEST = 560
 _PLACES_PX = 200

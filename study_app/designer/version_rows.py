@@ -15,7 +15,7 @@ from study_app.designer.document.study import Study
 from study_app.gui.sessions.session_facts import start_time_text
 from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted
-from study_app.protocol.differences import document_differences
+from study_app.protocol.descriptions import document_differences
 from study_app.store.study_runs import Run
 from study_app.store.study_versions import Kept, kept_content
 

@@ -32,10 +32,9 @@ from study_app.gui.widgets.cards import Card, Icon
 from study_app.gui.widgets.controls import ActionButton, Choice
 from study_app.gui.widgets.labels import label
 from study_app.number_text import capitalised, counted
-from study_app.protocol.differences import differences
-from study_app.protocol.source.document import Path as Place
-from study_app.protocol.source.document import value_at
-from study_app.protocol.source.files import unbundle, with_liquid_files
+from study_app.protocol.descriptions import differences
+from study_app.protocol.source import Path as Place
+from study_app.protocol.source import unbundle, value_at, with_liquid_files
 from study_app.store.folders import SessionFolder
 from study_app.store.receipt import without_conditions
 from study_app.store.study_runs import Run, keep_run_content, recorded_items, run_of, runs_of_study, source_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import TracebackType
 from typing import Any, Protocol, Self
 
-from study_app.haptics.kernels.c_functions import Driver
+from study_app.haptics.kernels import Driver
 
 
 class Device(Driver, Protocol):

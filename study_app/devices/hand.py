@@ -15,9 +15,7 @@ from typing import Any
 import numpy as np
 
 from study_app.errors import DeviceError
-from study_app.haptics.kernels.c_functions import fence, record_at
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import move
+from study_app.haptics.kernels import fence, kernel, move, record_at
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.ranges import Vector
 

@@ -17,8 +17,20 @@ import numpy as np
 
 from study_app.devices.base import Device
 from study_app.devices.hand import HAND, POINT, HandOrders, move_held_handle
-from study_app.haptics.kernels import c_functions
-from study_app.haptics.kernels.plant import HANDLE, measure, new_handle, push, release_handle
+from study_app.haptics.kernels import (
+    HANDLE,
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    command_at,
+    device_functions,
+    measure,
+    new_handle,
+    push,
+    reading_at,
+    record_at,
+    release_handle,
+)
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records
 
@@ -34,7 +46,7 @@ _SIMULATED = np.dtype(
     ],
     align=True,
 )
-_simulated_at = c_functions.record_at(_SIMULATED)
+_simulated_at = record_at(_SIMULATED)
 _POINTED_MASS_KG = 0.2
 _POINTED_STIFFNESS_NPM = 400.0  # 8 N hold the handle back by 20 mm, a fifth of the workspace
 _POINTED_DAMPING_NSPM = 27.0  # 1.5 times critical
@@ -105,22 +117,22 @@ class SimulatedDevice(HandOrders, Device):
 @cache
 def _functions() -> tuple[Any, Any]:
     """Compile read and write, once for all simulated devices."""
-    return c_functions.device_functions(_read, _write)
+    return device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     device = _simulated_at(context)
     if device.unplugged != 0:
-        return c_functions.READ_LOST
+        return READ_LOST
     elapsed_s = 0.0
     if device.started != 0:
         if now_ns <= device.last_ns:
-            return c_functions.READ_NOTHING_NEW
+            return READ_NOTHING_NEW
         elapsed_s = (now_ns - device.last_ns) * 1e-9
     device.started = 1
     device.last_ns = now_ns
     move_held_handle(device, now_ns, elapsed_s)
-    out = c_functions.reading_at(reading)
+    out = reading_at(reading)
     measure(device.handle, out.position_m)
     out.buttons = device.buttons
     out.delay_ticks = device.handle.delay
@@ -128,13 +140,13 @@ def _read(context: int, now_ns: int, reading: int) -> int:
         out.measured |= MEASURED_VELOCITY
         for axis in range(3):
             out.velocity_mps[axis] = device.handle.velocity_mps[axis]
-    return c_functions.READ_NEW
+    return READ_NEW
 
 
 def _write(context: int, command: int) -> int:
-    device, force_n = _simulated_at(context), c_functions.command_at(command).force_n
+    device, force_n = _simulated_at(context), command_at(command).force_n
     push(device.handle, force_n[0], force_n[1], force_n[2])
-    return c_functions.READ_LOST if device.unplugged != 0 else 0
+    return READ_LOST if device.unplugged != 0 else 0
 
 
 class PointedDevice(SimulatedDevice):

@@ -5,4 +5,7 @@ of forces) as examples.
 
 Reading order: appraisal, computer, cost, reference_model, table, thesis_figures; appraisal_measurement,
 reference_solutions, report_rates, soak, thresholds, timing; cfd, outlets, stability; expected_error; accuracy.
+
+Public modules: accuracy, appraisal, cfd, computer, cost, expected_error, outlets, reference_solutions, report_rates,
+soak, stability, table, thesis_figures, thresholds, timing.
 """

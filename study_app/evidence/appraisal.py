@@ -9,7 +9,7 @@ from typing import TypeAlias
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.tasks import Stroke
+from study_app.protocol.trials import Stroke
 from study_app.session.preflight import PredictedDelivery
 from study_app.workers.client import WorkerClient
 

@@ -15,7 +15,7 @@ from study_app.haptics.model.gate import effect_verdicts, resolve
 from study_app.haptics.model.motion import Motion, programmed_motion
 from study_app.haptics.model.scene import Effect, Everywhere, Knee, Scene
 from study_app.haptics.runtime.offline import samples_along, simulate
-from study_app.protocol.trials.tasks import Stroke
+from study_app.protocol.trials import Stroke
 from study_app.session.preflight import PredictedDelivery
 from study_app.session.simulated.predicted_delivery import predicted_delivery
 from study_app.workers.server import Send, Stop

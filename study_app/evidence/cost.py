@@ -7,9 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick import tick
+from study_app.haptics.kernels import compute_tick, kernel, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.gate import bounds, describe_gate, resolve
@@ -97,7 +95,7 @@ def _run_ticks(model: Any, safety: Record, sample: Record, positions_m: Any, sta
         for axis in range(3):
             sample.position_m[axis] = positions_m[row, axis]
         row = row + 1 if row + 1 < len(positions_m) else 0  # a division would take a third of a tick
-        tick(model, safety, sample)
+        compute_tick(model, safety, sample)
 
 
 def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:

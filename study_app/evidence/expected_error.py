@@ -35,8 +35,7 @@ from study_app.evidence.reference_solutions import (
 from study_app.evidence.stability.delivered_force import Acting, acting_on_sine, case_of
 from study_app.evidence.stability.velocity import WHOLE
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, Dynamics
-from study_app.haptics.model.effect import GRAVITY_MPS2
-from study_app.haptics.model.effects.local_wake import LocalWake
+from study_app.haptics.model.effects import GRAVITY_MPS2, LocalWake
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Effect, Everywhere, Kalman, Liquid, Scene, Velocity

@@ -12,11 +12,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.kernels.compiled import evidence_kernel, kernel
-from study_app.haptics.kernels.vector import copy, distance, norm
+from study_app.haptics.kernels import copy, distance, evidence_kernel, kernel, norm
 from study_app.haptics.model import laws
-from study_app.haptics.model.effects.non_newtonian import STIFFNESS_NPM
-from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.effects import STIFFNESS_NPM, Wake
 from study_app.haptics.model.laws import Maxwell
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.motion import Floats, Motion

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from study_app.evidence.reference_model import Constants, respond
-from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects import Drag
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
 from study_app.haptics.model.motion import Floats, Motion

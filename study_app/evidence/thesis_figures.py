@@ -19,7 +19,7 @@ from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
 from study_app.haptics.model import motion as paths
-from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.effects import Wake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.haptics.runtime.offline import Table, simulate

@@ -4,4 +4,7 @@
 adjusted; read these first. ``identify`` fits liquids to files of measurements.
 
 Reading order: parameters, programmed_paths; ab_comparison, identify; presets, shadow; live.
+
+Public modules: ab_comparison, identify.fit, identify.measured_force, identify.parameters, identify.preset, live,
+parameters, presets, programmed_paths, shadow.
 """

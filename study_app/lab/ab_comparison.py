@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import StudyError
-from study_app.haptics.model.effect import Value
+from study_app.haptics.model.effects import Value
 from study_app.haptics.model.scene import Scene
 from study_app.lab.parameters import sections, the_liquid, value_of, with_parameter
 

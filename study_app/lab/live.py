@@ -24,7 +24,7 @@ from study_app.haptics.model.slope_limits import slew_limit_n
 from study_app.lab.ab_comparison import Side, Workbench, other_side
 from study_app.lab.programmed_paths import lead_to_path, programmed_path
 from study_app.lab.shadow import Shadow, Tail, Trace
-from study_app.protocol.streams import stream
+from study_app.protocol.randomization import stream
 
 if TYPE_CHECKING:
     from study_app.haptics.model.motion import Motion

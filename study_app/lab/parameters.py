@@ -19,8 +19,7 @@ from typing import Any, Final
 from pydantic import BaseModel
 
 from study_app.errors import StudyError
-from study_app.haptics.model.effect import LEAST, MOST, Parameter, Value
-from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.haptics.model.effects import EFFECTS, LEAST, MOST, NAMED, Parameter, Value
 from study_app.haptics.model.estimators import ESTIMATORS
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.overrides import override_all

@@ -12,9 +12,9 @@ from typing import Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.haptics.kernels.safety import begin_scene, new_safety
+from study_app.haptics.kernels import begin_scene, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
-from study_app.haptics.model.effects.wake import scaled_length
+from study_app.haptics.model.effects import scaled_length
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.scene import Scene

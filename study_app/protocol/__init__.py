@@ -4,7 +4,9 @@
 ``checks`` refuses what no type can express, ``warnings`` reports what is valid but unwise, ``trials`` has designs,
 stimuli and methods.
 
-Reading order: source, streams, table; groups, raters, sequences, wording; questions; blocks, questionnaires; trials;
-model; formats, quantities, tracks, without_force; json_schema, orders, scene_file; differences, presented; checks,
-simulated; load; upgrade, warnings; describe.
+Reading order: randomization, source; participants, wording; questions; blocks, questionnaires; trials; model;
+file_format, quantities, without_force; orders; presented; checks, simulated; load; upgrade, warnings; descriptions.
+
+Public modules: blocks, checks, descriptions, file_format, load, model, orders, participants, presented, quantities,
+questionnaires, questions, randomization, simulated, source, trials, upgrade, warnings, without_force, wording.
 """

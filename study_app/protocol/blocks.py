@@ -8,8 +8,8 @@ from pydantic import Field, StringConstraints, model_validator
 
 from study_app.haptics.model.ranges import later, within
 from study_app.ids import MAX_ID
-from study_app.protocol.sequences import Constraint
-from study_app.protocol.table import Id, Localised, Table, invalid, text_in
+from study_app.protocol.randomization.sequences import Constraint
+from study_app.protocol.source.table import Id, Localised, Table, invalid, text_in
 
 Phase: TypeAlias = Literal["main", "practice", "baseline"]
 Order: TypeAlias = Literal["fixed", "shuffled", "constrained", "williams", "latin"]

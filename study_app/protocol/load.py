@@ -14,8 +14,8 @@ from study_app.haptics.model.scene import Liquid, RateHz, Scene, Withdrawn
 from study_app.protocol.checks.consistency import check
 from study_app.protocol.checks.designs import check_designs
 from study_app.protocol.checks.force_limits import check_paced, check_returned_energy
-from study_app.protocol.formats import format_fault, with_omitted_keys, with_scene_defaults
-from study_app.protocol.json_schema import schema
+from study_app.protocol.file_format.formats import format_fault, with_omitted_keys, with_scene_defaults
+from study_app.protocol.file_format.json_schema import schema
 from study_app.protocol.model import Format, HandForceN, Named, Protocol, SceneDefaults
 from study_app.protocol.questionnaires import with_instruments
 from study_app.protocol.source.document import Path, Places, entries, frozen
@@ -33,7 +33,7 @@ from study_app.protocol.source.files import (
     without_byte_order_mark,
 )
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of
-from study_app.protocol.table import Table
+from study_app.protocol.source.table import Table
 
 __all__ = [
     "is_scene_file",

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
-from study_app.haptics.model.effect import Effect as EffectDescriptor
+from study_app.haptics.model.effects import Effect as EffectDescriptor
 from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, Vector, later, within
 from study_app.haptics.model.scene import (
     FADE_S,
@@ -28,12 +28,22 @@ from study_app.haptics.model.scene import (
 )
 from study_app.ids import file_name_fault
 from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
-from study_app.protocol.groups import Group, GroupAssignment, Sequences, Steps, every_step
+from study_app.protocol.participants.groups import Group, GroupAssignment, Sequences, Steps, every_step
+from study_app.protocol.participants.raters import SimulatedParticipants
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
-from study_app.protocol.raters import SimulatedParticipants
-from study_app.protocol.table import Body as PageBody
-from study_app.protocol.table import Brief, Description, Id, Language, Localised, Printable, Table, invalid, text_in
+from study_app.protocol.source.table import Body as PageBody
+from study_app.protocol.source.table import (
+    Brief,
+    Description,
+    Id,
+    Language,
+    Localised,
+    Printable,
+    Table,
+    invalid,
+    text_in,
+)
 from study_app.protocol.trials.designs import AnyDesign, default_design, question_of
 from study_app.protocol.trials.methods import AnyMethod
 from study_app.protocol.trials.stimuli import Condition, Stimulus

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from study_app.haptics.model.effect import Parameter
-from study_app.haptics.model.effects import EFFECTS, NAMED
+from study_app.haptics.model.effects import EFFECTS, NAMED, Parameter
 from study_app.number_text import exact_text
 from study_app.protocol.model import MAX_FORCE_N
 

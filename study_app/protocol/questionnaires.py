@@ -14,7 +14,7 @@ from study_app.haptics.model.ranges import later, within
 from study_app.protocol.questions import KINDS, STATEMENT, AnyQuestion, Context, Question, Scale, Statement
 from study_app.protocol.source.document import Path, entries, frozen
 from study_app.protocol.source.problems import Fault, unknown_name
-from study_app.protocol.table import Id, Localised, Table, invalid
+from study_app.protocol.source.table import Id, Localised, Table, invalid
 from study_app.protocol.wording.languages import language_name, missing_text
 
 _Weight = Annotated[float, within(-1e6, 1e6, "weights in questionnaires are smaller than this")]

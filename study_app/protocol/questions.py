@@ -13,7 +13,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, field_validator, mod
 
 from study_app.discovery import Registry, Returns, instance_of
 from study_app.haptics.model.ranges import later, within
-from study_app.protocol.table import (
+from study_app.protocol.source.table import (
     DIRECTIONS,
     Id,
     Localised,

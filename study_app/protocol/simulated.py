@@ -29,11 +29,11 @@ from numpy.random import Generator
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
+from study_app.protocol.orders.tracks import design_of, stimulus_of
+from study_app.protocol.participants.raters import REHEARSED, SimulatedParticipants
 from study_app.protocol.presented.presentation import arrangement_text, next_level, trial_result
 from study_app.protocol.questions import POINTS
-from study_app.protocol.raters import REHEARSED, SimulatedParticipants
-from study_app.protocol.streams import Draw, Key, draw_secret, stream
-from study_app.protocol.tracks import design_of, stimulus_of
+from study_app.protocol.randomization.streams import Draw, Key, draw_secret, stream
 from study_app.protocol.trials.designs import Design, ForcedChoice, Rated
 from study_app.protocol.trials.methods import TrialResult
 from study_app.protocol.trials.stimuli import DELAYS, FORCE_DELAY, OF_LINK, Stimulated

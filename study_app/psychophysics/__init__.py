@@ -3,4 +3,6 @@
 Read ``families`` (the functions), ``grid`` (the posterior) and ``adaptive`` (the choice of the next level) first.
 
 Reading order: delivery, families; detection, grid; people, person_fit; adaptive.
+
+Public modules: adaptive, delivery, detection, families, grid, people, person_fit.
 """

@@ -24,7 +24,7 @@ def start_compilation(devices: tuple[str, ...] = DEVICES) -> CompilationClient |
     OSError
         The system cannot start a process.
     """
-    from study_app.haptics.kernels.compiled import CACHE  # noqa: PLC0415 - the compiler
+    from study_app.haptics.kernels import CACHE  # noqa: PLC0415 - the compiler
 
     if CACHE is None or (CACHE / _FILLED).exists():
         return None
@@ -36,7 +36,7 @@ def start_compilation(devices: tuple[str, ...] = DEVICES) -> CompilationClient |
 def carry_out(devices: tuple[str, ...], send: Send, _stop: Stop) -> None:
     """Open each device with a servo, at zero force."""
     from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415 - the compiler: only in that process
-    from study_app.haptics.kernels.compiled import CACHE, following_compilation  # noqa: PLC0415
+    from study_app.haptics.kernels import CACHE, following_compilation  # noqa: PLC0415
     from study_app.protocol.load import load  # noqa: PLC0415
 
     with following_compilation(send):

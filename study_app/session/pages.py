@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from study_app.protocol.questions import ChoiceView, ItemView, NumberView, Value
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.trials import AnyTask
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,13 +18,13 @@ from study_app.haptics.model.slope_limits import refusal_reason
 from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
-from study_app.protocol.checks.force_limits import blocks_by_stimulus, slope_limit_fault
+from study_app.protocol.checks import blocks_by_stimulus, slope_limit_fault
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import recordings_of
-from study_app.protocol.presented.presented_levels import highest_damping
-from study_app.protocol.sequences import enrolment_number
-from study_app.protocol.warnings.untranslated import UntranslatedText, listed_places
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.orders import recordings_of
+from study_app.protocol.presented import highest_damping
+from study_app.protocol.randomization import enrolment_number
+from study_app.protocol.warnings import UntranslatedText, listed_places
+from study_app.protocol.wording import language_name
 from study_app.store.blinded.sealing import recording_bytes
 from study_app.store.missing_trials import limit_reason
 from study_app.video.sources import VideosFound

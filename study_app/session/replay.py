@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.errors import StoreError, StudyError
-from study_app.haptics.kernels.safety import START_FADE_S, new_safety
+from study_app.haptics.kernels import START_FADE_S, new_safety
 from study_app.haptics.model.device_dynamics import Dynamics, dynamics_from
 from study_app.haptics.model.force_rules import ForceRules, rules_from
 from study_app.haptics.model.layout import LIMITER_FADE, LIMITER_GLITCH, SAMPLE, records
@@ -31,9 +31,9 @@ from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.haptics.runtime.offline import law_along, recompute_scenes
 from study_app.haptics.runtime.pack import adjust_into, pack
 from study_app.protocol.model import Protocol
-from study_app.protocol.presented.presentation import link_seed, recorded_presentation, scene_of
-from study_app.protocol.tracks import adjusting_of, design_of
-from study_app.protocol.trials.stimuli import Stimulated
+from study_app.protocol.orders import adjusting_of, design_of
+from study_app.protocol.presented import link_seed, recorded_presentation, scene_of
+from study_app.protocol.trials import Stimulated
 from study_app.store import receipt, recordings
 from study_app.store.atomic import is_there
 from study_app.store.blinded import blinding

@@ -10,9 +10,9 @@ from typing import Any
 from study_app.errors import ProtocolError, SessionError
 from study_app.protocol.load import known_protocols, parse, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial, build_schedule
-from study_app.protocol.source.files import has_hash
-from study_app.protocol.trials.methods import TrialResult
+from study_app.protocol.orders import FormStep, PageStep, Schedule, Step, Trial, build_schedule
+from study_app.protocol.source import has_hash
+from study_app.protocol.trials import TrialResult
 from study_app.store.blinded.blinding import Key, open_events, place_number
 from study_app.store.journals.journal_events import Event, SessionStarted
 from study_app.store.progress import Progress, progress_of, trial_results

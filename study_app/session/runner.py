@@ -23,9 +23,9 @@ import numpy as np
 
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.protocol.model import Protocol as Study
-from study_app.protocol.orders.schedule import Schedule
-from study_app.protocol.presented.presentation import link_seed, scene_of
-from study_app.protocol.trials.stimuli import DELAY
+from study_app.protocol.orders import Schedule
+from study_app.protocol.presented import link_seed, scene_of
+from study_app.protocol.trials import DELAY
 from study_app.session.device_buttons import DeviceButtons
 from study_app.session.ports import Ports
 from study_app.session.resume import FIRST, Start

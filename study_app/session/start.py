@@ -18,10 +18,9 @@ from study_app.errors import SessionError, StoreError
 from study_app.outlets.session_outlets import Outlets, OutletStatus
 from study_app.protocol.load import parse, read_document, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import stream
-from study_app.protocol.sequences import enrolment_number
-from study_app.protocol.source.files import has_hash, protocol_file
-from study_app.protocol.warnings.untranslated import check_translated, untranslated_on_pages
+from study_app.protocol.randomization import enrolment_number, stream
+from study_app.protocol.source import has_hash, protocol_file
+from study_app.protocol.warnings import check_translated, untranslated_on_pages
 from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store import workstation

@@ -18,7 +18,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from study_app.protocol.trials.tasks import Point, Reach, Task
+from study_app.protocol.trials import Point, Reach, Task
 from study_app.video.frames import VideoFrame
 
 Outcome: TypeAlias = Literal["complete", "timeout"]

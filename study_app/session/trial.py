@@ -16,7 +16,7 @@ import numpy as np
 from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_NAMES, SAMPLE
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.telemetry import timing
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.trials import AnyTask
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TankView, TargetReached, TaskView, new_tracker
 from study_app.session.transitions.events import StartTrial

@@ -16,10 +16,8 @@ from numpy.typing import NDArray
 from study_app.devices.registry import DEVICES
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.orders.schedule import Trial
-from study_app.protocol.tracks import design_of
-from study_app.protocol.trials.tasks import Task
+from study_app.protocol.orders import Trial, design_of, own_protocol
+from study_app.protocol.trials import Task
 from study_app.session.pages import Interval, TaskPage
 from study_app.session.tasks import TankView, Tracker, new_tracker
 from study_app.session.transitions.page_builder import task_page

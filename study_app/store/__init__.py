@@ -8,4 +8,12 @@ Reading order: atomic, delivered, folders, missing_trials, program_log; csv_file
 columns; journals; checksums, progress, receipt; blinded, folder_lock, support; exclusions, recordings,
 study_versions; drafts, merged, recorder, study_settings; study_runs, tables; withdrawals; sessions, sites;
 unblinding, upgrade, verification.
+
+Public modules: atomic, blinded.allocation, blinded.blinding, blinded.sealing, checksums, columns, csv_files, delivered,
+drafts, exclusions, folder_lock, folders, journals.journal, journals.journal_events, merged, missing_trials,
+output_files, program_log, progress, receipt, recorder, recordings, sessions.begin, sessions.open_session,
+sessions.recovery, sessions.simulated_sessions, sites.merge, study_runs, study_settings, study_versions, support,
+tables.column_dictionary, tables.session_tables, tables.study_files, unblinding, upgrade, verification.leaks,
+verification.proofs, verification.recorded_streams, verification.reproduction, verification.verify_session,
+verification.verify_study, withdrawals, workstation.
 """

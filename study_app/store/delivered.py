@@ -21,9 +21,8 @@ from study_app.haptics.model.layout import (
 )
 from study_app.number_text import counted
 from study_app.protocol.model import Limits, Protocol
-from study_app.protocol.presented.presentation import Presentation, presented_condition
-from study_app.protocol.trials.stimuli import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, Stimulated
-from study_app.protocol.trials.tasks import AnyTask, Follow
+from study_app.protocol.presented import Presentation, presented_condition
+from study_app.protocol.trials import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, AnyTask, Follow, Stimulated
 from study_app.psychophysics.delivery import (
     Times,
     Vectors,

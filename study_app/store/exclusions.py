@@ -12,7 +12,7 @@ from typing import Any
 
 from study_app.errors import StoreError
 from study_app.protocol.model import RULES
-from study_app.protocol.source.problems import did_you_mean
+from study_app.protocol.source import did_you_mean
 from study_app.store.atomic import append_line, parse_json, read_own_if_there, write_file
 from study_app.store.blinded.blinding import reveals
 from study_app.store.columns import EXCLUSIONS

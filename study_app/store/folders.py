@@ -26,7 +26,7 @@ from pathlib import Path
 from typing import TypeAlias
 
 from study_app.errors import StoreError
-from study_app.protocol.table import unprintable_character
+from study_app.protocol.source import unprintable_character
 
 ReportProgress: TypeAlias = Callable[[str, float], object]
 """Called with what is being done and the share that is done."""

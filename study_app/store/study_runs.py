@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.protocol.differences import differences
-from study_app.protocol.source.files import with_liquid_files
+from study_app.protocol.descriptions import differences
+from study_app.protocol.source import with_liquid_files
 from study_app.store import receipt
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import folders_of

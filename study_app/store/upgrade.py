@@ -11,7 +11,7 @@ from pathlib import Path
 
 from study_app.errors import StoreError
 from study_app.protocol.load import read_document
-from study_app.protocol.source.files import source_bytes
+from study_app.protocol.source import source_bytes
 from study_app.protocol.upgrade import needs_upgrade, upgraded_file
 from study_app.store.atomic import is_there, read_if_there, read_regular, write_file
 from study_app.store.blinded.blinding import opened_key

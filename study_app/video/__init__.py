@@ -2,4 +2,6 @@
 
 ``sources`` has cameras and footage with their threads, ``frames`` the pictures as values and their statistics in a
 trial, and ``decoding`` alone imports PyAV; read these first.
+
+Public modules: encoding, frames, sources.
 """

@@ -23,8 +23,8 @@ import numpy as np
 from study_app.errors import VideoError
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.files import file_hash
-from study_app.protocol.trials.stimuli import DELAY, MOST_DELAY_MS
+from study_app.protocol.source import file_hash
+from study_app.protocol.trials import DELAY, MOST_DELAY_MS
 from study_app.video.decoding import (
     EXTRA,
     OF_FILE,

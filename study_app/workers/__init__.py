@@ -5,4 +5,6 @@ read these first. ``cases`` compares the versions of both sides, ``shared_tasks`
 process, ``one_thread`` limits linear algebra.
 
 Reading order: one_thread, shared_tasks; server; cases, client; executors.
+
+Public modules: client, executors, one_thread, server, shared_tasks.
 """

@@ -44,7 +44,7 @@ from study_app.analysis.statistics.thresholds import group_mean
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
 from study_app.protocol.model import OF_LEVELS, Contrast, Protocol
-from study_app.protocol.raters import PUBLISHED, TYPICAL
+from study_app.protocol.participants.raters import PUBLISHED, TYPICAL
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.unblinding import unblind

@@ -24,7 +24,7 @@ from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
-from study_app.protocol.raters import PUBLISHED, TYPICAL
+from study_app.protocol.participants.raters import PUBLISHED, TYPICAL
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from tests.analysis.made_up import delays, everybody, liquids, study

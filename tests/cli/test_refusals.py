@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from study_app import app
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.evidence.accuracy import survey
+from study_app.evidence import accuracy
 from study_app.evidence.table import Evidence
 
 
@@ -69,8 +69,8 @@ def test_what_cannot_be_is_refused_before_a_window_opens(visit: Visit, words: tu
 
 
 def test_a_survey_of_liquids_is_written_into_a_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(survey, "survey", lambda _scenes, _show: ("compared",))
-    monkeypatch.setattr(survey, "evidence", lambda found: Evidence("", {"survey.md": found[0]}))
+    monkeypatch.setattr(accuracy, "survey_scenes", lambda _scenes, _show: ("compared",))
+    monkeypatch.setattr(accuracy, "survey_evidence", lambda found: Evidence("", {"survey.md": found[0]}))
     done = CliRunner().invoke(commands, ["accuracy", "--liquids", "--to", str(tmp_path)])
     assert (done.exit_code, (tmp_path / "survey.md").read_text("utf-8")) == (0, "compared"), done.output
     assert done.stdout.strip() == str(tmp_path / "survey.md")

@@ -12,7 +12,7 @@ from study_app.devices import registry, rig
 from study_app.devices.registry import descriptor_of, open_device
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.haptics.kernels.c_functions import READ_NEW, READ_NOTHING_NEW
-from study_app.protocol.streams import stream
+from study_app.protocol.randomization.streams import stream
 from tests.compiled import needs_servo
 from tests.devices.subjects import MS, Ticks, write
 

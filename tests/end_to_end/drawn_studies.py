@@ -8,9 +8,9 @@ from typing import Any
 import tomlkit
 
 from study_app.errors import ProtocolError
-from study_app.protocol.groups import sequences_in
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
+from study_app.protocol.participants.groups import sequences_in
 from study_app.protocol.source.document import frozen
 from study_app.protocol.wording.languages import LANGUAGES
 

@@ -75,19 +75,19 @@ GIVEN: dict[str, Any] = {
     "reasons": lambda rng: tuple(rng.choice(["not finite", "noise"], int(rng.integers(0, 3)), replace=False)),
 }  # fmt: skip
 QUICK = {
-    "timing_report-text": report.evidence, "delay_report-text": delays.evidence,
-    "device_lateness-text": device_lateness.evidence, "outlet_report-stream_text": streams.evidence,
-    "outlet_report-trigger_text": triggers.evidence,
-    "verdicts-write": known_values.evidence,
-    "noticed_delays-markdown": noticed_delays.evidence,
-    "rates-write": simulation.evidence,
-    "stability_report-in_words": stability_report.in_words, "stability_report-summary": stability_report.summary,
-    "force_delay-report": force_delay.evidence, "criteria-report": velocity.evidence,
-    "withheld_force-report": withheld_force.evidence,
+    "timing_report-text": report.timing_evidence, "delay_report-text": delays.delays_evidence,
+    "device_lateness-text": device_lateness.lateness_evidence, "outlet_report-stream_text": streams.streams_evidence,
+    "outlet_report-trigger_text": triggers.triggers_evidence,
+    "verdicts-write": known_values.known_values_evidence,
+    "noticed_delays-markdown": noticed_delays.noticed_delays_evidence,
+    "rates-write": simulation.report_rates_evidence,
+    "stability_report-in_words": stability_report.verdict_text, "stability_report-summary": stability_report.summary,
+    "force_delay-report": force_delay.force_delay_evidence, "criteria-report": velocity.velocity_evidence,
+    "withheld_force-report": withheld_force.withheld_force_evidence,
 }  # fmt: skip
 SLOW = {
-    "timing_report-write": report.evidence, "delay_report-write": delays.evidence,
-    "accuracy_report-write": accuracy_report.evidence, "liquid_survey-survey_markdown": survey.evidence,
+    "timing_report-write": report.timing_evidence, "delay_report-write": delays.delays_evidence,
+    "accuracy_report-write": accuracy_report.accuracy_evidence, "liquid_survey-survey_markdown": survey.survey_evidence,
     "test_reports_of_results-soaked": soaked,
 }  # fmt: skip
 REPORTS = (*QUICK.items(), *(pytest.param(*one, marks=pytest.mark.slow) for one in SLOW.items()))

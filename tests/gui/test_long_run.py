@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtWidgets import QApplication
 
 from study_app.app.delay_session import WindowsThread
-from study_app.evidence.soak.soak import soak
+from study_app.evidence.soak.soak import soak_servo
 from study_app.evidence.timing.measurement import LEAD_IN, PERIOD_NS
 from study_app.protocol.load import load_scenes
 from tests.compiled import needs_servo
@@ -21,7 +21,7 @@ pytestmark = [pytest.mark.slow, needs_servo]
 @pytest.mark.usefixtures("qapp")
 def test_half_an_hour_under_load_drops_nothing_drifts_by_nothing_and_takes_no_memory() -> None:
     windows = WindowsThread("gui")
-    found = windows.during(lambda: soak(load_scenes("rek2024"), HALF_AN_HOUR, virtual=True))
+    found = windows.during(lambda: soak_servo(load_scenes("rek2024"), HALF_AN_HOUR, virtual=True))
     assert found.findings == ()
     assert found.ticks == found.planned == 1_800_000
     assert found.dropped == 0

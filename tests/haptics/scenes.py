@@ -7,7 +7,7 @@ import numpy as np
 
 from study_app.haptics.kernels.compiled import entry_of
 from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick import tick
+from study_app.haptics.kernels.tick import compute_tick
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects.current import Vortex
 from study_app.haptics.model.effects.drag import Drag
@@ -129,7 +129,7 @@ class Hand:
         self.safety[0].fade = 1.0 if faded_in else 0.0
         self.sample = records(SAMPLE, 1)
         self.time_ns = 0
-        self._tick = entry_of(tick, self.model, self.safety[0], self.sample[0])
+        self._tick = entry_of(compute_tick, self.model, self.safety[0], self.sample[0])
 
     def tick(self, position_m: Any = None, *, after_ns: int = TICK_NS) -> Any:
         """Take one tick, with a new sample at ``position_m`` (hand frame), or without one; return a copy of it."""

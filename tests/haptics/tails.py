@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from study_app.evidence.reference_model import respond
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.tick import tick
+from study_app.haptics.kernels.tick import compute_tick
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.offline import simulate
@@ -100,4 +100,4 @@ def _pass_time(model: Any, safety: Any, sample: Any, places_m: Any, ticks: int, 
         sample.fresh = 1
         for axis in range(3):
             sample.position_m[axis] = places_m[k % len(places_m), axis]
-        tick(model, safety, sample)
+        compute_tick(model, safety, sample)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from study_app.errors import ProtocolError
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
 from tests.transcripts import every

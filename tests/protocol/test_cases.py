@@ -9,7 +9,7 @@ import pytest
 
 from study_app.cli import main
 from study_app.errors import ProtocolError
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.warnings.study_warnings import liquid_warnings
 from tests.protocol.edited_studies import FILES, STUDIES, Case, cases_of, regenerate, said_of, text_of

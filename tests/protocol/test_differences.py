@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.differences import CONDITIONS_DIFFER, differences
+from study_app.protocol.descriptions.protocol_differences import CONDITIONS_DIFFER, differences
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.store.receipt import without_conditions

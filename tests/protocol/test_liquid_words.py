@@ -9,7 +9,7 @@ import pytest
 
 from study_app.haptics.model.scene import Liquid
 from study_app.lab.presets import available_liquids
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load
 from study_app.protocol.quantities import liquid_words
 

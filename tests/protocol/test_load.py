@@ -14,10 +14,10 @@ from study_app.haptics.model.gate import describe_gate, resolve
 from study_app.haptics.model.overrides import override_value, value_of
 from study_app.haptics.model.scene import Liquid, Scene
 from study_app.haptics.model.slope_limits import steady_force
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
+from study_app.protocol.file_format.scene_file import scene_text
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.scene_file import scene_text
 from study_app.protocol.source.files import bundle, source_bytes, unbundle
 from tests.platforms import needs_posix
 from tests.protocol.sound import EVERY_ORDER, SOUND

@@ -10,7 +10,7 @@ from pydantic import BaseModel, GetCoreSchemaHandler, ValidationError
 
 from study_app.haptics.model.overrides import number_names
 from study_app.haptics.model.ranges import Frozen
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity, quantity_words

@@ -6,7 +6,7 @@ from pathlib import Path
 from study_app.protocol.load import parse
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import variants
-from study_app.protocol.tracks import design_of
+from study_app.protocol.orders.tracks import design_of
 from tests.protocol.groups.grouped import grouped
 
 TRIALS, ADJUSTMENT, DELAYS, QUESTIONS, GROUPS = (

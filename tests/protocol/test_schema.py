@@ -11,9 +11,9 @@ from typing import Any
 import jsonschema
 import pytest
 
-from study_app.protocol.json_schema import editor_schema, format_markdown
+from study_app.protocol.file_format.json_schema import editor_schema, format_markdown
 from study_app.protocol.source.files import shipped
-from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
+from study_app.protocol.trials.designs import DESIGN_KINDS
 from tests.protocol.edited_studies import FILES, STUDIES, cases_of, text_of
 
 SCHEMA = editor_schema()

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import ProtocolError
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import bundle, hashes_in, protocol_hash, source_bytes, unbundle
 

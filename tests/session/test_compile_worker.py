@@ -6,15 +6,16 @@ from types import SimpleNamespace
 
 import pytest
 
+from study_app.haptics import kernels
 from study_app.haptics.kernels import compiled
 from study_app.session.compile_worker import carry_out, start_compilation
 from tests.compiled import needs_servo
 
 
 def test_no_process_starts_if_nothing_can_be_stored_or_all_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(compiled, "CACHE", None)
+    monkeypatch.setattr(kernels, "CACHE", None)
     assert start_compilation() is None
-    monkeypatch.setattr(compiled, "CACHE", tmp_path)
+    monkeypatch.setattr(kernels, "CACHE", tmp_path)
     (tmp_path / "filled").touch()
     assert start_compilation() is None
 
@@ -23,8 +24,8 @@ def test_the_cache_is_filled_once_every_device_was_opened_and_stopped(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     done: list[str] = []
-    monkeypatch.setattr(compiled, "CACHE", tmp_path)
-    monkeypatch.setattr(compiled, "following_compilation", lambda _send: nullcontext())
+    monkeypatch.setattr(kernels, "CACHE", tmp_path)
+    monkeypatch.setattr(kernels, "following_compilation", lambda _send: nullcontext())
     monkeypatch.setattr(
         "study_app.devices.rig.open_rig", lambda name, _settings: SimpleNamespace(stop=lambda: done.append(name))
     )
@@ -36,7 +37,8 @@ def test_the_cache_is_filled_once_every_device_was_opened_and_stopped(
 @pytest.mark.nightly
 def test_the_process_fills_the_cache_and_says_how_far_it_is(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(compiled, "CACHE", tmp_path / compiled.CACHE.name)
+    for module in (compiled, kernels):
+        monkeypatch.setattr(module, "CACHE", tmp_path / compiled.CACHE.name)
     client = start_compilation(("scripted",))
     assert client is not None
     try:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from study_app.errors import ProtocolError, StoreError
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, load_scenes, parse
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from study_app.protocol.load import parse
+from study_app.protocol.randomization.streams import stream
 from study_app.protocol.source.files import shipped, shipped_file
-from study_app.protocol.streams import stream
 from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
 from study_app.store.folders import StudyFolder
 from study_app.store.progress import Progress

@@ -12,16 +12,31 @@ from study_app.analysis.wording import significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase, block_titles, display_language
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
-from study_app.protocol.orders.block_orders import every_step_of, follows_in
-from study_app.protocol.presented.presentation import link_descriptions
+from study_app.protocol.orders import (
+    design_of,
+    every_step_of,
+    follows_in,
+    has_correct_answer,
+    method_of,
+    stimulus_of,
+    success_name,
+)
+from study_app.protocol.presented import link_descriptions
 from study_app.protocol.questionnaires import Score, instruments, published_name, score_range
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
-from study_app.protocol.table import text_in
-from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, success_name
-from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
-from study_app.protocol.trials.designs import Design, default_design
-from study_app.protocol.trials.methods import Method
-from study_app.protocol.trials.stimuli import DELAY, OF_LINK, Assumed, Stimulus, assumed_for, rises
+from study_app.protocol.source import text_in
+from study_app.protocol.trials import (
+    DELAY,
+    DESIGN_KINDS,
+    OF_LINK,
+    Assumed,
+    Design,
+    Method,
+    Stimulus,
+    assumed_for,
+    default_design,
+    rises,
+)
 from study_app.store.blinded.blinding import Key, complete_protocol
 
 Kind: TypeAlias = Compared

@@ -22,7 +22,7 @@ from study_app.analysis.data.blocks import (
 )
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.blocks import display_language
-from study_app.protocol.table import text_in
+from study_app.protocol.source import text_in
 from study_app.store.atomic import parse_json, read_regular
 from study_app.store.blinded.blinding import Key
 from study_app.store.columns import INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING

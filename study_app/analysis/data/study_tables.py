@@ -53,8 +53,8 @@ from study_app.analysis.data.session_files import (
     with_excluded,
 )
 from study_app.errors import AnalysisError, StoreError
-from study_app.protocol.groups import EACH_GROUP
 from study_app.protocol.model import RULES, Contrast
+from study_app.protocol.participants import EACH_GROUP
 from study_app.protocol.questions import STATEMENT
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key

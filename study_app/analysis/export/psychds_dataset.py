@@ -14,17 +14,17 @@ from study_app.analysis.export.table_files import codebook_bytes, credit_lines, 
 from study_app.errors import ProtocolError
 from study_app.number_text import counted
 from study_app.protocol.blocks import display_language
-from study_app.protocol.source.files import (
+from study_app.protocol.source import (
     bundle,
     file_hash,
     has_hash,
     known_protocols,
     protocol_file,
     source_bytes,
+    text_in,
     unbundle,
     without_byte_order_mark,
 )
-from study_app.protocol.table import text_in
 from study_app.store.atomic import open_regular, system_message
 from study_app.store.blinded.blinding import revealed_key
 from study_app.store.csv_files import Column

@@ -19,7 +19,7 @@ from study_app.analysis.data.study_tables import Study, group_members
 from study_app.analysis.page_layout import MARGIN_PT, POINT, SMALL, Look, Picture, Sheet, picture_of, spread_points
 from study_app.analysis.statistics.outcome import student_interval
 from study_app.analysis.wording import percent
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 
 _A_ROW: Final = 3
 """Panels side by side."""

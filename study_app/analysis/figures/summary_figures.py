@@ -20,7 +20,7 @@ from study_app.analysis.page_layout import FigureTask, Picture, sample_words
 from study_app.analysis.questions import scored
 from study_app.analysis.results import ContrastResult, LevelsResult, Results
 from study_app.number_text import capitalised
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 
 _MEASURES: Final[tuple[tuple[type[LevelStatistic[Any]], str, str], ...]] = (
     (Thresholds, "threshold", "threshold"),

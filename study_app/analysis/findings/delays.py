@@ -56,7 +56,7 @@ from study_app.analysis.wording import (
     significant,
     with_group,
 )
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 
 
 @dataclass(frozen=True, slots=True)

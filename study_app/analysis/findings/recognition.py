@@ -28,7 +28,7 @@ from study_app.analysis.results import BlockResult, NotTested, Verdict, name, sh
 from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
 from study_app.analysis.statistics.recognition import Recognition, named_labels, recognition
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 
 _NONE_RECOGNISED: Final = "We could not show that participants recognised any liquid above chance."
 _NO_SINGLE_LIQUID: Final = "We could not show for any single liquid that it was recognised above chance."

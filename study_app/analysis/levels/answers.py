@@ -34,8 +34,7 @@ from study_app.analysis.levels.statistic import (
 from study_app.analysis.results import LevelsResult, Summary
 from study_app.analysis.statistics.outcome import Array, clopper_pearson, student_interval
 from study_app.analysis.wording import listed
-from study_app.protocol.trials.designs import Reply
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.trials import Reply, Stimulus
 
 _MOST_NAMED = 6
 

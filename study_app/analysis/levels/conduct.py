@@ -12,8 +12,8 @@ from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.measures import number_or_none
 from study_app.analysis.levels.statistic import LevelStatistic, Shown, digits, interval_text, unit
 from study_app.analysis.wording import counted, listed, number
-from study_app.protocol.trials.stimuli import OF_LINK
-from study_app.protocol.warnings.delayed_force import WITHHELD_PERCENT
+from study_app.protocol.trials import OF_LINK
+from study_app.protocol.warnings import WITHHELD_PERCENT
 
 _TRIAL: Final = ["participant", "session", "trial"]
 _Row: TypeAlias = dict[str, Any]

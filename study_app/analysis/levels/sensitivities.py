@@ -27,8 +27,8 @@ from study_app.analysis.levels.thresholds import Thresholds
 from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import listed, number
-from study_app.protocol.presented.presentation import arrangement_of
-from study_app.protocol.trials.designs import Design
+from study_app.protocol.presented import arrangement_of
+from study_app.protocol.trials import Design
 from study_app.psychophysics.detection import Model, Sensitivity, d_prime_at, rating
 from study_app.psychophysics.grid import Z_95
 

@@ -32,8 +32,7 @@ from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, GroupMean, drift, group_mean, p_of_fit
 from study_app.analysis.wording import counted, listed
-from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.stimuli import ANALYSIS_LAPSES, SESSION_SD, Assumed, Stimulus, analysis_grid
+from study_app.protocol.trials import ANALYSIS_LAPSES, SESSION_SD, Assumed, Design, Stimulus, analysis_grid
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import ALIKE, MANY_LAPSES, MEAN_LAPSE, NEAR_MODE, GroupPriors, Posterior, group_priors
 from study_app.psychophysics.person_fit import (

@@ -12,9 +12,8 @@ from scipy.special import bdtr
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import Study
 from study_app.protocol.model import BELOW_CHANCE_P
-from study_app.protocol.presented.presentation import arrangement_of
-from study_app.protocol.trials.methods import Answer, TrackSetting
-from study_app.protocol.trials.stimuli import DELAY, FORCE_DELAY, Stimulus
+from study_app.protocol.presented import arrangement_of
+from study_app.protocol.trials import DELAY, FORCE_DELAY, Answer, Stimulus, TrackSetting
 
 TRACK: Final = ["participant", "session", "block", "code"]
 """What one track is in the rows of `tracks`."""

@@ -39,7 +39,7 @@ from study_app.analysis.results import min_sample_reason
 from study_app.analysis.statistics.equivalence import STEPS, fewest_participants
 from study_app.analysis.wording import bound_text, listed
 from study_app.protocol.model import Contrast
-from study_app.protocol.raters import CONSISTENT, NOISY, STATED
+from study_app.protocol.participants import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
 from study_app.store.csv_files import Column, csv_bytes, optional
 from study_app.store.output_files import write_files

@@ -24,21 +24,21 @@ from study_app.analysis.statistics.thresholds import FEWEST
 from study_app.analysis.wording import bound_text, counted, listed, percent, significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, block_titles, display_language
-from study_app.protocol.describe import describe, limit_rows
+from study_app.protocol.descriptions import describe, limit_rows
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Analysis, Contrast, Protocol
-from study_app.protocol.orders.balance import block_orders_by_group
-from study_app.protocol.quantities import quantity, quantity_words
-from study_app.protocol.table import text_in
-from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
-from study_app.protocol.trials.stimuli import assumed_for
-from study_app.protocol.warnings.expected_precision import (
-    PRECISION,
-    expected_of,
-    precision_plan,
-    precision_rows,
-    threshold_plan,
+from study_app.protocol.orders import (
+    block_orders_by_group,
+    condition_of,
+    design_of,
+    method_of,
+    standards_of,
+    stimulus_of,
 )
+from study_app.protocol.quantities import quantity, quantity_words
+from study_app.protocol.source import text_in
+from study_app.protocol.trials import assumed_for
+from study_app.protocol.warnings import PRECISION, expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.store.exclusions import MISSING_RULE, describe_exclusion
 from study_app.store.merged import DASH, folders_of

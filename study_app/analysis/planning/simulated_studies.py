@@ -26,12 +26,11 @@ from study_app.analysis.statistics.mean_tests import means_of, p_differs, resamp
 from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, false_discovery, holm, p_of_draws
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, display_language
-from study_app.protocol.groups import groups_with
 from study_app.protocol.model import Contrast, Protocol
+from study_app.protocol.participants import LAPSE_POINTS, SimulatedParticipants, compared_kinds, groups_with
 from study_app.protocol.questions import POINTS, Question
-from study_app.protocol.raters import LAPSE_POINTS, SimulatedParticipants, compared_kinds
 from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
-from study_app.protocol.table import text_in
+from study_app.protocol.source import text_in
 
 LOWEST, HIGHEST = 1, POINTS
 ConditionFeatures: TypeAlias = Mapping[tuple[str, str], Sequence[TrialFeatures]]

@@ -30,9 +30,9 @@ from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import block_titles, display_language
 from study_app.protocol.model import Contrast, Protocol
-from study_app.protocol.table import text_in
-from study_app.protocol.tracks import stimulus_of, tracks_of
-from study_app.protocol.warnings.expected_precision import (
+from study_app.protocol.orders import stimulus_of, tracks_of
+from study_app.protocol.source import text_in
+from study_app.protocol.warnings import (
     PRECISION,
     EstimationPlan,
     MeanPlan,

@@ -18,8 +18,8 @@ from study_app.analysis.planned_exclusions import NEED_KEY, proposals, rule_cond
 from study_app.analysis.results import BlockResult, Results, lead_phrase, said_of_presentations
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.protocol.blocks import block_titles
-from study_app.protocol.groups import blocks_before
-from study_app.protocol.orders.block_orders import session_steps_of
+from study_app.protocol.orders import session_steps_of
+from study_app.protocol.participants import blocks_before
 from study_app.protocol.quantities import liquid_words
 from study_app.store.unblinding import RULES
 

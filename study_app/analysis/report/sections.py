@@ -51,8 +51,7 @@ from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
 from study_app.protocol.model import RULES, quoted_title
-from study_app.protocol.orders.balance import Evenness
-from study_app.protocol.orders.block_orders import session_steps_of
+from study_app.protocol.orders import Evenness, session_steps_of
 from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of

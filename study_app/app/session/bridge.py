@@ -34,11 +34,10 @@ from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.widgets.background import Background
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import expected_duration_s
-from study_app.protocol.orders.schedule import PageStep, Schedule, stream
+from study_app.protocol.orders import PageStep, Schedule, expected_duration_s, orders_of
+from study_app.protocol.randomization import stream
 from study_app.protocol.without_force import without_force
-from study_app.protocol.wording.languages import words
+from study_app.protocol.wording import words
 from study_app.session.pages import Page, TaskPage
 from study_app.session.ports import JournalPort, Ports
 from study_app.session.resume import FIRST, Start, begun_schedule, resume_at

@@ -175,7 +175,7 @@ class LiveSession(QObject):
         videos: Videos | None = None
         try:
             load_windows()
-            from study_app.haptics.kernels.compiled import following_compilation  # noqa: PLC0415 - the compiler: only in this thread
+            from study_app.haptics.kernels import following_compilation  # noqa: PLC0415 - the compiler: only in this thread
 
             study = self.chosen.read_protocol()
             check_choices(self.chosen, study)

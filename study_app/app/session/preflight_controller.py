@@ -29,7 +29,7 @@ from study_app.gui.widgets.background import Background
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
-from study_app.protocol.trials.tasks import Stroke
+from study_app.protocol.trials import Stroke
 from study_app.session.preflight import Check, Measurements, PredictedDelivery, Screen, preflight_checks
 from study_app.session.resume import begun_schedule
 from study_app.session.start import NewSession, Ready, measure_rig
@@ -304,7 +304,7 @@ class ComputerCheck(QObject):
     def _run_checks(self) -> tuple[Check, ...]:
         from study_app.devices.registry import backends  # noqa: PLC0415 - the compiler: only in this thread
         from study_app.devices.rig import open_rig, study_settings  # noqa: PLC0415
-        from study_app.haptics.kernels.compiled import CACHE, following_compilation  # noqa: PLC0415
+        from study_app.haptics.kernels import CACHE, following_compilation  # noqa: PLC0415
         from study_app.protocol.load import load  # noqa: PLC0415
         from study_app.session.preflight_measurements import measure_servo_and_disk  # noqa: PLC0415
 

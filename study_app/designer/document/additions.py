@@ -28,16 +28,13 @@ from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move
 from study_app.designer.document.toml_text import Refused
 from study_app.ids import MAX_ID, free_id
 from study_app.number_text import MINUS, exact_text, number_of
-from study_app.protocol.checks.cross_references import TEXTS
-from study_app.protocol.checks.designs import missing_for_rule
-from study_app.protocol.checks.force_limits import check_paced
-from study_app.protocol.groups import ASSIGNMENT
+from study_app.protocol.checks import TEXTS, check_paced, missing_for_rule
 from study_app.protocol.model import RULE_LIMITS, RULES
+from study_app.protocol.participants import ASSIGNMENT
 from study_app.protocol.questionnaires import instrument_tables, instruments
-from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.source.problems import Fault, rule_of, shown_value
-from study_app.protocol.warnings.untranslated import untranslated_texts
-from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
+from study_app.protocol.source import Fault, Path, entries, has, names, rule_of, shown_value, value_at
+from study_app.protocol.warnings import untranslated_texts
+from study_app.protocol.wording import LANGUAGES, language_name, languages_of
 
 
 def edits_to_switch(study: Study, path: Path, kind: str | None) -> tuple[Edit, ...]:

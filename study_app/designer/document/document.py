@@ -21,19 +21,19 @@ from study_app.designer.templates import FOLDER, templates
 from study_app.errors import StoreError
 from study_app.ids import MAX_SHORT_NAME, file_name_fault, free_short_name, short_name_of
 from study_app.number_text import counted
-from study_app.protocol.source.document import Path as Place
-from study_app.protocol.source.document import value_at
-from study_app.protocol.source.files import (
+from study_app.protocol.source import Path as Place
+from study_app.protocol.source import (
+    did_you_mean,
     file_hash,
     hashes_in,
     shipped,
     shipped_file,
     unbundle,
+    value_at,
     with_liquid_files,
     without_byte_order_mark,
 )
-from study_app.protocol.source.problems import did_you_mean
-from study_app.protocol.wording.languages import languages_of
+from study_app.protocol.wording import languages_of
 from study_app.store.atomic import cannot_write
 from study_app.store.drafts import Draft, Keeper, draft_of, unsaved_files
 from study_app.store.folder_lock import is_open

@@ -23,10 +23,10 @@ from study_app.designer.document.fields import (
 )
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
-from study_app.protocol.groups import sequences_in
+from study_app.protocol.participants import sequences_in
 from study_app.protocol.questionnaires import published_name
-from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.wording.languages import languages_of
+from study_app.protocol.source import Path, entries, has, names, value_at
+from study_app.protocol.wording import languages_of
 
 _TITLES: Final = ("title", "short", "text")
 """Keys of texts that an element is called by, the first that it has."""

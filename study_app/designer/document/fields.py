@@ -16,17 +16,15 @@ from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.ranges import REASON
 from study_app.ids import MAX_FROM_TEXT, MAX_ID, free_id, id_of
 from study_app.number_text import counted, exact_text
-from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES
-from study_app.protocol.json_schema import length_texts, schema
+from study_app.protocol.checks import CHOICES, ITEM_REFERENCES
+from study_app.protocol.file_format import length_texts, schema
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.questions import POINTS
-from study_app.protocol.source.document import Path, entries, has, names, value_at
-from study_app.protocol.source.problems import rule_of
-from study_app.protocol.table import ALTERNATIVES, NOT_WITH, SECTIONS
-from study_app.protocol.trials.designs import KINDS as DESIGNS
-from study_app.protocol.trials.designs import Design, default_design
-from study_app.protocol.trials.methods import KINDS as METHODS
-from study_app.protocol.wording.languages import LANGUAGES, languages_of
+from study_app.protocol.source import ALTERNATIVES, NOT_WITH, SECTIONS, Path, entries, has, names, rule_of, value_at
+from study_app.protocol.trials import DESIGN_KINDS as DESIGNS
+from study_app.protocol.trials import METHOD_KINDS as METHODS
+from study_app.protocol.trials import Design, default_design
+from study_app.protocol.wording import LANGUAGES, languages_of
 
 Document = Mapping[str, Any]
 ITEMS = "items"

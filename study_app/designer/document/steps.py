@@ -51,8 +51,8 @@ from study_app.number_text import counted
 from study_app.protocol.load import read_document, shipped, source_bytes
 from study_app.protocol.model import SceneDefaults
 from study_app.protocol.questionnaires import instrument, instrument_tables
-from study_app.protocol.source.document import Path, names, value_at
-from study_app.protocol.wording.languages import language_name, languages_of
+from study_app.protocol.source import Path, names, value_at
+from study_app.protocol.wording import language_name, languages_of
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
 """Returns the ids beside an element under which answers are recorded: its own then stays."""

@@ -14,9 +14,7 @@ from study_app.designer.document.toml_text import Refused, Splice, Splices, appl
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import located_problems, read_document, validate_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.document import Path, Places
-from study_app.protocol.source.files import TABLE, is_utf16, with_liquid_files, without_byte_order_mark
-from study_app.protocol.source.problems import Fault
+from study_app.protocol.source import TABLE, Fault, Path, Places, is_utf16, with_liquid_files, without_byte_order_mark
 
 _NOT_TOML: Final = "the file cannot be read: correct its text first"
 

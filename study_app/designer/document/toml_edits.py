@@ -25,7 +25,7 @@ from study_app.designer.document.toml_text import (
     table_text,
     toml_value,
 )
-from study_app.protocol.source.document import Node, Path
+from study_app.protocol.source import Node, Path
 
 _PADDING: Final = re.compile(r"([ \t]+)#")
 _COMMA: Final = re.compile(r"[ \t]*,[ \t]*")

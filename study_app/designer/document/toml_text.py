@@ -13,7 +13,7 @@ import tomlkit
 import tomlkit.items
 
 from study_app.errors import StudyError
-from study_app.protocol.source.document import Node, Path, scan_nodes
+from study_app.protocol.source import Node, Path, scan_nodes
 
 
 class Refused(StudyError):

@@ -70,7 +70,7 @@ from study_app.gui.widgets.controls import IconButton
 from study_app.gui.widgets.labels import Elided, Ink, label, set_property
 from study_app.number_text import capitalised
 from study_app.protocol.questionnaires import instruments
-from study_app.protocol.source.document import Path
+from study_app.protocol.source import Path
 
 KINDS = {
     "numbers": "Numbers", "vector": "Numbers", "number": "One number", "whole number": "One number", "text": "Text",

@@ -10,7 +10,7 @@ from study_app.designer.document.fields import default_designs
 from study_app.gui.theme.theme import Theme, font
 from study_app.gui.theme.themed import Coloured
 from study_app.gui.widgets.controls import Choice
-from study_app.protocol.trials.designs import Design
+from study_app.protocol.trials import Design
 
 _SIDE_PX, _GAP_PX, _RATIO = 14, 4, 3
 _SIZE: Final = QSize(5 * _SIDE_PX + 4 * _GAP_PX, _SIDE_PX)  # four intervals and the reply

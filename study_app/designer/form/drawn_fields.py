@@ -31,14 +31,10 @@ from study_app.gui.theme.themed import Themed
 from study_app.gui.widgets.cards import smooth_painter
 from study_app.gui.widgets.numbers import Range
 from study_app.number_text import capitalised, duration, exact_duration
-from study_app.protocol.orders.durations import ANSWER_S, CHOICE_S
-from study_app.protocol.presented.presented_levels import level_limits, levels
-from study_app.protocol.source.document import Path, value_at
-from study_app.protocol.tracks import design_of, method_of
-from study_app.protocol.trials.designs import ORDINALS
-from study_app.protocol.trials.methods import Adjustment
-from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.orders import ANSWER_S, CHOICE_S, design_of, method_of
+from study_app.protocol.presented import level_limits, levels
+from study_app.protocol.source import Path, value_at
+from study_app.protocol.trials import ORDINALS, Adjustment, AnyTask, Stimulus
 
 _FARTHEST: Final = 3.0
 """A limit is drawn up to so many times the highest level, or spans above it."""

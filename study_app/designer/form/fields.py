@@ -31,7 +31,7 @@ from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButt
 from study_app.gui.widgets.labels import Elided, label, set_property
 from study_app.number_text import number_of, typed_numbers, unclear_number
 from study_app.protocol.questions import STATEMENT
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.wording import language_name
 
 HAND_ON_MS = 150
 """What is typed is handed on so long after the first key [ms]: typing without a rest is kept as well."""

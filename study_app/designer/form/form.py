@@ -60,13 +60,12 @@ from study_app.designer.form.rows import (
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language, valid_part
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
-from study_app.protocol.checks.designs import missing_for_rule
-from study_app.protocol.groups import ASSIGNMENT, sequences_in
+from study_app.protocol.checks import missing_for_rule
 from study_app.protocol.model import RULE_LIMITS
-from study_app.protocol.source.document import Path, Places, has, names, places_of, value_at
-from study_app.protocol.source.problems import Fault
-from study_app.protocol.warnings.untranslated import untranslated_at
-from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
+from study_app.protocol.participants import ASSIGNMENT, sequences_in
+from study_app.protocol.source import Fault, Path, Places, has, names, places_of, value_at
+from study_app.protocol.warnings import untranslated_at
+from study_app.protocol.wording import LANGUAGES, language_name, languages_of
 
 _ENTRIES: Final = "In this order"
 _DEEPEST: Final = 3

@@ -34,7 +34,7 @@ from study_app.gui.widgets.controls import ActionButton, IconButton
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import typed_numbers
-from study_app.protocol.source.document import Path
+from study_app.protocol.source import Path
 
 _CAPTION: Final = f"force at a hand speed of {HAND_MPS:g} m/s"
 

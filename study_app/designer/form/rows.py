@@ -9,9 +9,9 @@ from study_app.designer.document.fields import Choice, Row, element_noun, label_
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import Study
 from study_app.protocol.questions import STATEMENT
-from study_app.protocol.source.document import Path, value_at
-from study_app.protocol.warnings.untranslated import UntranslatedText
-from study_app.protocol.wording.languages import LANGUAGES, language_name, languages_of
+from study_app.protocol.source import Path, value_at
+from study_app.protocol.warnings import UntranslatedText
+from study_app.protocol.wording import LANGUAGES, language_name, languages_of
 
 _ICONS: Final = {"rating": "scale", "slider": "slider", "number": "number", "choice": "list", "text": "letter"}
 

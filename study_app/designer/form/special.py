@@ -43,14 +43,13 @@ from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
-from study_app.protocol.groups import follows
 from study_app.protocol.model import OF_LEVELS
-from study_app.protocol.orders.balance import block_orders_by_group
-from study_app.protocol.sequences import has_even_borders, row_count
-from study_app.protocol.source.document import entries, names, value_at
-from study_app.protocol.tracks import measures_of
-from study_app.protocol.trials import designs, tasks
-from study_app.protocol.wording.languages import language_name, languages_of
+from study_app.protocol.orders import block_orders_by_group, measures_of
+from study_app.protocol.participants import follows
+from study_app.protocol.randomization import has_even_borders, row_count
+from study_app.protocol.source import entries, names, value_at
+from study_app.protocol.trials import DESIGN_KINDS, TASK_KINDS
+from study_app.protocol.wording import language_name, languages_of
 
 _ROUNDS: Final = 3
 _SQUARES: Final[Mapping[Any, Literal["williams", "latin"]]] = {"williams": "williams", "latin": "latin"}
@@ -215,8 +214,8 @@ DESCRIPTION: Final = SpecialEditor(
 
 
 _QUESTIONS: Final = (*(kind.__name__ for kind in questions.KINDS.own.values()), *questions.KINDS.others)
-_TASKS: Final = (*(kind.__name__ for kind in tasks.KINDS.own.values()), *tasks.KINDS.others)
-_DESIGNS: Final = tuple({kind.__name__ for kind in designs.KINDS.values()})
+_TASKS: Final = (*(kind.__name__ for kind in TASK_KINDS.own.values()), *TASK_KINDS.others)
+_DESIGNS: Final = tuple({kind.__name__ for kind in DESIGN_KINDS.values()})
 """The titles of their tables."""
 
 

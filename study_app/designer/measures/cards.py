@@ -16,7 +16,7 @@ from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.boxes import grid as grid_of
 from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
 from study_app.gui.widgets.labels import Elided, Ink, figures, label
-from study_app.protocol.source.document import Path
+from study_app.protocol.source import Path
 
 UNKNOWN: Final = "–"
 """Stands for a number that is not known."""

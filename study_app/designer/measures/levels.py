@@ -8,8 +8,8 @@ from study_app.gui.theme.theme import Theme
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.quantities import quantity
-from study_app.protocol.source.document import Path
-from study_app.protocol.trials.stimuli import Stimulus
+from study_app.protocol.source import Path
+from study_app.protocol.trials import Stimulus
 
 Limit: TypeAlias = Literal["norm", "slope"]
 Ticks: TypeAlias = tuple[tuple[float, str], ...]

@@ -34,9 +34,9 @@ from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import capitalised, counted, duration, duration_figure, duration_range
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.source.document import Path
-from study_app.protocol.wording.languages import language_name, languages_of
+from study_app.protocol.orders import order_of
+from study_app.protocol.source import Path
+from study_app.protocol.wording import language_name, languages_of
 
 _SQUARE_NAMES: Final = {"williams": "Williams design", "latin": "Latin square"}
 _MOST_CODES: Final = 8

@@ -12,7 +12,7 @@ from typing import Any, Final, TypeAlias
 from study_app.designer.measures.study_facts import text_keys
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.protocol.model import Protocol
-from study_app.protocol.warnings.expected_precision import imprecise, threshold_plan
+from study_app.protocol.warnings import imprecise, threshold_plan
 from study_app.workers.client import WorkerClient
 from study_app.workers.server import Send, Stop, Stopped
 

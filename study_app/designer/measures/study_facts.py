@@ -15,18 +15,23 @@ from study_app.designer.document.toml_edits import Set, Unset, meant_document
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.protocol.blocks import Block
-from study_app.protocol.json_schema import schema
+from study_app.protocol.file_format import schema
 from study_app.protocol.load import validate_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.balance import Evenness, balances, numbered_participants
-from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, step_duration_s, variants
-from study_app.protocol.sequences import row_count
-from study_app.protocol.source.document import Path, frozen, has, value_at
-from study_app.protocol.source.problems import Fault
-from study_app.protocol.warnings.study_warnings import warnings
-from study_app.protocol.warnings.untranslated import describe_untranslated, untranslated_texts
-from study_app.protocol.wording.languages import languages_of
+from study_app.protocol.orders import (
+    Evenness,
+    balances,
+    duration_range_s,
+    expected_duration_s,
+    numbered_participants,
+    orders_of,
+    step_duration_s,
+    variants,
+)
+from study_app.protocol.randomization import row_count
+from study_app.protocol.source import Fault, Path, frozen, has, value_at
+from study_app.protocol.warnings import describe_untranslated, untranslated_texts, warnings
+from study_app.protocol.wording import languages_of
 from study_app.store.verification.leaks import Telltales
 from study_app.store.workstation import device_without_force
 

@@ -24,11 +24,9 @@ from study_app.lab.ab_comparison import Setting
 from study_app.lab.ab_comparison import Side as LabSide
 from study_app.lab.parameters import parameter
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import variants
-from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial, build_schedule
-from study_app.protocol.source.document import Path, has, value_at
-from study_app.protocol.source.files import liquid_file_name, unbundle, with_liquid_files
-from study_app.protocol.wording.languages import language_name, languages_of
+from study_app.protocol.orders import FormStep, PageStep, Step, Trial, build_schedule, variants
+from study_app.protocol.source import Path, has, liquid_file_name, unbundle, value_at, with_liquid_files
+from study_app.protocol.wording import language_name, languages_of
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
 from study_app.store.study_versions import kept_content, kept_versions

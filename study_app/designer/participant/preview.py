@@ -72,10 +72,10 @@ from study_app.gui.widgets.controls import Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Trial
+from study_app.protocol.orders import Trial
 from study_app.protocol.questions import Value
-from study_app.protocol.source.document import Path, places_of, value_at
-from study_app.protocol.wording.languages import words
+from study_app.protocol.source import Path, places_of, value_at
+from study_app.protocol.wording import words
 from study_app.session.pages import DesignPage, Page, QuestionnairePage, TaskPage
 from study_app.session.simulated.observers import ProgrammedBall
 from study_app.session.tasks import TankView

@@ -19,10 +19,25 @@ import numpy as np
 
 from study_app.devices.base import Device
 from study_app.errors import DeviceError
-from study_app.haptics.kernels import c_functions
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.sample_validation import can_have_moved
-from study_app.haptics.kernels.vector import clear, copy, is_finite, norm, square_distance
+from study_app.haptics.kernels import (
+    READ,
+    READ_LOST,
+    READ_NEW,
+    WRITE,
+    Driver,
+    call_at,
+    can_have_moved,
+    clear,
+    command_at,
+    copy,
+    device_functions,
+    is_finite,
+    kernel,
+    norm,
+    reading_at,
+    record_at,
+    square_distance,
+)
 from study_app.haptics.model.layout import BUTTON_STOP, records
 from study_app.haptics.runtime.clocks.clock import Clock, SystemClock
 from study_app.haptics.runtime.servo import Servo
@@ -109,8 +124,8 @@ _EXCITATION = np.dtype(
     align=True,
 )
 
-_excitation_at = c_functions.record_at(_EXCITATION)
-_inner_read, _inner_write = c_functions.call_at(c_functions.READ), c_functions.call_at(c_functions.WRITE)
+_excitation_at = record_at(_EXCITATION)
+_inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
 
 class BenchDriver:
@@ -122,7 +137,7 @@ class BenchDriver:
     limit_n : the greatest force of an excitation [N]
     """
 
-    def __init__(self, inner: c_functions.Driver, limit_n: float) -> None:
+    def __init__(self, inner: Driver, limit_n: float) -> None:
         self.name = inner.name
         self.force_limit_n = inner.force_limit_n
         self.dynamics = inner.dynamics
@@ -161,7 +176,7 @@ class BenchDriver:
 
 @cache
 def _functions() -> tuple[Any, Any]:
-    return c_functions.device_functions(_read, _write)
+    return device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
@@ -169,11 +184,11 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     answer: int = _inner_read(bench.read, bench.context, now_ns, reading)
     elapsed_s = (now_ns - bench.now_ns) * 1e-9 if bench.started != 0 else 0.0
     bench.now_ns = now_ns
-    if answer == c_functions.READ_LOST:
+    if answer == READ_LOST:
         bench.armed = 0
         return answer
-    out = c_functions.reading_at(reading)
-    if answer == c_functions.READ_NEW and _is_usable(bench, out.position_m, now_ns):
+    out = reading_at(reading)
+    if answer == READ_NEW and _is_usable(bench, out.position_m, now_ns):
         _track_position(bench, out.position_m, now_ns)
     else:
         bench.silent += 1
@@ -184,7 +199,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    bench, asked = _excitation_at(context), c_functions.command_at(command)
+    bench, asked = _excitation_at(context), command_at(command)
     if bench.pending != 0 and bench.armed != 0 and bench.ended == RUNNING:
         copy(bench.force_n, asked.force_n)
     else:

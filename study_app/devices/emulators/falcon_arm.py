@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from study_app.devices.falcon.mechanics import Geometry
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import norm
+from study_app.haptics.kernels import kernel, norm
 
 ARMS = np.dtype(
     [

@@ -14,8 +14,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import constants
-from study_app.haptics.kernels.c_functions import record_at
-from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels import kernel, record_at
 
 OUT_RING: Final = 4096
 BACK_RING: Final = 4096

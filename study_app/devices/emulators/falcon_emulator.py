@@ -21,9 +21,7 @@ from study_app.devices.falcon.bulk import BULK, BulkCalls
 from study_app.devices.falcon.mechanics import DEFAULT_GEOMETRY, Geometry, geometry_named
 from study_app.devices.hand import HAND, HandOrders
 from study_app.devices.simulated import TREMOR_M, new_scripted_handle
-from study_app.haptics.kernels.c_functions import c_function, record_at
-from study_app.haptics.kernels.compiled import entry_of, kernel
-from study_app.haptics.kernels.plant import HANDLE
+from study_app.haptics.kernels import HANDLE, c_function, entry_of, kernel, record_at
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.ranges import Vector
 

@@ -21,8 +21,7 @@ from study_app.devices.emulators.falcon_bridge import answer
 from study_app.devices.falcon import constants
 from study_app.devices.hand import REACH, move_hand
 from study_app.errors import DeviceError
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import move, push
+from study_app.haptics.kernels import kernel, move, push
 
 _CHANCES: Final = ("drop", "truncate", "corrupt", "duplicate", "delay", "stall", "echo", "glued", "echo_prefix")
 """A reply lost, cut to 14 bytes, with a wrong byte, sent twice or late; a device that receives nothing for some time; a

@@ -16,7 +16,7 @@ from study_app.devices.force_dimension.exchange import BUTTONS, FILL, FUNCTIONS,
 from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE
 from study_app.devices.simulated import TREMOR_M, ScriptedDevice
 from study_app.errors import DeviceError
-from study_app.haptics.kernels.c_functions import READ, READ_NEW, WRITE, c_function, call_at, record_at
+from study_app.haptics.kernels import READ, READ_NEW, WRITE, c_function, call_at, record_at
 from study_app.haptics.model.layout import COMMAND, MEASURED_VELOCITY, READING, new_command, new_reading, records
 
 NO_FAULT, FAULT_ERROR, FAULT_NAN, FAULT_FORCE_OFF, FAULT_TIMEGUARD = range(5)

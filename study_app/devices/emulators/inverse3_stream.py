@@ -12,9 +12,7 @@ import numpy as np
 from numba import types
 
 from study_app.devices.hand import HAND, move_held_handle
-from study_app.haptics.kernels.c_functions import c_function, record_at
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import HANDLE, measure, push, release_handle
+from study_app.haptics.kernels import HANDLE, c_function, kernel, measure, push, record_at, release_handle
 
 _SOCKET_CALL = types.intp(types.intp, types.intp, types.uintp, types.int32)
 _IDLE_NS: Final = 100_000_000

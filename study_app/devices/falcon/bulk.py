@@ -14,8 +14,7 @@ import numpy as np
 from numba import types
 
 from study_app.devices.falcon import constants
-from study_app.haptics.kernels.c_functions import c_function, call_at, record_at
-from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels import c_function, call_at, kernel, record_at
 from study_app.haptics.model.layout import records
 
 BULK = types.int32(types.intp, types.uint8, types.intp, types.int32, types.intp, types.uint32)

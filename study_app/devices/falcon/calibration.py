@@ -26,7 +26,7 @@ from study_app.devices.falcon import mechanics
 from study_app.devices.falcon.constants import ERROR_NO_DEVICE
 from study_app.devices.falcon.failures import usb_failure
 from study_app.errors import DeviceError
-from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW
+from study_app.haptics.kernels import READ_LOST, READ_NEW
 from study_app.haptics.model.layout import new_command, new_reading
 from study_app.user_folder import FOLDER_VARIABLE, user_folder
 

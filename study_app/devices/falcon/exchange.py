@@ -19,10 +19,23 @@ import numpy as np
 from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, closed_during_call, enter, leave
 from study_app.devices.falcon import constants, mechanics, replies
 from study_app.devices.falcon.bulk import BULK, BulkCalls
-from study_app.haptics.kernels import c_functions
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.passivity import SURE_MPS
-from study_app.haptics.kernels.vector import clear, copy, dot, square, square_distance
+from study_app.haptics.kernels import (
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    SURE_MPS,
+    call_at,
+    clear,
+    command_at,
+    copy,
+    device_functions,
+    dot,
+    kernel,
+    reading_at,
+    record_at,
+    square,
+    square_distance,
+)
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import READING, records
 from study_app.haptics.model.slope_limits import SLEW_S, slew_limit_n
@@ -210,8 +223,8 @@ COUNTERS: Final = (
     "shortened",
 )
 
-_falcon_at = c_functions.record_at(_FALCON)
-_transfer = c_functions.call_at(BULK)
+_falcon_at = record_at(_FALCON)
+_transfer = call_at(BULK)
 
 
 def _offset(field: str) -> int:
@@ -243,14 +256,14 @@ def new_exchange(
 @cache
 def exchange_functions() -> tuple[Any, Any]:
     """Compile read and write, once for all Falcons."""
-    return c_functions.device_functions(_read, _write)
+    return device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     falcon = _falcon_at(context)
-    answer = c_functions.READ_LOST
+    answer = READ_LOST
     if enter(falcon):
-        answer = _take_reply(falcon, context, now_ns, c_functions.reading_at(reading))
+        answer = _take_reply(falcon, context, now_ns, reading_at(reading))
         if closed_during_call(falcon):
             finish(falcon, context)
         leave(falcon)
@@ -258,8 +271,8 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    falcon, asked = _falcon_at(context), c_functions.command_at(command)
-    answer = c_functions.READ_LOST
+    falcon, asked = _falcon_at(context), command_at(command)
+    answer = READ_LOST
     if enter(falcon):
         answer = _send_force(falcon, context, asked.force_n)
         if closed_during_call(falcon):
@@ -286,7 +299,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     falcon.apart += 1
     packets = _receive(falcon, context)
     if falcon.ended != RUNS or falcon.unguarded != 0:
-        return c_functions.READ_LOST
+        return READ_LOST
     gap = falcon.started == 0 or elapsed_ns <= 0 or elapsed_ns > _LONGEST_GAP_NS
     falcon.started = 1
     if gap:
@@ -294,13 +307,13 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
     punctual = replies.update_delay(falcon, packets, gap)
     if packets == 0:
         falcon.missing += 1
-        return c_functions.READ_NOTHING_NEW
+        return READ_NOTHING_NEW
     if not punctual:
         falcon.late += 1
-        return c_functions.READ_NOTHING_NEW
+        return READ_NOTHING_NEW
     if not (replies.take_status(falcon) and replies.is_plausible(falcon) and _locate(falcon)):
         falcon.refused += 1
-        return c_functions.READ_NOTHING_NEW
+        return READ_NOTHING_NEW
     _follow(falcon)
     _open_gate(falcon, elapsed_ns * 1e-9)
     for axis in range(3):
@@ -311,7 +324,7 @@ def _take_reply(falcon: Any, context: int, now_ns: int, out: Any) -> int:
         out.delay_ticks = falcon.delay
     falcon.fresh += 1
     falcon.fresh_ns = now_ns
-    return c_functions.READ_NEW
+    return READ_NEW
 
 
 @kernel
@@ -322,7 +335,7 @@ def _send_force(falcon: Any, context: int, force_n: Any) -> int:
     else:  # nor NaN: the servo sends neither
         clear(falcon.force_n)
     _send_packet(falcon, context)
-    return c_functions.READ_LOST if falcon.ended != RUNS else 0
+    return READ_LOST if falcon.ended != RUNS else 0
 
 
 @kernel

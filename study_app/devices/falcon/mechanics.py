@@ -28,7 +28,7 @@ import numpy as np
 
 from study_app.devices.falcon.constants import COUNTS_PER_TURN, MOST_TORQUE
 from study_app.errors import DeviceError
-from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels import kernel
 from study_app.haptics.model.layout import records
 
 

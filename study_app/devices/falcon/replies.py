@@ -24,7 +24,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.devices.falcon import constants
-from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels import kernel
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 
 _NIBBLES = 4

@@ -17,9 +17,21 @@ from numba import types
 
 from study_app.devices.driver import COMMON, FIRST_CAUSE, closed_during_call, enter, leave
 from study_app.devices.force_dimension.library import FORCE, FORCE_OFF_CAUSE, STATUS_WORDS
-from study_app.haptics.kernels import c_functions
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import clear, copy, is_finite
+from study_app.haptics.kernels import (
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    WRITE_SATURATED,
+    call_at,
+    clear,
+    command_at,
+    copy,
+    device_functions,
+    is_finite,
+    kernel,
+    reading_at,
+    record_at,
+)
 from study_app.haptics.model import layout
 
 # The library's functions end with the device's id (``char ID``). It is passed as a whole word: a C function takes the
@@ -87,17 +99,9 @@ FUNCTIONS: Final = {
     "stop": "dhdStop",
 }
 
-_device_at = c_functions.record_at(_FORCE_DIMENSION)
-_call_vector, _call_fill, _call_buttons = (
-    c_functions.call_at(VECTOR),
-    c_functions.call_at(FILL),
-    c_functions.call_at(BUTTONS),
-)
-_call_push, _call_push_all, _call_stop = (
-    c_functions.call_at(PUSH),
-    c_functions.call_at(PUSH_ALL),
-    c_functions.call_at(STOP),
-)
+_device_at = record_at(_FORCE_DIMENSION)
+_call_vector, _call_fill, _call_buttons = (call_at(VECTOR), call_at(FILL), call_at(BUTTONS))
+_call_push, _call_push_all, _call_stop = (call_at(PUSH), call_at(PUSH_ALL), call_at(STOP))
 _fields = _FORCE_DIMENSION.fields
 assert _fields is not None  # noqa: S101 - it is a record
 _POSITION, _VELOCITY, _ROTATION, _GAP, _STATUS = (
@@ -115,14 +119,14 @@ def new_exchange(force_limit_n: float) -> Any:
 @cache
 def exchange_functions() -> tuple[Any, Any]:
     """Compile read and write, once for all devices."""
-    return c_functions.device_functions(_read, _write)
+    return device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     device = _device_at(context)
-    answer = c_functions.READ_LOST
+    answer = READ_LOST
     if enter(device):
-        answer = _take_sample(device, context, now_ns, c_functions.reading_at(reading))
+        answer = _take_sample(device, context, now_ns, reading_at(reading))
         if closed_during_call(device):
             finish(device, context)
         leave(device)
@@ -130,8 +134,8 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    device, asked = _device_at(context), c_functions.command_at(command)
-    answer = c_functions.READ_LOST
+    device, asked = _device_at(context), command_at(command)
+    answer = READ_LOST
     if enter(device):
         answer = _send_force(device, context, asked.force_n)
         if closed_during_call(device):
@@ -168,7 +172,7 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
         return _end(device, context, ERROR)
     if got == TIMEGUARD:
         device.guarded += 1
-        return c_functions.READ_NOTHING_NEW
+        return READ_NOTHING_NEW
     if not is_finite(device.position_m):
         return _end(device, context, BAD_NUMBER)
     device.fresh += 1
@@ -194,7 +198,7 @@ def _take_sample(device: Any, context: int, now_ns: int, out: Any) -> int:
     ):
         out.gripper_m = device.gap_m
         out.measured |= layout.MEASURED_GRIPPER
-    return c_functions.READ_NEW
+    return READ_NEW
 
 
 @kernel
@@ -249,7 +253,7 @@ def _send_force(device: Any, context: int, force_n: Any) -> int:
     device.sent_n[0], device.sent_n[1], device.sent_n[2] = x_n, y_n, z_n
     if got == MOTOR_SATURATED:
         device.saturated += 1
-        return c_functions.WRITE_SATURATED
+        return WRITE_SATURATED
     return 0
 
 
@@ -265,4 +269,4 @@ def _push(device: Any, x_n: float, y_n: float, z_n: float) -> Any:
 def _end(device: Any, context: int, why: int) -> int:
     finish(device, context)
     device.ended = why
-    return c_functions.READ_LOST
+    return READ_LOST

@@ -16,10 +16,20 @@ from numba import types
 
 from study_app.devices.driver import COMMON, FIRST_CAUSE, RUNS, closed_during_call, enter, leave
 from study_app.devices.inverse3 import wire
-from study_app.haptics.kernels import c_functions
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import clear, copy
-from study_app.haptics.kernels.vector import square as square_of
+from study_app.haptics.kernels import (
+    READ_LOST,
+    READ_NEW,
+    READ_NOTHING_NEW,
+    call_at,
+    clear,
+    command_at,
+    copy,
+    device_functions,
+    kernel,
+    reading_at,
+    record_at,
+)
+from study_app.haptics.kernels import square as square_of
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records
 
 _TRANSFER = types.intp(types.intp, types.intp, types.uintp, types.int32)
@@ -78,8 +88,8 @@ _INVERSE3 = np.dtype(
 
 COUNTERS: Final = ("ticks", "fresh", "missing", "late", "skipped", "unasked", "sent", "answered")
 
-_device_at = c_functions.record_at(_INVERSE3)
-_call = c_functions.call_at(_TRANSFER)
+_device_at = record_at(_INVERSE3)
+_call = call_at(_TRANSFER)
 _fields = _INVERSE3.fields
 assert _fields is not None  # noqa: S101 - it is a record
 _INBOX_AT, _OUTBOX_AT = int(_fields["inbox"][1]), int(_fields["outbox"][1])
@@ -103,14 +113,14 @@ def new_exchange(device_id: str, force_limit_n: float, seed: int) -> Any:
 @cache
 def exchange_functions() -> tuple[Any, Any]:
     """Compile read and write, once for all devices."""
-    return c_functions.device_functions(_read, _write)
+    return device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
     device = _device_at(context)
-    answer = c_functions.READ_LOST
+    answer = READ_LOST
     if enter(device):
-        answer = _take_replies(device, context, now_ns, c_functions.reading_at(reading))
+        answer = _take_replies(device, context, now_ns, reading_at(reading))
         if closed_during_call(device):
             finish(device, context)
         leave(device)
@@ -118,8 +128,8 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    device, asked = _device_at(context), c_functions.command_at(command)
-    answer = c_functions.READ_LOST
+    device, asked = _device_at(context), command_at(command)
+    answer = READ_LOST
     if enter(device):
         answer = _send_force(device, context, asked.force_n)
         if closed_during_call(device):
@@ -152,12 +162,12 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
             break  # no more replies are owed
     if device.answered == answered:
         device.missing += 1
-        return c_functions.READ_NOTHING_NEW
+        return READ_NOTHING_NEW
     row = (device.answered - 1) % _LOG
     device.age_ns = now_ns - device.sent_ns[row]
     if device.age_ns > _LONGEST_GAP_NS:
         device.late += 1
-        return c_functions.READ_NOTHING_NEW
+        return READ_NOTHING_NEW
     device.fresh += 1
     device.fresh_ns = now_ns
     value = device.scan.value
@@ -167,7 +177,7 @@ def _take_replies(device: Any, context: int, now_ns: int, out: Any) -> int:
         out.measured |= MEASURED_VELOCITY
     out.buttons = device.buttons
     out.delay_ticks = device.ticks - device.sent_tick[row]
-    return c_functions.READ_NEW
+    return READ_NEW
 
 
 @kernel
@@ -326,7 +336,7 @@ def _end(device: Any, context: int, why: int) -> int:
         finish(device, context)
     clear(device.sent_n)  # silence ends a force that could not be reset
     device.ended = why
-    return c_functions.READ_LOST
+    return READ_LOST
 
 
 @kernel

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels import kernel
 
 TEXT: Final = 0x1
 CLOSE: Final = 0x8

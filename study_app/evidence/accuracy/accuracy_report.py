@@ -349,7 +349,7 @@ def _values(row: Row) -> tuple[str | float, ...]:
     )
 
 
-def evidence(accuracy: Accuracy) -> Evidence:
+def accuracy_evidence(accuracy: Accuracy) -> Evidence:
     """Return the tables (Markdown with the source of each reference, and CSV) and the figure."""
     parts = [f"Machine: {accuracy.machine}.", f"Motion: {accuracy.motion}.", _WHAT]
     parts += [accuracy.plain_c] if accuracy.plain_c else []

@@ -13,13 +13,8 @@ import numpy as np
 
 from study_app.evidence.reference_model import unsteady_n
 from study_app.evidence.reference_solutions import COUNT_M, Truth, with_effects
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.effects.drag import resistance
-from study_app.haptics.kernels.effects.wake import REST_MPS, response
-from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick import tick
-from study_app.haptics.kernels.vector import norm, subtract
-from study_app.haptics.model.effects.drag import REFERENCE
+from study_app.haptics.kernels import REST_MPS, compute_tick, kernel, new_safety, norm, resistance, response, subtract
+from study_app.haptics.model.effects import REFERENCE
 from study_app.haptics.model.estimators import GIVEN
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
@@ -267,7 +262,7 @@ def _tick(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> No
     if model.parameters[0].estimator == GIVEN:
         for axis in range(3):
             state.estimate_mps[axis] = velocity_mps[k, axis]
-    tick(model, safety, sample)
+    compute_tick(model, safety, sample)
 
 
 @kernel

@@ -74,7 +74,9 @@ class Surveyed:
         return self.speed_mps / self.mps_per_reynolds
 
 
-def survey(scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None) -> tuple[Surveyed, ...]:
+def survey_scenes(
+    scenes: Mapping[str, Scene], progress: Callable[[str], None] = lambda _: None
+) -> tuple[Surveyed, ...]:
     """Measure every liquid of a file that has a viscosity, most viscous first."""
     surveyed = []
     for name, scene in scenes.items():
@@ -120,7 +122,7 @@ def _law_spread(reynolds: float) -> float:
     return (max(ratios) - min(ratios)) * len(ratios) / sum(ratios)
 
 
-def evidence(found: tuple[Surveyed, ...]) -> Evidence:
+def survey_evidence(found: tuple[Surveyed, ...]) -> Evidence:
     """Return tables of the liquids and of drag laws as a function of the Reynolds number, as Markdown."""
     highest = max(it.case.reynolds for it in (*load_tables(), *training(), *held_out()))
     liquids = []

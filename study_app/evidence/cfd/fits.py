@@ -22,8 +22,7 @@ from study_app.evidence.cfd.stored_flows import Table as SolvedTable
 from study_app.evidence.reference_solutions import PERCEPTIBLE_N, RELATIVE, measured_drag_n
 from study_app.evidence.table import Evidence, Table, plot_files
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
-from study_app.haptics.model.effects.local_wake import LocalWake
-from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.effects import LocalWake, Wake
 from study_app.haptics.model.laws import LAWS
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.overrides import override_all
@@ -358,7 +357,7 @@ def fits_csv(fits: Sequence[Fitted]) -> str:
     return Table(COLUMNS, rows).csv()
 
 
-def evidence(tables: Sequence[SolvedTable], drag: SolvedTable, fits: Sequence[Fitted]) -> Evidence:
+def fits_evidence(tables: Sequence[SolvedTable], drag: SolvedTable, fits: Sequence[Fitted]) -> Evidence:
     """Return the fits as CSV, both tables as Markdown, and the figure."""
     text = f"{_steady_markdown(drag)}\n\n{_fits_markdown(fits)}\n"
     files = {FITS_FILE: fits_csv(fits), "cfd.md": text}

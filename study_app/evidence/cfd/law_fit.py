@@ -86,7 +86,7 @@ class _Solved:
         return error_n
 
 
-def refit(
+def refit_law(
     tables: Sequence[SolvedTable],
     held_out: Sequence[SolvedTable] = (),
     progress: Callable[[str], None] = lambda _: None,
@@ -152,7 +152,7 @@ def _fit(solved: Sequence[_Solved], begin: Constants) -> Constants:
     return Constants._make(np.exp(solution.x).tolist())
 
 
-def evidence(found: Refit) -> Evidence:
+def law_fit_evidence(found: Refit) -> Evidence:
     """Return constants and errors as Markdown, and the constants fitted without each motion as CSV."""
     values = zip(Constants._fields, found.constants, CONSTANTS, strict=True)
     constants = [(name, f"{fitted:.3g}", f"{own:g}") for name, fitted, own in values]

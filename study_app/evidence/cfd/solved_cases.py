@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study_app.errors import StudyError
 from study_app.haptics.model.motion import Floats
 from study_app.protocol.load import load_scene
-from study_app.protocol.source.files import shipped_file
+from study_app.protocol.source import shipped_file
 
 RAMP: Final = 0.2
 STOP: Final = 10.0

@@ -146,7 +146,7 @@ def errors(columns: dict[str, Floats]) -> Floats:
     return found
 
 
-def evidence(columns: dict[str, Floats]) -> Evidence:
+def yield_flow_evidence(columns: dict[str, Floats]) -> Evidence:
     """Return the comparison as a table."""
     wrong = errors(columns)
     grid, smooth = (float(np.abs(columns[name] / columns["drag"] - 1).max()) for name in COLUMNS[3:])

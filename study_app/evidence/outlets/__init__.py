@@ -1,1 +1,14 @@
 """The evidence about outlets: what arrives in another process, and its cost to the servo."""
+
+from study_app.evidence.outlets.localhost import localhost_only
+from study_app.evidence.outlets.streams import compare_streams, measure_streams, streams_evidence
+from study_app.evidence.outlets.triggers import measure_triggers, triggers_evidence
+
+__all__ = [
+    "compare_streams",
+    "localhost_only",
+    "measure_streams",
+    "measure_triggers",
+    "streams_evidence",
+    "triggers_evidence",
+]

@@ -116,7 +116,7 @@ class Streamed:
         return self.samples_lost == self.markers_lost == 0 and self.intact and self.error_p99_ms <= _MOST_ERROR_MS
 
 
-def stream(
+def measure_streams(
     seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> Streamed:
     """Stream a servo at 1 kHz and twenty markers per second to a listener in another process."""
@@ -197,7 +197,7 @@ class Ratio:
         return "missed" if self.low > _MOST_RATIO else "undecided: measure for longer"
 
 
-def compare(
+def compare_streams(
     seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> tuple[Ratio, ...]:
     """Return the ratios of the median and the 99th percentile of the lateness, with and without outlets.
@@ -258,7 +258,7 @@ def _ratio_of(active: Sequence[NDArray[np.int64]], rest: Sequence[NDArray[np.int
     )
 
 
-def evidence(streams: Streamed, ratios: Sequence[Ratio]) -> Evidence:
+def streams_evidence(streams: Streamed, ratios: Sequence[Ratio]) -> Evidence:
     """Return the results as text."""
     p50_us, p50_ms, p99_ms = (
         float(np.percentile(values, share)) if len(values) else math.nan

@@ -74,7 +74,7 @@ class _VirtualPort:
         self._listener.__exit__()
 
 
-def measure(
+def measure_triggers(
     port: str, seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> TriggerDelays:
     """Send twenty events per second to the address of a port, or to a virtual one, and return their delays.
@@ -132,7 +132,7 @@ def _send(
     return sent, sink
 
 
-def evidence(delays: TriggerDelays) -> Evidence:
+def triggers_evidence(delays: TriggerDelays) -> Evidence:
     """Return the results as text."""
     lines = [
         f"{len(delays.written_us)} events, 20 per second, on {delays.port}",

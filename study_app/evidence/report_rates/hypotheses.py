@@ -23,10 +23,8 @@ from study_app.analysis.statistics.mean_tests import means_of, p_differs
 from study_app.analysis.statistics.outcome import Array, holm
 from study_app.analysis.statistics.recognition import recognition
 from study_app.analysis.statistics.trend import trend
-from study_app.protocol.trials.designs import ForcedChoice
-from study_app.protocol.trials.methods import UpDown
-from study_app.protocol.trials.stimuli import Stimulus
-from study_app.protocol.warnings.expected_precision import ThresholdPlan
+from study_app.protocol.trials import ForcedChoice, Stimulus, UpDown
+from study_app.protocol.warnings import ThresholdPlan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 
 _ALPHA: Final = 0.05

@@ -41,7 +41,7 @@ from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.thresholds import noticed
 from study_app.evidence.report_rates.hypotheses import false_claims, true_claims
 from study_app.evidence.table import Evidence, Table
-from study_app.protocol.raters import REHEARSED
+from study_app.protocol.participants import REHEARSED
 
 Generator: TypeAlias = Literal["answer model", "ordinal probit"]
 _Extent: TypeAlias = Literal["empty", "own trends", "partial", "full"]
@@ -227,7 +227,7 @@ class Rate:
         return "yes" if low >= least and high <= most else "too few studies"
 
 
-def evidence(rates: Sequence[Rate], heading: str) -> Evidence:
+def report_rates_evidence(rates: Sequence[Rate], heading: str) -> Evidence:
     """Return the rates with their Wilson intervals and whether their limits are met, as Markdown and as CSV."""
     rows = []
     for rate in sorted(rates, key=lambda rate: (rate.cell, rate.what, rate.participants)):
@@ -568,7 +568,7 @@ def cells(sizes: Sequence[int] = _SIZES) -> tuple[Cell, ...]:
     return (*every, *looked)
 
 
-def validate(
+def measure_report_rates(
     simulation: Plan,
     studies: int,
     executor: Executor,

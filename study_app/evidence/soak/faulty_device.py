@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.kernels.c_functions import (
+from study_app.haptics.kernels import (
     READ,
     READ_LOST,
     READ_NOTHING_NEW,
@@ -19,11 +19,12 @@ from study_app.haptics.kernels.c_functions import (
     Driver,
     c_function,
     call_at,
+    copy,
+    kernel,
+    norm,
+    random,
     record_at,
 )
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import random
-from study_app.haptics.kernels.vector import copy, norm
 from study_app.haptics.model.layout import BUTTON_STOP, COMMAND, READING, records
 from study_app.haptics.runtime.clocks.clock import VIRTUAL, Clock
 

@@ -11,9 +11,8 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.evidence.reference_model import new_wake_list, store_element, sum_elements
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.vector import copy, square, square_distance
-from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.kernels import copy, kernel, square, square_distance
+from study_app.haptics.model.effects import Wake
 from study_app.haptics.model.force_rules import CURRENT
 from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
 from study_app.haptics.model.scene import Everywhere, Liquid, Scene

@@ -11,9 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.evidence.soak.faulty_device import GLITCH_M
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.passivity import DELIVERY_STEPS_PER_N
-from study_app.haptics.kernels.sample_validation import FAULT_NS
+from study_app.haptics.kernels import DELIVERY_STEPS_PER_N, FAULT_NS, kernel
 from study_app.haptics.model.layout import (
     BUTTON_STOP,
     LIMITER_ENERGY,

@@ -376,7 +376,7 @@ def _size(vector: Floats) -> float:
     return float(np.nan_to_num(np.linalg.norm(vector), nan=np.inf))
 
 
-def soak(
+def soak_servo(
     scenes: Mapping[str, Scene],
     hours: float,
     *,

@@ -20,9 +20,7 @@ from study_app.evidence.stability.stability_cases import (
     Case,
     scene_of,
 )
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.plant import new_handle, new_schedule
-from study_app.haptics.kernels.safety import new_safety
+from study_app.haptics.kernels import kernel, new_handle, new_safety, new_schedule
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
 from study_app.haptics.model.layout import SAMPLE, records

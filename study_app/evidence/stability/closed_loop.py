@@ -26,15 +26,30 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.estimators import take_force
-from study_app.haptics.kernels.loop import follow_delay
-from study_app.haptics.kernels.passivity import log_acted, log_command, update_observer
-from study_app.haptics.kernels.plant import measure, move, next_tick, push, random
-from study_app.haptics.kernels.safety import delay_force
-from study_app.haptics.kernels.sample_validation import accept_sample, watchdog
-from study_app.haptics.kernels.tick import step_model, tick, write_sample
-from study_app.haptics.kernels.vector import clear, copy, distance, is_finite, norm
+from study_app.haptics.kernels import (
+    accept_sample,
+    clear,
+    compute_tick,
+    copy,
+    delay_force,
+    distance,
+    follow_delay,
+    is_finite,
+    kernel,
+    log_acted,
+    log_command,
+    measure,
+    move,
+    next_tick,
+    norm,
+    push,
+    random,
+    step_model,
+    take_force,
+    update_observer,
+    watchdog,
+    write_sample,
+)
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records
 
@@ -505,7 +520,7 @@ def _read(sample: Any, handle: Any, pace: Any, loop: Any) -> None:
 def _answer(model: Any, safety: Any, sample: Any, loop: Any) -> None:
     """Run a tick; without safety the force of the effects is sent unchanged."""
     if loop.safe:
-        tick(model, safety, sample)
+        compute_tick(model, safety, sample)
         return
     sample.limiters = 0
     interval_s = accept_sample(model.parameters[0], model.state[0], safety, sample)

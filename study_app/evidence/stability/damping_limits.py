@@ -12,7 +12,7 @@ from study_app.evidence.stability.bench import Bench
 from study_app.evidence.stability.closed_loop import TRACE
 from study_app.evidence.stability.stability_cases import STROKE, THROWN, Case
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
-from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects import Drag
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.layout import records
 from study_app.haptics.model.scene import Body, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity

@@ -118,7 +118,7 @@ def _shipped_liquids() -> tuple[str, ...]:
     return tuple(liquids.values())
 
 
-def measure(*, whole: bool = False, executor: Executor | None = None) -> tuple[Delivered, ...]:
+def measure_delivered_force(*, whole: bool = False, executor: Executor | None = None) -> tuple[Delivered, ...]:
     """Return the acting force of the liquids with limits, with one hand or handle changed at a time.
 
     With ``whole``, also with every hand and handle, and of all other shipped liquids with both estimators.
@@ -276,7 +276,7 @@ def _least_error(trace: Any, law_n: Floats, delay: int) -> float:
     return 100 * math.sqrt(float(np.sum(off_n**2) / np.sum(law_n[rows] ** 2)))
 
 
-def evidence(found: Sequence[Delivered]) -> Evidence:
+def delivered_force_evidence(found: Sequence[Delivered]) -> Evidence:
     """Return the table, with the limits, and whether each limit is met."""
     exceeded = sum(bool(row.exceeded) for row in found)
     text = "\n".join((*_lines(found), f"{exceeded} of {len(found)} rows exceed a limit")) + "\n"

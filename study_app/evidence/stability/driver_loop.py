@@ -37,11 +37,18 @@ from study_app.evidence.stability.verdict import (
     windows,
     worst_of,
 )
-from study_app.haptics.kernels.c_functions import Driver
-from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.kernels.loop import CONTROL, ClockCalls, DeviceCalls, Output, Records, run
-from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.vector import copy
+from study_app.haptics.kernels import (
+    CONTROL,
+    ClockCalls,
+    DeviceCalls,
+    Driver,
+    Output,
+    Records,
+    copy,
+    kernel,
+    new_safety,
+    run,
+)
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.layout import new_command, new_reading, records
 from study_app.haptics.runtime.clocks.clock import VirtualClock

@@ -19,7 +19,7 @@ from study_app.evidence.reference_solutions import without_buoyancy
 from study_app.evidence.stability.bench import Bench, sine_path
 from study_app.evidence.stability.stability_cases import Case, scene_of, scenes
 from study_app.evidence.table import Evidence, Table, run
-from study_app.protocol.warnings.delayed_force import Entry
+from study_app.protocol.warnings import Entry
 
 LIQUIDS: Final = (
     "water",
@@ -37,7 +37,7 @@ _LASTS_S: Final = 6.0
 _SETTLED_S: Final = 1.0
 
 
-def measure(
+def measure_force_delays(
     liquids: Iterable[str] = LIQUIDS,
     estimators: Iterable[str] = _ESTIMATORS,
     hands: Iterable[str] = _HANDS,
@@ -48,7 +48,7 @@ def measure(
     return run(_entry, itertools.product(liquids, estimators, hands, delays_ms), None, progress)
 
 
-def evidence(entries: Sequence[Entry], file: str) -> Evidence:
+def force_delay_evidence(entries: Sequence[Entry], file: str) -> Evidence:
     """Return the remaining share [%] as a table, and the file that ``protocol.warnings.delayed_force`` reads.
 
     The table has one line per liquid, estimator and hand, and one column per delay.

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any, Final
 
 from study_app.errors import StudyError
-from study_app.haptics.model.effects.drag import DAMPING_NSPM, Drag
+from study_app.haptics.model.effects import DAMPING_NSPM, Drag
 from study_app.haptics.model.estimators import ESTIMATORS as KINDS
 from study_app.haptics.model.estimators import MOST_LAG_TICKS
 from study_app.haptics.model.scene import (
@@ -21,7 +21,7 @@ from study_app.haptics.model.scene import (
     too_long_delay,
 )
 from study_app.protocol.load import load
-from study_app.protocol.source.files import shipped, shipped_file
+from study_app.protocol.source import shipped, shipped_file
 
 REACHES: Final = "reaches"
 CIRCLES: Final = "circles"
@@ -186,7 +186,7 @@ class Case:
         return " ".join(f"{name}={_word(getattr(self, name))}" for name in names)
 
 
-def parse(line: str) -> Case:
+def parse_case(line: str) -> Case:
     """Return the case described by a line of ``name=value`` words; omitted values have their defaults.
 
     Raises

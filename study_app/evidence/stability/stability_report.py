@@ -311,7 +311,7 @@ def _judge(case: Case, safe: bool) -> Verdict:
     return judge_driven(case) if case.plant == FALCON else judge(case, safe=safe)
 
 
-def in_words(verdict: Verdict) -> str:
+def verdict_text(verdict: Verdict) -> str:
     """Return a verdict as a sentence."""
     said = f"safety {'on' if verdict.safe else 'off'}: "
     said += f"{verdict.grade} ({', '.join(verdict.reasons)})" if verdict.reasons else verdict.grade
@@ -394,7 +394,7 @@ def _fidelity(fidelities: Sequence[Fidelity]) -> Iterator[str]:
         yield f"  {liquid:20}" + "".join(f"{cell:>16}" for cell in cells)
 
 
-def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidence:
+def stability_evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidence:
     """Return a summary (or a table of groups), the cases as CSV, the unstable ones as text, and the map."""
     text = f"seed {seed}\n\n{summary(swept, fidelities) if swept.on else group_table(swept)}"
     lines = ("# When the simulation is stable", "", "```", text, "```", "", "![Map](map.png)", "")
@@ -408,7 +408,7 @@ def evidence(swept: Swept, fidelities: Sequence[Fidelity], seed: str) -> Evidenc
     return Evidence(f"{text}\n", files, figures, missed=swept.missed)
 
 
-def limits(executor: Executor, progress: Callable[[int, int], object], file: str) -> Evidence:
+def slope_limits_evidence(executor: Executor, progress: Callable[[int, int], object], file: str) -> Evidence:
     """Measure the table of limits that `haptics.model.slope_limits` reads, by an executor.
 
     The rows of "line", for velocities that a device measures, are copied from the shipped table.

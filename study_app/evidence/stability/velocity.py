@@ -29,7 +29,7 @@ from study_app.evidence.stability.damping_limits import boundary_nspm
 from study_app.evidence.stability.stability_cases import Case, scenes
 from study_app.evidence.table import Evidence
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.effects.drag import Drag
+from study_app.haptics.model.effects import Drag
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
 from study_app.haptics.model.slope_limits import slope_limit
@@ -289,7 +289,7 @@ class Row(NamedTuple):
         return self.values[0] >= self.goal if self.least else self.values[0] <= self.goal
 
 
-def measure(progress: _Progress) -> tuple[Row, ...]:
+def measure_velocities(progress: _Progress) -> tuple[Row, ...]:
     """Measure all rows; ``progress`` is called with the name of each part before it is measured."""
     rows: list[Row] = []
     for name, part in PARTS.items():
@@ -298,7 +298,7 @@ def measure(progress: _Progress) -> tuple[Row, ...]:
     return tuple(rows)
 
 
-def evidence(rows: Sequence[Row]) -> Evidence:
+def velocity_evidence(rows: Sequence[Row]) -> Evidence:
     """Return the rows as a table."""
     text = "\n".join(_lines(rows)) + "\n"
     return Evidence(text, {"velocity.txt": text}, missed=not all(row.met for row in rows))

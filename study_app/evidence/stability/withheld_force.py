@@ -94,7 +94,7 @@ class Withheld(NamedTuple):
         return self.liquid in _EXEMPT or (self.quick <= self.most and self.lasting < MOST_AFTER)
 
 
-def measure(
+def measure_withheld_force(
     names: Sequence[str] | None = None,
     estimators: Sequence[str] = _ESTIMATORS,
     *,
@@ -119,7 +119,7 @@ def measure(
     return run(_measured, planned, executor)
 
 
-def evidence(found: Sequence[Withheld]) -> Evidence:
+def withheld_force_evidence(found: Sequence[Withheld]) -> Evidence:
     """Return the table of shares in percent, and whether each limit is met."""
     text = "\n".join(_lines(found)) + "\n"
     return Evidence(text, {"withheld.txt": text}, missed=not all(withheld.met for withheld in found))

@@ -36,10 +36,10 @@ from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
+from study_app.protocol.orders import condition_of, design_of, method_of, standards_of, stimulus_of
+from study_app.protocol.randomization import Draw, stream
 from study_app.protocol.simulated import OBSERVER, Observer, as_requested, simulate_study
-from study_app.protocol.streams import Draw, stream
-from study_app.protocol.tracks import condition_of, design_of, method_of, standards_of, stimulus_of
-from study_app.protocol.trials.stimuli import DELAYS, SESSION_SD
+from study_app.protocol.trials import DELAYS, SESSION_SD
 from study_app.psychophysics.people import (
     BETWEEN_PEOPLE,
     ESTIMATE_NOISE,
@@ -572,7 +572,7 @@ def rehearsed_measures(known: Known, found: Rehearsed, spread: float) -> Iterato
     yield known.recovered(found.values, spread)
 
 
-def validate(
+def validate_known_values(
     known: Sequence[tuple[bytes, Known]],
     studies: int,
     seeds: Sequence[int],
@@ -621,7 +621,7 @@ def validate(
     return verdicts_on(measures)
 
 
-def evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:
+def known_values_evidence(verdicts: Sequence[Verdict], heading: str) -> Evidence:
     """Return one row per value with its limit, as Markdown below a heading and as CSV."""
     table = Table(Verdict._fields, [(*it[:-1], "yes" if it.holds else "no") for it in verdicts], left=5)
     csv = Table(Verdict._fields, [(*it[:-1], str(it.holds).lower()) for it in verdicts]).csv()

@@ -20,9 +20,9 @@ from study_app.analysis.statistics.thresholds import Threshold, noticed
 from study_app.evidence.table import Evidence, Table
 from study_app.evidence.thresholds.known_values import KnownThreshold, known_value
 from study_app.protocol.load import load
+from study_app.protocol.randomization import Draw, stream
 from study_app.protocol.simulated import NO_FEATURES, Observer, Rater, rate, rater
-from study_app.protocol.streams import Draw, stream
-from study_app.protocol.trials.stimuli import LINEAR_WIDTH
+from study_app.protocol.trials import LINEAR_WIDTH
 from study_app.psychophysics.families import success
 from study_app.psychophysics.people import normal
 
@@ -94,7 +94,7 @@ def people_of(count: int, seed: int) -> tuple[Person, ...]:
     return tuple(found)
 
 
-def compare(count: int, seed: int) -> Compared:
+def compare_delays(count: int, seed: int) -> Compared:
     """Return the delays that ``count`` participants (at least three) detect, and those that they rate as noticed."""
     people = people_of(count, seed)
     both = [(criterion_s, 0.0) for criterion_s in CRITERIA_S] + [(MEAN_CRITERION_S, _ADAPTED_S)]
@@ -182,7 +182,7 @@ _CAPTION: Final = (
 )
 
 
-def evidence(comparison: Compared) -> Evidence:
+def noticed_delays_evidence(comparison: Compared) -> Evidence:
     """Return both thresholds as a table, and the figure (PNG, SVG, PDF) with its caption."""
     middle, low, high = comparison.detected_ms
     rows = [(f"{FORCED_CHOICE}: forced choice, 75 % correct", "–", f"{middle:.0f} ms", f"{low:.0f} to {high:.0f} ms")]

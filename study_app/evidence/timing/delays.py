@@ -232,7 +232,7 @@ _HEADINGS: Final = (
 )  # fmt: skip
 
 
-def evidence(delays: Delayed) -> Evidence:
+def delays_evidence(delays: Delayed) -> Evidence:
     """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
     width, height = delays.size_px
     head = (

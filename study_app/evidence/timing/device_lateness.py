@@ -115,7 +115,7 @@ def _ratio(own: list[NDArray[np.int64]], reference: list[NDArray[np.int64]], rou
     return late / early
 
 
-def evidence(found: Sequence[DeviceLateness]) -> Evidence:
+def lateness_evidence(found: Sequence[DeviceLateness]) -> Evidence:
     """Return the table as text."""
     lines = [f"{'device':<28}{'ticks':>8}{'p50 us':>9}{'p99 us':>9}   p99 : {_REFERENCE} (95 % interval)"]
     for lateness in found:

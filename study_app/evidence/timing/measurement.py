@@ -17,12 +17,9 @@ from numpy.typing import NDArray
 from study_app.evidence.computer import LoadName, Windows, machine, under_load
 from study_app.evidence.cost import hand_motion
 from study_app.evidence.table import TURN_S, check_seconds, take_turns
-from study_app.haptics.kernels.c_functions import READ, READ_NEW, SLEEP, WRITE, Driver, c_function, call_at, record_at
-from study_app.haptics.kernels.compiled import kernel
+from study_app.haptics.kernels import READ, READ_NEW, SLEEP, WRITE, Driver, c_function, call_at, kernel, record_at
 from study_app.haptics.model.device_dynamics import UNKNOWN
-from study_app.haptics.model.effects.current import Vortex
-from study_app.haptics.model.effects.drag import Drag
-from study_app.haptics.model.effects.wake import Wake
+from study_app.haptics.model.effects import Drag, Vortex, Wake
 from study_app.haptics.model.layout import READING, records
 from study_app.haptics.model.scene import Cylinder, Liquid, Scene
 from study_app.haptics.runtime.clocks.clock import Clock, SystemClock, VirtualClock, raise_priority
@@ -442,7 +439,7 @@ def _run_loop(loop: Loop, ticks: int, _round: int) -> Ticks:
     return loop.run(ticks)
 
 
-def timing(
+def measure_timing(
     seconds: float,
     load: LoadName,
     windows: Windows | None,

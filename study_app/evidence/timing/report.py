@@ -153,7 +153,7 @@ _HEADINGS: Final = (
 )  # fmt: skip
 
 
-def evidence(timing: Timed) -> Evidence:
+def timing_evidence(timing: Timed) -> Evidence:
     """Return the report for a terminal, as Markdown between comments for docs/timing.md, as CSV, and the figure."""
     head = (
         f"{timing.seconds:g} s of each loop at 1 kHz, alternating every quarter of a second; "

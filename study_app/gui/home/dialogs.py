@@ -25,12 +25,12 @@ from study_app.gui.widgets.boxes import STRETCH, grid, hbox, vbox
 from study_app.gui.widgets.cards import Icon, Rule, scrolled
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label, set_ink
-from study_app.protocol.groups import check_session_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.source.files import source_bytes
-from study_app.protocol.warnings.untranslated import check_translated
-from study_app.protocol.wording.languages import LANGUAGES, language_name
+from study_app.protocol.participants import check_session_number
+from study_app.protocol.source import source_bytes
+from study_app.protocol.warnings import check_translated
+from study_app.protocol.wording import LANGUAGES, language_name
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
 from study_app.session.start import MAX_SEED, NewSession, check_row, draw_seed, study_results
 from study_app.store.blinded.allocation import Claim, check_choice, claims

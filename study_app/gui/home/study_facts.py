@@ -23,15 +23,9 @@ from study_app.gui.sessions.session_facts import (
 from study_app.number_text import counted
 from study_app.protocol.load import is_scene_file, load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.source.files import (
-    known_protocols,
-    protocol_file,
-    shipped,
-    shipped_file,
-    without_byte_order_mark,
-)
-from study_app.protocol.wording.languages import language_name
+from study_app.protocol.orders import Schedule, Trial
+from study_app.protocol.source import known_protocols, protocol_file, shipped, shipped_file, without_byte_order_mark
+from study_app.protocol.wording import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
 from study_app.store.blinded.allocation import session_protocol

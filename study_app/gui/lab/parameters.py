@@ -16,7 +16,7 @@ from study_app.gui.widgets.cards import Card, Icon, MaskedPanel, Rule, scrolled,
 from study_app.gui.widgets.controls import ActionButton, Cap, Choice, CompactStop, IconButton, Toggle
 from study_app.gui.widgets.labels import Clamped, label, set_property
 from study_app.gui.widgets.numbers import NumberField, Range, Slider, read_number, write_number
-from study_app.haptics.model.effect import Parameter, Value
+from study_app.haptics.model.effects import Parameter, Value
 from study_app.lab.ab_comparison import Setting, Side, other_side
 from study_app.lab.parameters import OFF, ON, Section, sections
 from study_app.number_text import readings_of, unclear_number

@@ -15,9 +15,8 @@ from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, forc
 from study_app.gui.sessions.session_facts import broken_limit_text, operator_language, step_title
 from study_app.number_text import grouped, minutes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import FormStep, Schedule, Step, Trial
-from study_app.protocol.tracks import design_of
-from study_app.protocol.wording.languages import words
+from study_app.protocol.orders import FormStep, Schedule, Step, Trial, design_of
+from study_app.protocol.wording import words
 from study_app.store.columns import SEALED
 from study_app.store.delivered import Broken
 from study_app.store.journals.journal_events import Note

@@ -45,7 +45,7 @@ from study_app.gui.participant.tank.layers import (
 )
 from study_app.gui.theme.theme import TANK
 from study_app.gui.widgets.accessible import announce
-from study_app.protocol.wording.languages import Words
+from study_app.protocol.wording import Words
 from study_app.session.pages import TaskPage
 from study_app.session.tasks import TankView, new_tracker
 

@@ -35,7 +35,7 @@ from study_app.gui.participant.tank_widget import TankWidget, paint_ahead
 from study_app.gui.theme.theme import PARTICIPANT, font, load_fonts, stylesheet
 from study_app.gui.widgets.accessible import give_role
 from study_app.gui.widgets.main_view import EscapeKey
-from study_app.protocol.wording.languages import Words, words
+from study_app.protocol.wording import Words, words
 from study_app.session.pages import (
     ChoicePage,
     DesignPage,

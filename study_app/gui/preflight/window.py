@@ -23,10 +23,9 @@ from study_app.gui.widgets.cards import Bar, Card, Chip, Rule, scrolled, smooth_
 from study_app.gui.widgets.controls import ActionButton, Choice, Number
 from study_app.gui.widgets.labels import Ink, figures, label
 from study_app.gui.widgets.live_plots import LatenessPlot, lateness_histogram
-from study_app.protocol.describe import number_range
+from study_app.protocol.descriptions import number_range
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.schedule import Schedule, Trial
+from study_app.protocol.orders import Schedule, Trial, orders_of
 from study_app.session.preflight import (
     LOUDEST_DB,
     MEANS,

@@ -38,7 +38,7 @@ from study_app.gui.widgets.cards import Bar, Card, Chip
 from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 from study_app.store.atomic import write_file
 from study_app.store.exclusions import Exclusion
 

@@ -66,7 +66,7 @@ from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
 from study_app.gui.widgets.labels import label
 from study_app.gui.widgets.main_view import Place
 from study_app.number_text import counted
-from study_app.protocol.groups import EACH_GROUP
+from study_app.protocol.participants import EACH_GROUP
 from study_app.store.exclusions import Exclusion
 from study_app.store.folders import StudyFolder
 from study_app.store.merged import FOLDER, folders_of

@@ -10,11 +10,9 @@ from typing import Any, Literal, NamedTuple, TypeAlias
 from study_app.errors import StoreError
 from study_app.gui.theme.theme import Tone
 from study_app.number_text import counted, duration_range
-from study_app.protocol.describe import number_range
+from study_app.protocol.descriptions import number_range
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import expected_duration_s, variants
-from study_app.protocol.orders.schedule import FormStep, PageStep
+from study_app.protocol.orders import FormStep, PageStep, expected_duration_s, orders_of, variants
 from study_app.store import receipt
 from study_app.store.columns import TRIALS_MISSING
 from study_app.store.exclusions import Exclusion, exclusions

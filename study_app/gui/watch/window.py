@@ -32,7 +32,7 @@ from study_app.gui.widgets.controls import ActionButton, Choice, Toggle
 from study_app.gui.widgets.labels import Elided, figures, label
 from study_app.gui.widgets.live_plots import STROKE, Floats, Plot, draw_quickly, tick_step, tick_text
 from study_app.gui.widgets.numbers import MARGIN, Range, Slider
-from study_app.protocol.wording.languages import words_or_english
+from study_app.protocol.wording import words_or_english
 from study_app.session.tasks import TankView
 from study_app.session.watch import Kind, Watched, read_watched
 from study_app.store.atomic import write_file

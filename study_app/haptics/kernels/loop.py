@@ -15,7 +15,7 @@ from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.kernels.passivity import log_delivery, log_saturation
 from study_app.haptics.kernels.safety import begin_scene
 from study_app.haptics.kernels.sample_validation import FAULT_NS
-from study_app.haptics.kernels.tick import tick
+from study_app.haptics.kernels.tick import compute_tick
 from study_app.haptics.model import layout
 from study_app.haptics.model.device_dynamics import MOST_DELAY
 
@@ -135,9 +135,9 @@ def run(control: Any, slots: Any, safety: Any, exchanged: Any, output: Any, devi
         if sample.status == layout.STATUS_OK:
             safety[0].stop = 1 if host.hung != 0 else host.stop  # recorded in the sample, so that a replay repeats it
             if host.taken % 2 == 0:
-                tick(first, safety[0], sample)
+                compute_tick(first, safety[0], sample)
             else:
-                tick(second, safety[0], sample)
+                compute_tick(second, safety[0], sample)
         if _send(sample, safety[0], exchanged.command, device, clock, began_ns) == c_functions.READ_LOST:
             sample.status = layout.STATUS_DEVICE_LOST
         ended_ns = began_ns + sample.busy_ns

@@ -29,7 +29,7 @@ from study_app.haptics.model.layout import GROWS_AS_SQUARE, LIMITER_ESTIMATOR, S
 
 
 @kernel
-def tick(model: Any, safety: Record, sample: Record) -> None:
+def compute_tick(model: Any, safety: Record, sample: Record) -> None:
     """Process one reading and compute the force to send.
 
     The caller fills ``sample.time_ns``, ``position_m`` (hand frame) and ``fresh``; velocity, wake, forces, limiters and

@@ -24,7 +24,7 @@ from study_app.haptics.kernels.estimators import take_force
 from study_app.haptics.kernels.passivity import log_acted, log_delivery, log_saturation
 from study_app.haptics.kernels.safety import begin_scene, guard, new_safety
 from study_app.haptics.kernels.sample_validation import clamp, place
-from study_app.haptics.kernels.tick import step_model, tick, write_sample
+from study_app.haptics.kernels.tick import compute_tick, step_model, write_sample
 from study_app.haptics.kernels.vector import copy, distance, square
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.effects import local_wake, wake
@@ -242,7 +242,7 @@ def take_sample(model: Any, safety: Record, sample: Record, delivered: bool) -> 
     saturated = sample.limiters & LIMITER_SATURATED
     safety.stop = 1 if sample.limiters & LIMITER_STOP else 0
     safety.delay_ticks = sample.delay_ticks
-    tick(model, safety, sample)
+    compute_tick(model, safety, sample)
     if not delivered:
         log_acted(safety.passivity, (sent_x, sent_y, sent_z))
     elif not as_asked:

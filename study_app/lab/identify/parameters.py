@@ -10,8 +10,7 @@ from typing import Any, Final
 from pydantic import BaseModel, ValidationError
 
 from study_app.errors import StudyError
-from study_app.haptics.model.effect import Effect
-from study_app.haptics.model.effects import EFFECTS
+from study_app.haptics.model.effects import EFFECTS, Effect
 from study_app.haptics.model.scene import Liquid, Scene
 
 _THRESHOLDS: Final = tuple(name for effect in EFFECTS for name in effect.thresholds)

@@ -10,7 +10,7 @@ from study_app.lab.identify.estimates import CONFIDENCE, Estimates
 from study_app.lab.identify.fit import CurveFit, Fit
 from study_app.lab.identify.measured_force import FLOW_CURVE
 from study_app.lab.identify.parameters import Parameter
-from study_app.protocol.scene_file import scene_text, with_default_estimator
+from study_app.protocol.file_format import scene_text, with_default_estimator
 from study_app.store.atomic import make_folder
 from study_app.store.csv_files import csv_text_of
 from study_app.store.output_files import write_files

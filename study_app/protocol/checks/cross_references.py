@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from study_app.protocol.groups import ASSIGNMENT, SEQUENCES, sequences_in
+from study_app.protocol.participants.groups import ASSIGNMENT, SEQUENCES, sequences_in
 from study_app.protocol.questions import POINTS, Context, Question, Scale, ShowIf, Statement, question_of
 from study_app.protocol.source.document import Path, entries, names, value_at
 from study_app.protocol.source.problems import Fault, did_you_mean, unknown_name

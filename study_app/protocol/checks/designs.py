@@ -12,15 +12,9 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
-from study_app.protocol.groups import follows
 from study_app.protocol.model import Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.presented.presentation import scene_of
-from study_app.protocol.quantities import can_vary
-from study_app.protocol.source.document import Path, entries, names
-from study_app.protocol.source.problems import Fault, unknown_name
-from study_app.protocol.table import Table
-from study_app.protocol.tracks import (
+from study_app.protocol.orders.tracks import (
     condition_of,
     design_of,
     has_correct_answer,
@@ -31,8 +25,14 @@ from study_app.protocol.tracks import (
     stimulus_of,
     tracks_of,
 )
-from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
-from study_app.protocol.trials.methods import KINDS as METHOD_KINDS
+from study_app.protocol.participants.groups import follows
+from study_app.protocol.presented.presentation import scene_of
+from study_app.protocol.quantities import can_vary
+from study_app.protocol.source.document import Path, entries, names
+from study_app.protocol.source.problems import Fault, unknown_name
+from study_app.protocol.source.table import Table
+from study_app.protocol.trials.designs import DESIGN_KINDS
+from study_app.protocol.trials.methods import METHOD_KINDS
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus, rises
 
 _LEAST_MS: Final = 1e-3

@@ -22,6 +22,7 @@ from study_app.haptics.model.slope_limits import slope_limit, steady_force
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol, Reach
+from study_app.protocol.orders.tracks import condition_of, standards_of, stimulus_of
 from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.presented.presented_levels import (
     FASTER,
@@ -35,7 +36,6 @@ from study_app.protocol.presented.presented_levels import (
 )
 from study_app.protocol.source.document import Path
 from study_app.protocol.source.problems import Fault
-from study_app.protocol.tracks import condition_of, standards_of, stimulus_of
 from study_app.protocol.trials.stimuli import OF_LINK, Stimulated, Stimulus
 from study_app.protocol.trials.tasks import Stroke
 

@@ -14,13 +14,19 @@ from itertools import count, pairwise
 from typing import TypeAlias
 
 from study_app.errors import StudyError
-from study_app.protocol.groups import next_group
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import CodeOrder, Orders, orders_of
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.schedule import blocks_in_order, codes_of
-from study_app.protocol.sequences import enrolment_number, has_even_borders, longest_run, row_count, shortest_distance
-from study_app.protocol.streams import draw_secret, group_of, stream
+from study_app.protocol.participants.groups import next_group
+from study_app.protocol.randomization.sequences import (
+    enrolment_number,
+    has_even_borders,
+    longest_run,
+    row_count,
+    shortest_distance,
+)
+from study_app.protocol.randomization.streams import draw_secret, group_of, stream
 
 _Table: TypeAlias = tuple[tuple[int, ...], ...]
 

@@ -7,9 +7,9 @@ from typing import Any, Literal, TypeAlias
 from pydantic import BaseModel, ConfigDict
 
 from study_app.protocol.blocks import Block, Order, OrderOfBlocks, Phase
-from study_app.protocol.groups import Group, every_step, follows, session_steps
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.tracks import method_of, tracks_of
+from study_app.protocol.orders.tracks import method_of, tracks_of
+from study_app.protocol.participants.groups import Group, every_step, follows, session_steps
 from study_app.protocol.trials.methods import TrackOrder
 
 CodeOrder: TypeAlias = Literal[Order, TrackOrder]

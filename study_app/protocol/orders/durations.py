@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from study_app.protocol.groups import parts_by_block, session_count, sessions_differ, steps_of
 from study_app.protocol.model import Block, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.tracks import design_of, method_of
+from study_app.protocol.orders.tracks import design_of, method_of
+from study_app.protocol.participants.groups import parts_by_block, session_count, sessions_differ, steps_of
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.tasks import AnyTask
 

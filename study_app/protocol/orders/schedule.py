@@ -33,9 +33,9 @@ from typing import TypeAlias
 from study_app.protocol.blocks import Phase
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import BlockOrder, FormOrder, Orders, block_codes, orders_of
-from study_app.protocol.sequences import Constraint, assigned_row, draw_order, row, row_count
-from study_app.protocol.streams import Draw, shuffle, stream
-from study_app.protocol.tracks import tracks_of
+from study_app.protocol.orders.tracks import tracks_of
+from study_app.protocol.randomization.sequences import Constraint, assigned_row, draw_order, row, row_count
+from study_app.protocol.randomization.streams import Draw, shuffle, stream
 
 __all__ = [
     "FormStep",

@@ -11,8 +11,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Condition, Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.streams import Draw, Key, secret_stream, shuffle, stream
-from study_app.protocol.tracks import (
+from study_app.protocol.orders.tracks import (
     Track,
     condition_of,
     design_of,
@@ -22,6 +21,7 @@ from study_app.protocol.tracks import (
     stimulus_of,
     track_of,
 )
+from study_app.protocol.randomization.streams import Draw, Key, secret_stream, shuffle, stream
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.methods import TrackSetting, TrialResult
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated

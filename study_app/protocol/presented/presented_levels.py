@@ -17,7 +17,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.tracks import condition_of, method_of, standards_of, stimulus_of
+from study_app.protocol.orders.tracks import condition_of, method_of, standards_of, stimulus_of
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus
 from study_app.psychophysics.families import Floats
 

@@ -1,7 +1,7 @@
 """Designs of a trial: its intervals, their arrangements, the answers, and which answer is correct.
 
-A kind is a subclass of `Design` whose ``kind`` is a ``Literal`` with a default, in `KINDS`. The study file's key, the
-page, the tables, d′, the report and simulated observers follow from its values and methods.
+A kind is a subclass of `Design` whose ``kind`` is a ``Literal`` with a default, in `DESIGN_KINDS`. The study file's
+key, the page, the tables, d′, the report and simulated observers follow from its values and methods.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pydantic import Field
 from study_app.haptics.model.ranges import within
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import POSITIVE, Choice, Number, Option, Question, Rating
-from study_app.protocol.table import Id, Localised, Table
+from study_app.protocol.source.table import Id, Localised, Table
 from study_app.protocol.wording.languages import words_or_english
 from study_app.psychophysics import detection
 from study_app.psychophysics.detection import Sensitivity
@@ -340,7 +340,7 @@ class Adjusted(_JudgementDesign):
         return self.kind if self.standard else "adjustment_alone"
 
 
-KINDS: Final[dict[str, type[Design]]] = {
+DESIGN_KINDS: Final[dict[str, type[Design]]] = {
     kind: design
     for design in (Abx, Adjusted, Estimation, ForcedChoice, Oddity, Rated, SameDifferent, YesNo)
     for kind in get_args(design.model_fields["kind"].annotation)
@@ -349,12 +349,12 @@ KINDS: Final[dict[str, type[Design]]] = {
 if TYPE_CHECKING:
     AnyDesign: TypeAlias = Design
 else:
-    AnyDesign = Annotated[reduce(or_, dict.fromkeys(KINDS.values())), Field(discriminator="kind")]
+    AnyDesign = Annotated[reduce(or_, dict.fromkeys(DESIGN_KINDS.values())), Field(discriminator="kind")]
 
 
 def default_design(kind: str) -> Design:
     """Return a design of a kind with all its defaults (KeyError of an unknown kind)."""
-    return KINDS[kind].model_validate({"kind": kind})
+    return DESIGN_KINDS[kind].model_validate({"kind": kind})
 
 
 def question_of(design: Design, languages: Sequence[str]) -> Questionnaire:

@@ -1,6 +1,6 @@
 """Methods: how many trials a track has, and the level of each.
 
-`Method` says what each kind must state; a kind is a subclass in `KINDS`.
+`Method` says what each kind must state; a kind is a subclass in `METHOD_KINDS`.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from study_app.discovery import Registry, Returns, are_numbers, instance_of, num
 from study_app.errors import PlugInError
 from study_app.haptics.model.ranges import within
 from study_app.number_text import counted
-from study_app.protocol.streams import Draw, shuffle
-from study_app.protocol.table import OfKinds, Table
+from study_app.protocol.randomization.streams import Draw, shuffle
+from study_app.protocol.source.table import OfKinds, Table
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.stimuli import (
     CONSTANT_LEVELS,
@@ -88,7 +88,7 @@ class TrialResult:
 class Method(Table):
     """The rule for choosing the levels of a track: the common keys, and the functions that each kind defines.
 
-    A kind is a subclass whose ``kind`` is a ``Literal`` with a default, in `KINDS`.
+    A kind is a subclass whose ``kind`` is a ``Literal`` with a default, in `METHOD_KINDS`.
     """
 
     if TYPE_CHECKING:
@@ -613,7 +613,7 @@ class _RecordedMethod(Method):
     kind: str
 
     def presentations(self, stimulus: Stimulus) -> int:
-        raise PlugInError(": ".join(KINDS.missing(self.kind)))
+        raise PlugInError(": ".join(METHOD_KINDS.missing(self.kind)))
 
     def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
         return stimulus.levels
@@ -624,7 +624,7 @@ class _RecordedMethod(Method):
 
 _MOST_PRESENTATIONS: Final = 10_000
 """No track of a plug-in presents more comparisons."""
-KINDS: Final = Registry[type[Method]](
+METHOD_KINDS: Final = Registry[type[Method]](
     "method",
     {"adjustment": Adjustment, "constant": Constant, "questplus": QuestPlus, "updown": UpDown},
     Method,
@@ -645,10 +645,12 @@ if TYPE_CHECKING:
     AnyMethod: TypeAlias = Method
 else:
     AnyMethod = Annotated[
-        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Method, _RecordedMethod)
+        reduce(or_, METHOD_KINDS.own.values()),
+        Field(discriminator="kind"),
+        OfKinds(METHOD_KINDS, Method, _RecordedMethod),
     ]
 
 
 def default_method(kind: str) -> Method:
     """Return a method of a kind with all its defaults (KeyError of an unknown kind)."""
-    return KINDS[kind].model_validate({"kind": kind})
+    return METHOD_KINDS[kind].model_validate({"kind": kind})

@@ -16,7 +16,7 @@ from pydantic.json_schema import SkipJsonSchema
 from study_app.haptics.model import scene
 from study_app.haptics.model.ranges import later, within
 from study_app.haptics.model.scene import ForceLink
-from study_app.protocol.table import Id, Table, invalid
+from study_app.protocol.source.table import Id, Table, invalid
 from study_app.protocol.trials.designs import Design
 from study_app.psychophysics.families import Family, Floats
 from study_app.psychophysics.grid import FREE_GUESSES, Grid, Values, evenly, geometric, lapse_prior

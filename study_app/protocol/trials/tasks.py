@@ -14,7 +14,7 @@ from pydantic import ConfigDict, Field, model_validator
 from study_app.discovery import Registry, Returns, are_numbers, instance_of, number_between
 from study_app.errors import PlugInError
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Localised, OfKinds, Table, invalid
+from study_app.protocol.source.table import Localised, OfKinds, Table, invalid
 
 Seconds: TypeAlias = Annotated[
     float, within(0.1, 3600, ("a hand movement takes at least 0.1 s, and a trial takes less than an hour"))
@@ -46,7 +46,7 @@ _SHAKE_M: Final = 0.03
 class Task(Table):
     """The hand's task in an interval, with the properties that each kind defines.
 
-    A kind is a subclass whose ``kind`` is a ``Literal``, in `KINDS`, with a key ``instruction``. ``activity`` and
+    A kind is a subclass whose ``kind`` is a ``Literal``, in `TASK_KINDS`, with a key ``instruction``. ``activity`` and
     ``summary`` are texts for readers of the study. ``tracker`` and ``hand`` name the class that follows the task
     through the samples of a trial and the one that performs it with a simulated hand, ``module:Class``.
     """
@@ -312,7 +312,7 @@ class _RecordedTask(Task):
 
     @property
     def limit_s(self) -> float:
-        raise PlugInError(": ".join(KINDS.missing(self.kind)))
+        raise PlugInError(": ".join(TASK_KINDS.missing(self.kind)))
 
 
 _IS_SPAN: Final = number_between(0, 3600)
@@ -327,7 +327,7 @@ _RETURNS: Final = {
     "fastest_stroke": Returns("a Stroke of numbers", lambda value: isinstance(value, Stroke) and are_numbers(value)),
     "summary": instance_of(str),
 }
-KINDS: Final = Registry[type[Task]](
+TASK_KINDS: Final = Registry[type[Task]](
     "task", {"explore": Explore, "reach": Reach, "follow": Follow}, Task, "kind", _RETURNS
 )
 """Every kind by its id."""
@@ -336,5 +336,5 @@ if TYPE_CHECKING:
     AnyTask: TypeAlias = Task
 else:
     AnyTask = Annotated[
-        reduce(or_, KINDS.own.values()), Field(discriminator="kind"), OfKinds(KINDS, Task, _RecordedTask)
+        reduce(or_, TASK_KINDS.own.values()), Field(discriminator="kind"), OfKinds(TASK_KINDS, Task, _RecordedTask)
     ]

@@ -19,9 +19,16 @@ from numpy.typing import NDArray
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
+from study_app.protocol.orders.tracks import (
+    design_of,
+    has_correct_answer,
+    method_of,
+    standards_of,
+    stimulus_of,
+    tracks_of,
+)
 from study_app.protocol.presented.presented_levels import Clipping, clipping
 from study_app.protocol.quantities import quantity
-from study_app.protocol.tracks import design_of, has_correct_answer, method_of, standards_of, stimulus_of, tracks_of
 from study_app.protocol.trials.designs import Design, Rated
 from study_app.protocol.trials.methods import Method, TrackSetting
 from study_app.protocol.trials.stimuli import LINEAR_WIDTH, WIDTH_PRIOR, Stimulus, analysis_grid, guesses_of, rises

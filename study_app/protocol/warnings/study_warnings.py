@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator
 from itertools import combinations, pairwise
 
-from study_app.haptics.model.effects.drag import REFERENCE, resistance_n
+from study_app.haptics.model.effects import REFERENCE, resistance_n
 from study_app.haptics.model.gate import effective_speed_mps
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import HAND_MPS, Steady, steady_force
@@ -17,10 +17,10 @@ from study_app.protocol.checks.consistency import LEAST_N, force_n
 from study_app.protocol.checks.force_limits import PACED, fastest_hz, unpaced_clipping_warning
 from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.orders.durations import variants
+from study_app.protocol.orders.tracks import design_of, has_correct_answer, method_of, stimulus_of, tracks_of
 from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import POINTS
-from study_app.protocol.tracks import design_of, has_correct_answer, method_of, stimulus_of, tracks_of
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
 from study_app.protocol.warnings.delayed_force import delay_warnings
 from study_app.protocol.warnings.expected_precision import imprecise

@@ -23,7 +23,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.simulated import NO_FEATURES, Comparison, TrialFeatures, as_requested
-from study_app.protocol.trials.stimuli import Stimulated
+from study_app.protocol.trials import Stimulated
 from study_app.session.pages import DesignPage, FeedbackPage, Interval, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import REHEARSED_SCREENS, begun_schedule
 from study_app.session.simulated.observers import reading_s

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.devices.hand import HandOrders
-from study_app.protocol.orders.schedule import shuffle, stream
 from study_app.protocol.questions import ItemView, Value, shown_questions
+from study_app.protocol.randomization import shuffle, stream
 from study_app.protocol.simulated import Rater, TrialFeatures, judgements
-from study_app.protocol.trials.tasks import Reach, Task
+from study_app.protocol.trials import Reach, Task
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
 from study_app.session.tasks import TankView, new_tracker

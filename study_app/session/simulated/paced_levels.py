@@ -13,9 +13,9 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.presented.presented_levels import extreme_levels
-from study_app.protocol.tracks import condition_of, stimulus_of
-from study_app.protocol.trials.stimuli import OF_CONDITION, Stimulated
+from study_app.protocol.orders import condition_of, stimulus_of
+from study_app.protocol.presented import extreme_levels
+from study_app.protocol.trials import OF_CONDITION, Stimulated
 from study_app.store.delivered import broken_interval_limits, delivered_values, judged_fields
 
 _INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None}

@@ -11,11 +11,11 @@ from typing import Final
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule, stream
+from study_app.protocol.orders import Schedule, design_of
+from study_app.protocol.participants import REHEARSED
 from study_app.protocol.questions import Value, plain_number
-from study_app.protocol.raters import REHEARSED
+from study_app.protocol.randomization import stream
 from study_app.protocol.simulated import Comparison, Course, Observer, TrialFeatures, courses_of, observer_of, rater
-from study_app.protocol.tracks import design_of
 from study_app.session.pages import ChoicePage, DesignPage, Page, QuestionnairePage
 from study_app.session.simulated.observers import Choice, Draw, answer_choices, fill_in_page, newly_shown_questions
 from study_app.session.transitions.events import Chosen, Event, ItemShown, Submitted

@@ -18,12 +18,10 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import variants
-from study_app.protocol.orders.schedule import stream
-from study_app.protocol.presented.presented_levels import extreme_levels
-from study_app.protocol.tracks import design_of
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.orders import design_of, orders_of, variants
+from study_app.protocol.presented import extreme_levels
+from study_app.protocol.randomization import stream
+from study_app.protocol.trials import AnyTask
 from study_app.session.preflight import PredictedDelivery
 from study_app.session.simulated.observers import task_path
 

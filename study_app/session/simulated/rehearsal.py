@@ -34,11 +34,12 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule, draw_key, stream
-from study_app.protocol.presented.presentation import has_imperfect_link, next_level
+from study_app.protocol.orders import Schedule, Trial, build_schedule, draw_key
+from study_app.protocol.presented import has_imperfect_link, next_level
 from study_app.protocol.questions import Value, shown_questions
+from study_app.protocol.randomization import Key as LevelKey
+from study_app.protocol.randomization import stream
 from study_app.protocol.simulated import NO_FEATURES, Comparison, Observer, TrialFeatures
-from study_app.protocol.streams import Key as LevelKey
 from study_app.session.pages import (
     DesignPage,
     FeedbackPage,

@@ -26,7 +26,7 @@ RehearsalClient: TypeAlias = WorkerClient[RehearsalOrder, float | str | Path]
 
 def carry_out(order: RehearsalOrder, send: Send, _stop: Stop) -> Path:
     """Rehearse, and return the study folder (see `study_app.session.simulated.rehearsal.rehearse`)."""
-    from study_app.haptics.kernels.compiled import following_compilation  # noqa: PLC0415 - only in that process
+    from study_app.haptics.kernels import following_compilation  # noqa: PLC0415 - only in that process
     from study_app.session.simulated.rehearsal import rehearse  # noqa: PLC0415 - the compiler, too
 
     with following_compilation(send):

@@ -10,8 +10,7 @@ from typing import Any, Final, Literal, TypeAlias
 
 from study_app.errors import DeviceError, ServoFault, StudyError, VideoError
 from study_app.protocol.questions import Value
-from study_app.protocol.trials.stimuli import Stimulated
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.trials import AnyTask, Stimulated
 from study_app.session.pages import Page
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import Stepped as SteppedLine

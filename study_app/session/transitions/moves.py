@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from study_app.errors import SessionError
-from study_app.protocol.orders.schedule import Trial
-from study_app.protocol.presented.presentation import delay_s_of
+from study_app.protocol.orders import Trial
+from study_app.protocol.presented import delay_s_of
 from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (
     Adjust,

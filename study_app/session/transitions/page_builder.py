@@ -11,13 +11,20 @@ from typing import Final, Literal, TypeAlias
 
 from study_app.haptics.model.scene import Body
 from study_app.protocol.model import PageText, Protocol, Questionnaire
-from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Trial, build_schedule, draw_key, stream
+from study_app.protocol.orders import (
+    FormStep,
+    PageStep,
+    Schedule,
+    Trial,
+    build_schedule,
+    design_of,
+    draw_key,
+    own_protocol,
+)
 from study_app.protocol.questions import ChoiceView, Context, NumberView, Question, Value
-from study_app.protocol.streams import draw_secret, group_of
-from study_app.protocol.tracks import design_of
-from study_app.protocol.trials.designs import ORDINALS
-from study_app.protocol.wording.languages import Words, words
+from study_app.protocol.randomization import draw_secret, group_of, stream
+from study_app.protocol.trials import ORDINALS
+from study_app.protocol.wording import Words, words
 from study_app.session import pages
 from study_app.session.transitions.state import Phase, Plan, SessionState
 from study_app.store.journals.journal_events import Answer

@@ -7,14 +7,11 @@ from typing import Literal, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.orders.schedule import FormStep, PageStep, Schedule, Step, Trial
-from study_app.protocol.presented.presentation import Presentation, next_level
+from study_app.protocol.orders import FormStep, PageStep, Schedule, Step, Trial, adjusting_of, design_of, method_of
+from study_app.protocol.presented import Presentation, next_level
 from study_app.protocol.questions import Context, Question, shown_questions
-from study_app.protocol.streams import Key
-from study_app.protocol.tracks import adjusting_of, design_of, method_of
-from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.methods import Adjusting, Adjustment, TrialResult
-from study_app.protocol.trials.tasks import AnyTask
+from study_app.protocol.randomization import Key
+from study_app.protocol.trials import Adjusting, Adjustment, AnyTask, Design, TrialResult
 from study_app.session.resume import FIRST, Start
 from study_app.session.transitions.events import Command
 from study_app.store.journals.journal_events import Answer

@@ -5,8 +5,8 @@ from typing import Any, Final, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
-from study_app.protocol.orders.schedule import FormStep, PageStep, Step, Trial
-from study_app.protocol.presented.presentation import (
+from study_app.protocol.orders import FormStep, PageStep, Step, Trial
+from study_app.protocol.presented import (
     Presentation,
     arrangement_text,
     delay_s_of,
@@ -15,7 +15,7 @@ from study_app.protocol.presented.presentation import (
     trial_result,
 )
 from study_app.protocol.questions import answer_problem
-from study_app.protocol.trials.stimuli import Stimulated
+from study_app.protocol.trials import Stimulated
 from study_app.session.transitions import page_builder
 from study_app.session.transitions.events import (
     Chosen,

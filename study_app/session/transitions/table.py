@@ -27,7 +27,7 @@ from typing import Any, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import Schedule
+from study_app.protocol.orders import Schedule
 from study_app.session.resume import FIRST, Start
 from study_app.session.transitions import moves, steps
 from study_app.session.transitions.events import (

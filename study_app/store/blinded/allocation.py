@@ -4,7 +4,7 @@ Each participant has an entry, claimed by creating a file in ``blinding/allocate
 get different entries; nobody else gets it, except a participant who replaces the first one.
 
 - **Randomised** (``NNN.json``): entries 1, 2 … in the order in which first sessions began. The group follows from entry
-  and secret (`protocol.streams`); the file holds it sealed.
+  and secret (`protocol.randomization.streams`); the file holds it sealed.
 - **Pre-existing** (``GROUP-NNN.json``): entries 1, 2 … of each group, whose name is in the file and in journals.
 - **Replacements** (``…NNN-PARTICIPANT.json``) take over the entry, and so the group and the place in it, of the
   participant whom they replace.
@@ -24,11 +24,10 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from study_app.errors import StoreError, StudyError
-from study_app.protocol.groups import check_session_number, next_group
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.sequences import enrolment_number
-from study_app.protocol.streams import group_of
+from study_app.protocol.orders import own_protocol
+from study_app.protocol.participants import check_session_number, next_group
+from study_app.protocol.randomization import enrolment_number, group_of
 from study_app.store.atomic import (
     cannot_write,
     is_there,

@@ -32,10 +32,9 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.gate import resolve
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol, SceneDefaults, StudyLiquid
-from study_app.protocol.orders.schedule import block_codes, draw_key
-from study_app.protocol.sequences import enrolment_number
-from study_app.protocol.streams import draw_secret, group_of, own_code, place_in_group
-from study_app.protocol.table import RECORDED
+from study_app.protocol.orders import block_codes, draw_key
+from study_app.protocol.randomization import draw_secret, enrolment_number, group_of, own_code, place_in_group
+from study_app.protocol.source import RECORDED
 from study_app.protocol.upgrade import needs_upgrade, upgraded_tables
 from study_app.store import receipt
 from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own

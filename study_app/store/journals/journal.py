@@ -27,7 +27,7 @@ from typing import Any, BinaryIO
 
 import study_app
 from study_app.errors import StoreError
-from study_app.protocol.source.files import without_byte_order_mark
+from study_app.protocol.source import without_byte_order_mark
 from study_app.store.atomic import (
     cannot_write,
     flush_file,

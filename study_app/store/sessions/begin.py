@@ -13,10 +13,10 @@ from study_app.errors import StoreError
 from study_app.ids import read_as
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.files import unbundle
-from study_app.protocol.trials.stimuli import LEVEL_RULES
+from study_app.protocol.orders import own_protocol
+from study_app.protocol.randomization import stream
+from study_app.protocol.source import unbundle
+from study_app.protocol.trials import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.atomic import (
     cannot_write,

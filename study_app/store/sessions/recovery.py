@@ -16,10 +16,10 @@ from typing import Any
 
 import study_app
 from study_app.errors import StoreError
-from study_app.protocol.differences import CONDITIONS_DIFFER, differences
+from study_app.protocol.descriptions import CONDITIONS_DIFFER, differences
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.files import bundle, has_hash, hashes_in, unbundle
+from study_app.protocol.randomization import stream
+from study_app.protocol.source import bundle, has_hash, hashes_in, unbundle
 from study_app.protocol.upgrade import needs_upgrade
 from study_app.store import receipt
 from study_app.store.atomic import is_there, paths_in, read_own, remove_temporary_files, write_file

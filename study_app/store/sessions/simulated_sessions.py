@@ -16,9 +16,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.orders.schedule import stream
-from study_app.protocol.source.files import unbundle
+from study_app.protocol.orders import own_protocol
+from study_app.protocol.randomization import stream
+from study_app.protocol.source import unbundle
 from study_app.store import receipt
 from study_app.store.atomic import create_folder, make_folder
 from study_app.store.blinded.allocation import Entries, allocate

@@ -14,7 +14,7 @@ from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.table import text_in
+from study_app.protocol.source import text_in
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, write_file
 from study_app.store.blinded.blinding import Key, open_events, opened_key, reveals

@@ -12,12 +12,18 @@ from pathlib import Path
 from study_app.errors import StoreError
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import own_protocol
-from study_app.protocol.orders.schedule import RecordedTrial, Schedule, build_schedule, reproduce
-from study_app.protocol.presented.presentation import arrangement_text, next_level
-from study_app.protocol.streams import Key
-from study_app.protocol.tracks import adjusting_of, design_of
-from study_app.protocol.trials.stimuli import LEVEL_RULES
+from study_app.protocol.orders import (
+    RecordedTrial,
+    Schedule,
+    adjusting_of,
+    build_schedule,
+    design_of,
+    own_protocol,
+    reproduce,
+)
+from study_app.protocol.presented import arrangement_text, next_level
+from study_app.protocol.randomization import Key
+from study_app.protocol.trials import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import complete_protocol, open_events, participant_group, place_number, read_key

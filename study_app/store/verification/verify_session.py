@@ -22,7 +22,7 @@ import study_app
 from study_app.errors import PlugInError, StoreError
 from study_app.number_text import counted
 from study_app.protocol.upgrade import needs_upgrade
-from study_app.protocol.wording.languages import SHIPPED
+from study_app.protocol.wording import SHIPPED
 from study_app.store import csv_files, receipt
 from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporary_files
 from study_app.store.blinded.blinding import Key, complete_protocol, open_events, opened_key

@@ -20,7 +20,7 @@ from typing import Any, Final, TypeAlias
 from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
-from study_app.protocol.source.files import without_byte_order_mark
+from study_app.protocol.source import without_byte_order_mark
 from study_app.store import csv_files, exclusions, receipt
 from study_app.store.atomic import is_there, read_own, read_regular, temporary_files
 from study_app.store.blinded import blinding

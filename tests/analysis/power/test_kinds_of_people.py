@@ -25,7 +25,7 @@ from study_app.analysis.planning.simulated_studies import (
 from study_app.cli import commands
 from study_app.errors import ProtocolError
 from study_app.protocol.load import parse
-from study_app.protocol.raters import CONSISTENT, NOISY, PUBLISHED, STATED, TYPICAL, SimulatedParticipants
+from study_app.protocol.participants.raters import CONSISTENT, NOISY, PUBLISHED, STATED, TYPICAL, SimulatedParticipants
 from study_app.protocol.simulated import NO_FEATURES
 from tests.analysis.conftest import SMALL
 

@@ -23,7 +23,7 @@ from study_app.analysis.statistics.trend import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import load
-from study_app.protocol.raters import CONSISTENT, PUBLISHED, REHEARSED
+from study_app.protocol.participants.raters import CONSISTENT, PUBLISHED, REHEARSED
 from study_app.protocol.simulated import NO_FEATURES, TrialFeatures
 from study_app.workers.executors import Workers
 from tests.protocol.groups.grouped import grouped

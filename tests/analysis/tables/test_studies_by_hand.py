@@ -12,8 +12,8 @@ import pytest
 from study_app.analysis.data import blocks, measures, motion, session_files, study_tables
 from study_app.analysis.data.blocks import Block, OwnDynamics, Setting
 from study_app.analysis.data.study_tables import Study, group_means, groups_shown, pool_sites, split_study
-from study_app.protocol.groups import EACH_GROUP
 from study_app.protocol.model import Published
+from study_app.protocol.participants.groups import EACH_GROUP
 from study_app.store.exclusions import Exclusion
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 

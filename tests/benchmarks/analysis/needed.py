@@ -19,7 +19,7 @@ from study_app.analysis.planning.simulated_studies import draw_opinions, plan, s
 from study_app.analysis.results import Failures
 from study_app.evidence.report_rates.simulation import report
 from study_app.protocol.load import load
-from study_app.protocol.raters import PUBLISHED, TYPICAL
+from study_app.protocol.participants.raters import PUBLISHED, TYPICAL
 from study_app.session.simulated.rehearsal import condition_features
 
 SEED, OTHER = 1, 2

@@ -1,4 +1,4 @@
-"""Noise, response bias and spread of slopes of people in published ratings, which ``protocol.raters`` takes from here.
+"""Noise, response bias and spread of slopes of people in published ratings, for ``protocol.participants.raters``.
 
 Run it by itself: ``python tests/benchmarks/analysis/rating_data.py FOLDER``, with the data sets written from R:
 ``write.csv(lmerTest::TVbo, "TVbo.csv")`` and ``data(chocolates, package = "SensoMineR"); write.csv(sensochoc,
@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from study_app.protocol.raters import CONSISTENT, NOISY, PUBLISHED, TYPICAL
+from study_app.protocol.participants.raters import CONSISTENT, NOISY, PUBLISHED, TYPICAL
 
 STEPS = 6
 """Of a seven-point scale."""

@@ -38,8 +38,8 @@ from study_app.designer.measures.study_facts import copied_texts, facts, missing
 from study_app.designer.templates import FOLDER
 from study_app.errors import StudyError
 from study_app.ids import MAX_ID
-from study_app.protocol.groups import sequences_in
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.participants.groups import sequences_in
 from study_app.protocol.source.document import Path, entries
 from tests.designer.document.grown import PROTOCOLS, texts
 from tests.designer.document.random_edits import at

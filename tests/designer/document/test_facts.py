@@ -23,7 +23,7 @@ from study_app.designer.measures.study_facts import (
     valid_part,
 )
 from study_app.haptics.model.slope_limits import slope_limit
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule

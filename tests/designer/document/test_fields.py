@@ -13,7 +13,7 @@ from study_app.designer.document.steps import AddKey, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.form.form import form_of
 from study_app.number_text import exact_text
-from study_app.protocol.json_schema import schema
+from study_app.protocol.file_format.json_schema import schema
 from study_app.protocol.source.document import Path, entries
 from study_app.protocol.source.problems import Fault, rule_of
 from study_app.store.workstation import MachineSettings

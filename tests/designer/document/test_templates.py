@@ -16,7 +16,7 @@ from study_app.designer.document.study import read_study
 from study_app.designer.new_study_page import KnownAnswer, known_answers
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.errors import StudyError
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.warnings.expected_precision import threshold_plan

@@ -8,7 +8,7 @@ from study_app.cli import commands
 from study_app.errors import StudyError
 from study_app.evidence.accuracy import accuracy_report, comparison
 from study_app.evidence.accuracy.comparison import accuracy
-from study_app.evidence.accuracy.survey import PUBLISHED, survey
+from study_app.evidence.accuracy.survey import PUBLISHED, survey_scenes
 from study_app.evidence.table import Evidence
 from study_app.haptics.model.motion import Motion
 from study_app.protocol.load import load_scenes
@@ -29,7 +29,7 @@ def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path, monkey
     (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8", newline="\n")
     measured = []
     monkeypatch.setattr(comparison, "accuracy", lambda *given, **_: measured.append(given))
-    monkeypatch.setattr(accuracy_report, "evidence", lambda _found: Evidence("", {}))
+    monkeypatch.setattr(accuracy_report, "accuracy_evidence", lambda _found: Evidence("", {}))
     words = ["accuracy", "rek2024", "--liquid", "water", "--path", str(tmp_path / "slow.csv"), "--to", str(tmp_path)]
     done = CliRunner().invoke(commands, words)
     assert done.exit_code == 0, done.output
@@ -44,7 +44,7 @@ CHOSEN = ("water", "honey", "olive_oil")
 @pytest.fixture(scope="module")
 def found():
     scenes = load_scenes("physical2")
-    return {it.liquid: it for it in survey({name: scenes[name] for name in CHOSEN})}
+    return {it.liquid: it for it in survey_scenes({name: scenes[name] for name in CHOSEN})}
 
 
 @pytest.mark.parametrize("name", PUBLISHED)

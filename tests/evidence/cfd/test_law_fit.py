@@ -44,12 +44,12 @@ def planted(table):
 
 def test_planted_constants_are_found_and_a_motion_left_out_is_met():
     tables = [planted(it) for it in stored_flows.training() if it.case.liquid_id == "gear_oil"]
-    found = law_fit.refit(tables)
+    found = law_fit.refit_law(tables)
     assert tuple(found.constants) == pytest.approx(tuple(PLANTED), rel=1e-3)
     assert max(max(it.fitted) for it in found.errors) < 1e-4
     assert max(it.left_out[0] for it in found.errors) < 0.02
     assert min(it.program[0] for it in found.errors) > 0.01
-    text = law_fit.evidence(found).text
+    text = law_fit.law_fit_evidence(found).text
     assert "| c_z | 5 | 3.15 |" in text
     assert text.count("gear_oil | ") == len(tables)
 

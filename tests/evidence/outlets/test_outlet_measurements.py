@@ -8,7 +8,7 @@ import pytest
 
 from study_app.errors import OutletError
 from study_app.evidence.outlets import triggers
-from study_app.evidence.outlets.streams import stream
+from study_app.evidence.outlets.streams import measure_streams
 from tests.compiled import needs_servo
 
 pytest.importorskip("pylsl", reason="pylsl is not installed: pip install 'liquid-study[lsl]'")
@@ -19,7 +19,7 @@ slow = pytest.mark.slow
 @needs_servo
 @pytest.mark.parametrize("seconds", [pytest.param(3, marks=slow), pytest.param(60, marks=[slow, pytest.mark.nightly])])
 def test_every_sample_and_marker_arrives_with_the_servos_time(seconds: int) -> None:
-    found = stream(seconds, ending=threading.Event())
+    found = measure_streams(seconds, ending=threading.Event())
     assert found.samples_sent > 500 * seconds
     assert (found.samples_lost, found.intact) == (0, True)
     assert found.markers_sent > 10 * seconds
@@ -35,16 +35,16 @@ def test_every_sample_and_marker_arrives_with_the_servos_time(seconds: int) -> N
 @slow
 @pytest.mark.skipif(not hasattr(os, "openpty"), reason="this system has no virtual ports")
 def test_each_event_is_one_byte_at_a_reader_of_a_virtual_port() -> None:
-    found = triggers.measure(triggers.VIRTUAL, 1.0, ending=threading.Event())
+    found = triggers.measure_triggers(triggers.VIRTUAL, 1.0, ending=threading.Event())
     assert found.read_us is not None
     assert found.high_ms is not None
     assert len(found.read_us) == len(found.written_us) >= 5
     assert found.wrong == 0
     assert found.read_us.min() > 0
     assert np.median(found.high_ms) >= 9.0
-    assert "wrong or missing bytes: 0" in triggers.evidence(found).text
+    assert "wrong or missing bytes: 0" in triggers.triggers_evidence(found).text
 
 
 def test_a_port_that_is_not_there_is_named() -> None:
     with pytest.raises(OutletError, match="serial:/nowhere/ttyUSB7 cannot be opened"):
-        triggers.measure("serial:/nowhere/ttyUSB7", 1.0, ending=threading.Event())
+        triggers.measure_triggers("serial:/nowhere/ttyUSB7", 1.0, ending=threading.Event())

@@ -26,7 +26,7 @@ from study_app.evidence.report_rates.simulation import (
     Generator,
     count_single,
     count_studies,
-    evidence,
+    report_rates_evidence,
     simulate_answers,
     true_effects,
 )
@@ -103,7 +103,7 @@ def test_every_kind_of_study_is_counted(rek: Plan, generator: Generator, monkeyp
         one.what for one in rates
     }
     assert rates == [rate for cell in cells for rate in count_studies(rek, cell, true_effects(rek, cell), 1, 0, 2)]
-    files = evidence(rates, "rates").files
+    files = report_rates_evidence(rates, "rates").files
     assert len(files["rates.md"].splitlines()) == len(files["rates.csv"].splitlines()) + 3 == len(rates) + 4
 
 

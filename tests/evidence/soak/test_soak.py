@@ -15,7 +15,7 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.cli import main
-from study_app.evidence.soak.soak import Soak, soak
+from study_app.evidence.soak.soak import Soak, soak_servo
 from study_app.protocol.load import load_scenes
 
 pytestmark = pytest.mark.slow
@@ -31,7 +31,7 @@ def scenes():
 @pytest.fixture(scope="module")
 def found(scenes):
     """Return the report of two minutes in virtual time."""
-    return soak(scenes, SHORT_H, virtual=True)
+    return soak_servo(scenes, SHORT_H, virtual=True)
 
 
 def test_two_virtual_minutes_of_every_fault_find_nothing(found):
@@ -53,24 +53,24 @@ def test_two_virtual_minutes_of_every_fault_find_nothing(found):
 
 
 def test_the_same_seed_finds_the_same(scenes, found):
-    again = soak(scenes, SHORT_H, virtual=True).table()
+    again = soak_servo(scenes, SHORT_H, virtual=True).table()
     first = found.table()
     for table in (again, first):
         for name in ("took_s", "memory_bytes"):
             del table[name]
     assert again == first
-    assert soak(scenes, 0.001, virtual=True, seed=2).table() != soak(scenes, 0.001, virtual=True).table()
+    assert soak_servo(scenes, 0.001, virtual=True, seed=2).table() != soak_servo(scenes, 0.001, virtual=True).table()
 
 
 def test_liquids_without_a_wake_are_soaked_too():
-    found = soak(load_scenes("physical_liquids"), 0.01, virtual=True)
+    found = soak_servo(load_scenes("physical_liquids"), 0.01, virtual=True)
     assert found.findings == ()
     assert found.drift.comparisons == 0
 
 
 @pytest.mark.nightly
 def test_two_real_seconds_tick_in_a_thread_of_their_own(scenes):
-    found = soak(scenes, 2 / 3600, virtual=False)
+    found = soak_servo(scenes, 2 / 3600, virtual=False)
     assert found.findings == ()
     assert found.ticks >= found.planned
     assert {name: seen for name, _, _, seen in found.faults}["clock_jump"] is None
@@ -87,7 +87,7 @@ def test_one_that_is_asked_to_end_says_what_it_has(scenes):
         if "%" in line:
             ending.set()
 
-    found = soak(scenes, SHORT_H, virtual=True, ending=ending, progress=tell)
+    found = soak_servo(scenes, SHORT_H, virtual=True, ending=ending, progress=tell)
     assert lines[-1].startswith(" 10 %")
     assert 12_000 <= found.ticks < 20_000
     assert found.verdict.startswith("passed: no faults found in the 1")

@@ -8,7 +8,7 @@ import pytest
 
 from study_app.evidence.stability.bench import Bench, new_trace
 from study_app.evidence.stability.case_groups import groups
-from study_app.evidence.stability.stability_cases import materials, of_physical2, parse
+from study_app.evidence.stability.stability_cases import materials, of_physical2, parse_case
 from study_app.evidence.stability.verdict import MISJUDGED_ALLOWANCE_J, judge
 from tests.haptics.scenes import COMPILED
 
@@ -28,7 +28,7 @@ def test_a_sample_of_closed_loops_in_other_liquids_is_stable():
 
 def test_lines_of_earlier_versions_still_describe_the_same_case():
     old = "liquid=syrup scale=20 rate_hz=500 delay=2 hand=thrown motion=stroke speed_mps=0.6 mass_kg=0.25 missed=0.02"
-    case = parse(old)
+    case = parse_case(old)
     assert case.believed_delay == case.delay == 2
     assert (case.plant, case.lost, case.duplicated, case.burst_ms, case.slows_to) == ("handle", 0.0, 0.0, 0.0, -1)
 
@@ -49,8 +49,8 @@ def samples(case, ticks):
 def test_hand_that_breaks_the_wake_at_each_reversal_is_as_restless_without_feedback():
     """The wake of light oil turns the force at each reversal of 4 Hz, with the motors off more than with them."""
     released = "liquid=light_oil hand=lets-go motion=sine speed_mps=0.75398 release_s=0.7 plant=arm"
-    held = dataclasses.replace(parse(released), hand="middle")
-    for case in (parse(released), held):
+    held = dataclasses.replace(parse_case(released), hand="middle")
+    for case in (parse_case(released), held):
         verdict = judge(case, safe=True)
         assert not verdict.reasons, verdict
 
@@ -76,7 +76,7 @@ TAR, THROWN_TAR = "speed_mps=0.1885 release_s=1.01667", "hand=thrown speed_mps=0
     ],
 )
 def test_a_delay_one_tick_longer_than_believed_leaves_the_loop_stable(line):
-    verdict = judge(parse(line), safe=True)
+    verdict = judge(parse_case(line), safe=True)
     assert not verdict.reasons, verdict
     assert verdict.balance_j > -MISJUDGED_ALLOWANCE_J
 
@@ -92,6 +92,6 @@ def test_a_delay_one_tick_longer_than_believed_leaves_the_loop_stable(line):
     ],
 )
 def test_repeated_samples_do_not_make_the_force_restless(line):
-    verdict = judge(parse(f"{line} duplicated=0.05 estimator=kalman"), safe=True)
+    verdict = judge(parse_case(f"{line} duplicated=0.05 estimator=kalman"), safe=True)
     assert not verdict.reasons, verdict
     assert verdict.fast_n < verdict.played_n + 0.02

@@ -67,7 +67,7 @@ def test_values_beyond_a_limit_are_marked_and_counted() -> None:
     assert found("physical2_olive_oil", "light").limits == {"sine": (0, 19.5)}
     assert found("physical2_honey", "middle", 0.1).limits == {"sine": (0, 30)}
     assert found("honey").limits == {}
-    result = delivered_force.evidence((found("physical2_honey"), found("physical2_olive_oil", hz=3.0)))
+    result = delivered_force.delivered_force_evidence((found("physical2_honey"), found("physical2_olive_oil", hz=3.0)))
     assert "14.0/15" in result.text
     assert "130/80–120*" in result.text
     assert "11.0/15" in result.text

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from study_app.evidence.stability.bench import Bench
-from study_app.evidence.stability.force_delay import delayed_trace, measure
-from study_app.evidence.stability.stability_cases import Case, parse
+from study_app.evidence.stability.force_delay import delayed_trace, measure_force_delays
+from study_app.evidence.stability.stability_cases import Case, parse_case
 from study_app.haptics.model.force_rules import CURRENT
 from study_app.protocol.warnings.delayed_force import stored_table
 from tests.haptics.scenes import COMPILED
@@ -35,7 +35,7 @@ def test_the_force_of_the_effects_comes_so_late(delay, liquid, scale, more):
     """
     case = Case(liquid=liquid, scale=scale, quantum_um=1.0, delay=0, **more)
     prompt = imposed(case, rules=CURRENT._replace(known_force_ticks=99))
-    late = imposed(parse(f"{case} force_delay_ms={delay}"))
+    late = imposed(parse_case(f"{case} force_delay_ms={delay}"))
     assert late.withheld_n.max() < 1e-3  # the controller has nothing to do: another force would not be the prompt one
     shifted_n = np.zeros_like(prompt.sent_n)
     shifted_n[delay:] = prompt.sent_n[:-delay]
@@ -48,7 +48,7 @@ def test_the_force_of_the_effects_comes_so_late(delay, liquid, scale, more):
 @pytest.mark.slow
 def test_the_force_comes_so_late_without_safety_too():
     case = Case(liquid="physical_tar", scale=1.0, quantum_um=1.0, delay=0)
-    prompt, late = (imposed(it, safe=False).sent_n for it in (case, parse(f"{case} force_delay_ms=7")))
+    prompt, late = (imposed(it, safe=False).sent_n for it in (case, parse_case(f"{case} force_delay_ms=7")))
     assert np.abs(prompt).max() > 1
     assert late[7:] == pytest.approx(prompt[:-7], abs=1e-9)
 
@@ -61,7 +61,7 @@ def test_a_delayed_force_gives_energy_that_the_controller_withholds():
     trace = delayed_trace(case)
     assert np.linalg.norm(trace.sent_n, axis=1).max() <= 8.0 * (1 + 1e-9)
     assert np.abs(trace.velocity_mps).max() < 1.0
-    (entry,) = measure(["light_oil"], ["ewma"], ["light"], [100])
+    (entry,) = measure_force_delays(["light_oil"], ["ewma"], ["light"], [100])
     assert 0 < entry.left_percent < 30
     assert entry.withheld_percent > 70
 
@@ -74,7 +74,7 @@ def test_a_delayed_force_gives_energy_that_the_controller_withholds():
 )
 def test_the_shipped_table_is_the_one_that_is_measured(liquid, estimator, hand):
     shipped = [it for it in stored_table() if it[:3] == (liquid, estimator, hand)]
-    for one, again in zip(shipped, measure([liquid], [estimator], [hand]), strict=True):
+    for one, again in zip(shipped, measure_force_delays([liquid], [estimator], [hand]), strict=True):
         assert one[:4] == again[:4]
         within = 0.3 if one.withheld_percent == 0 else 10.0  # beyond, it hangs on micrometres
         assert one.left_percent == pytest.approx(again.left_percent, abs=within)

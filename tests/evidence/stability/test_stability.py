@@ -11,7 +11,7 @@ from study_app import cli
 from study_app.errors import StudyError
 from study_app.evidence.stability import stability_report as stability
 from study_app.evidence.stability.case_groups import Group, evenly_chosen, groups, sweep
-from study_app.evidence.stability.stability_cases import Case, liquids, parse, scene_of
+from study_app.evidence.stability.stability_cases import Case, liquids, parse_case, scene_of
 from study_app.evidence.stability.verdict import STABLE, Verdict, judge
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.slope_limits import slope_limit_table
@@ -50,7 +50,7 @@ def test_the_strongest_linear_damper_is_unstable_without_safety_and_stable_with_
     damped = [dataclasses.replace(case, liquid="damper") for case in evenly_chosen(sweep(), 60)]
     assert sum(bool(judge(case, safe=False).reasons) for case in damped) > 25
     assert [str(case) for case in damped if judge(case, safe=True).reasons] == []
-    assert parse(str(damped[0])) == damped[0]
+    assert parse_case(str(damped[0])) == damped[0]
 
 
 @pytest.mark.nightly
@@ -86,7 +86,7 @@ CHOPPED = "rate_hz=2000 hand=thrown viscous_nspm=0 quantum_um=20"
     ids=["estimator changes with the delay", "the same in a free handle", "late force of a damper", "jitter and loss"],
 )
 def test_cases_of_earlier_sweeps_are_stable(line):
-    assert judge(parse(line), safe=True).grade == STABLE
+    assert judge(parse_case(line), safe=True).grade == STABLE
 
 
 @compiled
@@ -104,7 +104,7 @@ def test_a_handle_without_any_friction_comes_to_rest_in_tar(speed_mps, quantum_u
 
 @pytest.mark.parametrize("case", evenly_chosen(sweep(), 20))
 def test_a_case_is_a_line_that_reproduces_it(case):
-    assert parse(str(case)) == case
+    assert parse_case(str(case)) == case
     assert scene_of(case).scale == case.scale
 
 
@@ -127,7 +127,7 @@ def test_a_case_is_a_line_that_reproduces_it(case):
 )
 def test_a_line_that_is_no_case_is_told_in_one_sentence(line, said):
     with pytest.raises(StudyError, match=said) as caught:
-        parse(line)
+        parse_case(line)
     assert "\n" not in str(caught.value)
 
 
@@ -153,7 +153,7 @@ def command(*words):
 
 @compiled
 def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
-    judged = stability.judge(parse(UNSTABLE), safe=False)
+    judged = stability.judge(parse_case(UNSTABLE), safe=False)
     monkeypatch.setattr(stability, "judge", lambda case, safe: dataclasses.replace(judged, case=case, safe=safe))
     monkeypatch.setattr(stability, "judge_driven", lambda case: dataclasses.replace(judged, case=case, safe=True))
     few = stability.fidelities(["honey"], STUDY_LOOPS)
@@ -163,7 +163,7 @@ def test_it_ends_with_3_where_safety_does_not_hold(monkeypatch):
     assert ran.return_value == 3
     lines = [line for line in ran.stderr.splitlines() if line.startswith("liquid=")]
     assert len(lines) == 2 * (1 + len(groups(count=2)))
-    assert {parse(line).plant for line in lines} == {"handle", "arm", "falcon"}
+    assert {parse_case(line).plant for line in lines} == {"handle", "arm", "falcon"}
 
 
 def test_it_tolerates_one_noisy_case_in_10000_and_no_unstable_one():
@@ -196,7 +196,7 @@ def test_it_tolerates_one_noisy_case_in_10000_and_no_unstable_one():
 @compiled
 def test_each_run_draws_its_cases_from_a_seed_that_repeats_it(monkeypatch):
     """Without a seed, two runs judge other cases; with the printed one, the same."""
-    judged, cases = stability.judge(parse("liquid=honey"), safe=True), []
+    judged, cases = stability.judge(parse_case("liquid=honey"), safe=True), []
 
     def keep(case, safe):
         cases.append(case)

@@ -5,7 +5,7 @@ import pytest
 
 from study_app.evidence.stability import verdict
 from study_app.evidence.stability.bench import Bench
-from study_app.evidence.stability.stability_cases import parse
+from study_app.evidence.stability.stability_cases import parse_case
 from study_app.evidence.stability.verdict import compare_fast, judge, reasons_of, worst_of
 from tests.haptics.scenes import COMPILED
 
@@ -79,7 +79,7 @@ class WithoutObserver(Bench):
 @pytest.mark.slow
 def test_loops_that_oscillate_are_unstable(monkeypatch):
     """A linear loop beyond its boundary, and a delay three ticks longer than believed that nothing observes."""
-    case = parse("liquid=honey delay=4 believed=1 hand=thrown motion=stroke speed_mps=0.6")
+    case = parse_case("liquid=honey delay=4 believed=1 hand=thrown motion=stroke speed_mps=0.6")
     assert judge(case, safe=True).grade == "stable"
     assert judge(case, safe=False).grade == "unstable"
     monkeypatch.setattr(verdict, "Bench", WithoutObserver)

@@ -4,7 +4,14 @@ import itertools
 
 import pytest
 
-from study_app.evidence.stability.withheld_force import MODES, MOST_AFTER, QUICK, SHAKEN, SHOWN_SHAKE, measure
+from study_app.evidence.stability.withheld_force import (
+    MODES,
+    MOST_AFTER,
+    QUICK,
+    SHAKEN,
+    SHOWN_SHAKE,
+    measure_withheld_force,
+)
 from tests.haptics.scenes import COMPILED
 
 compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
@@ -13,7 +20,7 @@ compiled = pytest.mark.skipif(not COMPILED, reason="many thousands of ticks")
 @pytest.mark.slow
 @compiled
 def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
-    shares = measure(["syrup"])
+    shares = measure_withheld_force(["syrup"])
     assert {(found.estimator, found.mode) for found in shares} == set(itertools.product(("ewma", "kalman"), MODES))
     for found in shares:
         assert found.strokes[0] == pytest.approx(0.0, abs=1e-3)
@@ -24,7 +31,7 @@ def test_slow_strokes_lose_nothing_and_shares_lie_between_0_and_1():
 @compiled
 def test_a_second_after_the_hand_was_shaken_the_whole_force_arrives():
     """Under the rules before, up to 28 and 56 % are still withheld with `ewma`."""
-    found = [one for one in measure(["light_oil", "physical_honey"]) if one.mode == SHAKEN]
+    found = [one for one in measure_withheld_force(["light_oil", "physical_honey"]) if one.mode == SHAKEN]
     assert len(found) == 4
     assert max(one.after[QUICK.index(SHOWN_SHAKE)][0] for one in found) > 0.1
     assert all(one.lasting < MOST_AFTER for one in found)

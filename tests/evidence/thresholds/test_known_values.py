@@ -26,13 +26,13 @@ from study_app.evidence.thresholds.known_values import (
     rehearsed,
     rehearsed_measures,
     share_interval,
-    validate,
+    validate_known_values,
     verdicts_on,
 )
 from study_app.protocol.load import load, parse
+from study_app.protocol.randomization.streams import stream
 from study_app.protocol.simulated import Comparison, Course, Observer
 from study_app.protocol.source.files import source_bytes
-from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design
 from tests.compiled import needs_servo
 from tests.protocol.trials.level_studies import text_of_damper
@@ -240,7 +240,7 @@ def test_studies_of_all_seeds_count_together_and_each_seed_once(
     told = []
     with ThreadPoolExecutor(1) as executor:
         said: list[str] = []
-        rows = validate(
+        rows = validate_known_values(
             [(b"", threshold)], 2, (1, 2, 1), executor, lambda words, _share: told.append(words), said.append
         )
     assert "small: 4 of 4 studies" in told

@@ -7,12 +7,12 @@ from study_app.evidence.thresholds.noticed_delays import (
     JND_S,
     MEAN_CRITERION_S,
     Compared,
-    compare,
+    compare_delays,
     people_of,
     rated,
 )
+from study_app.protocol.randomization.streams import stream
 from study_app.protocol.simulated import OBSERVER, Comparison
-from study_app.protocol.streams import stream
 from study_app.protocol.trials.designs import default_design
 
 pytestmark = pytest.mark.slow
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def found() -> Compared:
-    return compare(40, 1)
+    return compare_delays(40, 1)
 
 
 def test_the_forced_choice_finds_the_known_delay_and_the_rating_the_criterion(found: Compared) -> None:

@@ -13,7 +13,15 @@ if numba.config.DISABLE_JIT:
 
 from study_app.cli import main
 from study_app.evidence.computer import busy_cores
-from study_app.evidence.timing.measurement import FULL, LEAD_IN, PERIOD_NS, PlayedHand, granted, ticks_at, timing
+from study_app.evidence.timing.measurement import (
+    FULL,
+    LEAD_IN,
+    PERIOD_NS,
+    PlayedHand,
+    granted,
+    measure_timing,
+    ticks_at,
+)
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
@@ -69,7 +77,7 @@ class FakeWindows:
 @pytest.mark.slow
 def test_a_race_times_every_loop_in_every_class_it_is_granted():
     lines = []
-    raced = timing(0.5, "none", FakeWindows(), progress=lines.append)
+    raced = measure_timing(0.5, "none", FakeWindows(), progress=lines.append)
     levels = ["normal"] if granted().best is None else ["normal", granted().best.level]
     assert list(raced.levels) == levels
     assert [one.kind for one in raced.loops][:4] == ["servo", "bare", "thread", "qt"]

@@ -13,7 +13,7 @@ from study_app.haptics.model.overrides import number_names, override_value
 from study_app.haptics.model.scene import PROMPT_LINK, STORED_FORCES, Box, ForceLink, Liquid, Scene
 from study_app.haptics.runtime.offline import samples_along
 from study_app.haptics.runtime.pack import is_built_alike, pack, pack_into
-from study_app.protocol.scene_file import scene_text
+from study_app.protocol.file_format.scene_file import scene_text
 from tests.haptics.scenes import EVERYTHING, Hand, liquid, scene, stroke
 
 TICKS = 3000

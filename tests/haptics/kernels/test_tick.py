@@ -4,7 +4,7 @@ from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 
 from study_app.haptics.kernels.safety import new_safety
-from study_app.haptics.kernels.tick import tick
+from study_app.haptics.kernels.tick import compute_tick
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Box, Scene
@@ -57,7 +57,7 @@ def run(model, safety, sample, positions_m, ticks):
         sample.fresh = k % 7 != 0
         for axis in range(3):
             sample.position_m[axis] = positions_m[k % len(positions_m), axis]
-        tick(model, safety, sample)
+        compute_tick(model, safety, sample)
 
 
 @pytest.mark.slow

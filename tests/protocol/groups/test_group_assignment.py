@@ -4,10 +4,10 @@ import pytest
 
 from study_app.analysis.planning.preregistration import preregistration
 from study_app.errors import ProtocolError
-from study_app.protocol.describe import describe
-from study_app.protocol.groups import next_group
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balances, numbered_participants
+from study_app.protocol.participants.groups import next_group
 from study_app.protocol.warnings.study_warnings import warnings
 from tests.protocol.groups.grouped import grouped
 

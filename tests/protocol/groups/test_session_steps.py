@@ -5,14 +5,14 @@ from collections import Counter
 import pytest
 
 from study_app.errors import StudyError
-from study_app.protocol.groups import check_session_number, every_step, steps_of
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balances, numbered_participants
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, own_protocol, variants
 from study_app.protocol.orders.schedule import build_schedule, draw_key
-from study_app.protocol.streams import group_of, stream
+from study_app.protocol.participants.groups import check_session_number, every_step, steps_of
+from study_app.protocol.randomization.streams import group_of, stream
 from tests.protocol.groups.grouped import grouped
 
 SESSIONS = 'sequences = [["hello", "thin"], ["thick", "thin", "end"]]\n'

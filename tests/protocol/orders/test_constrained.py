@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.sequences import (
+from study_app.protocol.randomization.sequences import (
     PROPOSALS,
     Constraint,
     draw_order,
@@ -14,7 +14,7 @@ from study_app.protocol.sequences import (
     propose_order,
     shortest_distance,
 )
-from study_app.protocol.streams import stream
+from study_app.protocol.randomization.streams import stream
 
 Order = tuple[int, ...]
 

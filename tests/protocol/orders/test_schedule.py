@@ -10,7 +10,7 @@ from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.schedule import PageStep, Schedule, Trial, build_schedule, draw_key, stream
-from study_app.protocol.sequences import (
+from study_app.protocol.randomization.sequences import (
     Constraint,
     Square,
     assigned_row,
@@ -19,7 +19,7 @@ from study_app.protocol.sequences import (
     row,
     row_count,
 )
-from study_app.protocol.streams import shuffle
+from study_app.protocol.randomization.streams import shuffle
 from tests.protocol.sound import ORDER, SOUND
 
 REK = load("rek2024")

@@ -3,9 +3,9 @@
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
+from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.presented.presentation import Presentation, next_level, trial_result
-from study_app.protocol.streams import Key, stream
-from study_app.protocol.tracks import design_of
+from study_app.protocol.randomization.streams import Key, stream
 from study_app.protocol.trials.methods import TrialResult
 from tests.protocol.edited_studies import text_of as text_of_study
 

@@ -5,8 +5,8 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.presented.presentation import next_level
-from study_app.protocol.tracks import design_of
 from study_app.protocol.trials.methods import TrialResult
 from tests.protocol.trials.level_studies import key_of, study
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from study_app.protocol.tracks import method_of
+from study_app.protocol.orders.tracks import method_of
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.protocol.trials.matching import matching

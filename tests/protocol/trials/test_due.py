@@ -3,9 +3,9 @@ from collections import Counter
 import pytest
 
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.presented.presentation import longest_delay_s, next_level
-from study_app.protocol.streams import Key, shuffle, stream
-from study_app.protocol.tracks import design_of
+from study_app.protocol.randomization.streams import Key, shuffle, stream
 from tests.protocol.trials.level_studies import SECRET, answered, key_of, run, study
 
 

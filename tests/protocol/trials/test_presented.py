@@ -10,8 +10,8 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.orders.tracks import adjusting_of, design_of, tracks_of
 from study_app.protocol.presented.presentation import arrangement_text, next_level, trial_result
-from study_app.protocol.tracks import adjusting_of, design_of, tracks_of
 from study_app.protocol.trials.methods import TrialResult
 from tests.golden import compare
 from tests.golden_values import one_line

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from study_app.protocol.trials.designs import KINDS as DESIGN_KINDS
-from study_app.protocol.trials.designs import Design, Rated, default_design
+from study_app.protocol.trials.designs import DESIGN_KINDS, Design, Rated, default_design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.protocol.trials.tasks import Follow
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.tracks import success_name
+from study_app.protocol.orders.tracks import success_name
 from study_app.protocol.trials.designs import default_design
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from study_app.haptics.model.scene import PROMPT_LINK, ForceLink
 from study_app.protocol.checks.force_limits import longest_delay_ms, returned_j
-from study_app.protocol.describe import describe
+from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import has_imperfect_link, link_seed, scene_of

@@ -182,7 +182,7 @@ def test_a_session_is_replayed_with_the_model_that_its_receipt_records(
         "kind": "kalman"
     }
     monkeypatch.setattr(gate, "_budget_n", lambda _scene, total_n: 0.9 * total_n)
-    monkeypatch.setattr("study_app.protocol.formats.ESTIMATOR", "ewma")
+    monkeypatch.setattr("study_app.protocol.file_format.formats.ESTIMATOR", "ewma")
     comes_out(place, 4)
     monkeypatch.setattr(replay_module, "recorded_protocol", lambda protocol, _receipt, _key: protocol)
     assert replay(place).differences

@@ -13,8 +13,8 @@ from study_app.gui.operator.operator_view import Session, operator_view, stages
 from study_app.gui.operator.servo_health import Vitals
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
+from study_app.protocol.randomization.streams import stream
 from study_app.protocol.simulated import NO_FEATURES, Comparison
-from study_app.protocol.streams import stream
 from study_app.session.simulated.rehearsal import RehearsedSession, rehearse
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import open_or_draw_key, read_key

@@ -10,8 +10,8 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial
 from study_app.protocol.presented.presentation import next_level
+from study_app.protocol.randomization.streams import Key
 from study_app.protocol.source.files import source_bytes
-from study_app.protocol.streams import Key
 from study_app.session.resume import Start, resume_at
 from study_app.session.simulated.answers_only import begin_session_at_step
 from study_app.session.transitions.page_builder import preview

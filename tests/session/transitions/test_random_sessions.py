@@ -14,7 +14,7 @@ from study_app.errors import SessionError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule, draw_key, stream
-from study_app.protocol.tracks import design_of
+from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import FIRST

@@ -9,7 +9,7 @@ from study_app.errors import SessionError
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.table import text_in
+from study_app.protocol.source.table import text_in
 from study_app.session.pages import EndPage, TroublePage
 from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (

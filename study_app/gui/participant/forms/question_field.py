@@ -32,7 +32,7 @@ from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.widgets.accessible import announce, give_role
 from study_app.gui.widgets.boxes import grid
 from study_app.protocol.questions import ItemView, Value
-from study_app.protocol.wording.languages import Words
+from study_app.protocol.wording import Words
 
 if TYPE_CHECKING:
     Widget = QWidget

@@ -18,7 +18,7 @@ from study_app.gui.participant.pages.page_widget import PageContext, page_painte
 from study_app.gui.theme.theme import PARTICIPANT, font
 from study_app.gui.widgets.boxes import add_layout
 from study_app.protocol.questions import ItemView
-from study_app.protocol.wording.languages import Words
+from study_app.protocol.wording import Words
 from study_app.session.pages import QuestionnairePage
 
 _LEAST_CELL = 44.0

@@ -37,8 +37,8 @@ from study_app.protocol.questions import (
     Value,
     plain_number,
 )
-from study_app.protocol.table import UNPRINTABLE, characters
-from study_app.protocol.wording.languages import Words
+from study_app.protocol.source import UNPRINTABLE, characters
+from study_app.protocol.wording import Words
 
 _SHORT = 12  # letters of options of which three stand side by side
 _MEDIUM = 28  # of which two do

@@ -29,7 +29,7 @@ from study_app.gui.theme.themed import remove_widget
 from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, announce, give_role
 from study_app.gui.widgets.boxes import STRETCH, hbox, vbox
 from study_app.protocol.questions import ItemView, shown_questions
-from study_app.protocol.wording.languages import Words
+from study_app.protocol.wording import Words
 from study_app.session.pages import QuestionnairePage
 from study_app.session.transitions.events import Chosen, ItemShown, Retracted, Submitted
 

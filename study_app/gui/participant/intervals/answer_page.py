@@ -24,7 +24,7 @@ from study_app.gui.widgets.accessible import HeadingLabel, PlainLabel, announce,
 from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
 from study_app.gui.widgets.numbers import read_number
 from study_app.protocol.questions import Value, plain_number
-from study_app.protocol.wording.languages import Words
+from study_app.protocol.wording import Words
 from study_app.session.pages import ChoicePage, DesignPage, FeedbackPage, Interval, NumberPage, TaskPage
 from study_app.session.transitions.events import STEP_S, Chosen, ItemShown, Stepped, Submitted
 

@@ -29,7 +29,7 @@ from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, font
 from study_app.gui.widgets.accessible import button_text
 from study_app.gui.widgets.boxes import grid
 from study_app.gui.widgets.cards import fill_rounded
-from study_app.protocol.wording.languages import Words, words
+from study_app.protocol.wording import Words, words
 from study_app.session.pages import Progress
 
 if TYPE_CHECKING:

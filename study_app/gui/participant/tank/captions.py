@@ -18,7 +18,7 @@ from study_app.gui.participant.pages.page_widget import (
 )
 from study_app.gui.participant.tank.frame import Placed, TaskShown
 from study_app.gui.theme.theme import PARTICIPANT, font
-from study_app.protocol.wording.languages import Words
+from study_app.protocol.wording import Words
 from study_app.session.pages import TaskPage
 
 _DESIGNED_FOR = (1920, 1080)

@@ -6,7 +6,7 @@ import pytest
 from study_app.evidence.cfd import fits, stored_flows
 from study_app.evidence.reference_model import unsteady_n
 from study_app.evidence.reference_solutions import oscillation_truth, starting_truth
-from study_app.evidence.stability.stability_cases import parse
+from study_app.evidence.stability.stability_cases import parse_case
 from study_app.evidence.stability.verdict import judge
 from study_app.haptics.kernels.effects.unsteady_drag import RATES_PER_S, WEIGHTS_RPS
 from study_app.haptics.model.estimators import Kalman
@@ -152,7 +152,7 @@ def test_after_a_stop_the_slope_limit_leaves_the_force_as_it_is():
     ],
 )
 def test_late_drag_leaves_closed_loops_stable(line):
-    assert not judge(parse(line), safe=True).reasons
+    assert not judge(parse_case(line), safe=True).reasons
 
 
 def test_added_mass_and_history_keep_the_stable_share_of_their_own_effects():

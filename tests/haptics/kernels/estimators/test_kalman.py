@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from study_app.evidence.stability.damping_limits import boundary_nspm
-from study_app.evidence.stability.withheld_force import measure
+from study_app.evidence.stability.withheld_force import measure_withheld_force
 from study_app.haptics.kernels import estimators as kalman
 from study_app.haptics.kernels.safety import new_safety
 from study_app.haptics.model.device_dynamics import Dynamics
@@ -122,7 +122,7 @@ def test_the_limit_holds_where_the_delay_is_wrong_by_one():
 @compiled
 def test_a_motion_that_breaks_off_leaves_no_liquid_weak():
     """The imposed stroke of 8 Hz goes over into slow stirring from one sample to the next, at 0.5 m/s."""
-    for found in measure(["honey"], ["kalman"]):
+    for found in measure_withheld_force(["honey"], ["kalman"]):
         assert found.lasting < 0.005
         assert found.quick < 0.02
 

@@ -5,7 +5,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from study_app.protocol.streams import Draw
+from study_app.protocol.randomization.streams import Draw
 from study_app.protocol.trials.methods import Method, TrackSetting, TrialResult
 from study_app.protocol.trials.stimuli import Stimulus
 

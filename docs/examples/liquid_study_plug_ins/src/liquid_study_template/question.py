@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from pydantic import Field
 
 from study_app.protocol.questions import Context, Draw, ItemView, Question, Value, ValueType
-from study_app.protocol.table import Localised
+from study_app.protocol.source.table import Localised
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,7 +6,7 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Localised
+from study_app.protocol.source.table import Localised
 from study_app.protocol.trials.tasks import Point, Stroke, Task
 
 

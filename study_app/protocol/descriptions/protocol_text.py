@@ -12,18 +12,11 @@ from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slope_limit, steady_force
 from study_app.number_text import counted
-from study_app.protocol.groups import sessions_differ
 from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.balance import block_order_words, planned_participants
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
-from study_app.protocol.presented.presentation import link_descriptions
-from study_app.protocol.presented.presented_levels import FASTER, highest_damping
-from study_app.protocol.quantities import liquid_words, quantity
-from study_app.protocol.questionnaires import instrument
-from study_app.protocol.questions import Context, Question
-from study_app.protocol.sequences import row_count
-from study_app.protocol.tracks import (
+from study_app.protocol.orders.tracks import (
     condition_of,
     design_of,
     has_correct_answer,
@@ -33,6 +26,13 @@ from study_app.protocol.tracks import (
     success_name,
     tracks_of,
 )
+from study_app.protocol.participants.groups import sessions_differ
+from study_app.protocol.presented.presentation import link_descriptions
+from study_app.protocol.presented.presented_levels import FASTER, highest_damping
+from study_app.protocol.quantities import liquid_words, quantity
+from study_app.protocol.questionnaires import instrument
+from study_app.protocol.questions import Context, Question
+from study_app.protocol.randomization.sequences import row_count
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import DELAY, DELAYS, OF_CONDITION, OF_LINK
 from study_app.protocol.trials.tasks import Follow

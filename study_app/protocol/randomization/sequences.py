@@ -44,7 +44,7 @@ from fractions import Fraction
 from typing import Literal, TypeAlias, TypeVar
 
 from study_app.number_text import counted
-from study_app.protocol.streams import Draw, shuffle, study_stream
+from study_app.protocol.randomization.streams import Draw, shuffle, study_stream
 
 
 @dataclass(frozen=True, slots=True)

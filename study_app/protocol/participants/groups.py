@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from study_app.errors import StudyError
 from study_app.haptics.model.ranges import later, within
 from study_app.protocol.source.document import Path, entries
-from study_app.protocol.table import Id, Table, invalid
+from study_app.protocol.source.table import Id, Table, invalid
 
 GroupAssignment: TypeAlias = Literal["randomised", "pre-existing"]
 ASSIGNMENT: Final = ("study", "group_assignment")

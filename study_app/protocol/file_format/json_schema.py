@@ -16,7 +16,7 @@ from pydantic_core import to_jsonable_python
 
 from study_app.documentation import anchor_of
 from study_app.number_text import counted
-from study_app.protocol.formats import relax_schema
+from study_app.protocol.file_format.formats import relax_schema
 from study_app.protocol.model import Protocol
 
 _LIQUID_FILE = (

@@ -17,7 +17,7 @@ from typing import Annotated, Final
 from pydantic import Field
 
 from study_app.haptics.model.ranges import within
-from study_app.protocol.table import Table
+from study_app.protocol.source.table import Table
 
 LAPSE_POINTS: Final = 3.0
 """An answer given in error is so many points higher than the answer model says. [choice]"""

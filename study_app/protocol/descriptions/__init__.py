@@ -1,0 +1,14 @@
+"""A protocol in words, and how one protocol differs from another."""
+
+from study_app.protocol.descriptions.protocol_differences import CONDITIONS_DIFFER, differences, document_differences
+from study_app.protocol.descriptions.protocol_text import describe, describe_scenes, limit_rows, number_range
+
+__all__ = [
+    "CONDITIONS_DIFFER",
+    "describe",
+    "describe_scenes",
+    "differences",
+    "document_differences",
+    "limit_rows",
+    "number_range",
+]
