@@ -10,11 +10,12 @@ import numpy as np
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.evaluate import evaluate
 from study_app.analysis.findings import all_findings
+from study_app.analysis.page_layout import draw_figures
 from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import first_page
 from study_app.analysis.report.methods import methods
 from study_app.analysis.report.sections import answers, block
-from study_app.analysis.report.study_figures import pictures
+from study_app.analysis.report.study_figures import block_figure_tasks
 from study_app.analysis.report.write_report import as_json_types, tests_csv
 from study_app.analysis.results import Failures, Results
 from tests.analysis.made_up import DECIDED, ITEMS, Presented, delays, liquids, study
@@ -53,7 +54,7 @@ def keeps_contract(made: Study, forms: Sequence[str] = ()) -> Results:
     assert results.failures == ()
     json.dumps(as_json_types(results), allow_nan=False)
     failures = Failures()
-    figures = list(pictures(made, results, forms, failures)) if forms else []
+    figures = list(draw_figures(block_figure_tasks(made, results, forms), failures)) if forms else []
     texts = [methods(made, results), *sections.limits(made, results)]
     page = first_page(results, sections.limits(made, results))
     texts.append(seen(re.sub(r'src="[^"]*"', 'src="#part-"', page)))

@@ -75,9 +75,9 @@ class Card:
     def figure_of(self, drawn: Sequence[Picture]) -> Picture | None:
         """Return the figure that shows the answer; None if there is none."""
         for name in self.figures:
-            for one in drawn:
-                if one.name == name or (one.block == self.block and one.name.partition("-")[0] == name):
-                    return one
+            for figure in drawn:
+                if figure.name == name or (figure.block == self.block and figure.name.partition("-")[0] == name):
+                    return figure
         return None
 
 
@@ -100,8 +100,8 @@ def presented_in(study: Study) -> dict[str, Presented]:
         details.append("no visual delay" if delays == [0.0] else delay)
         design = f" ({block.design.paper_name}{_trials(study, block)})" if isinstance(block, LevelBlock) else ""
         by_condition: dict[str, list[Setting]] = {"": conditions}
-        for one in conditions:
-            by_condition.setdefault(one.condition or "", []).append(one)
+        for condition in conditions:
+            by_condition.setdefault(condition.condition or "", []).append(condition)
         presented[block.id] = Presented(
             f"In the block “{block.title}”{design}, the liquid{'s were' if len(liquids) > 1 else ' was'} "
             f"{listed(liquids)}{f', with {listed(details)}' if details else ''}"
@@ -122,7 +122,11 @@ def _trials(study: Study, block: LevelBlock) -> str:
 
 
 def _liquids(conditions: Sequence[Setting]) -> list[str]:
-    return [f"“{liquid.replace('_', ' ')}”" for liquid in dict.fromkeys(one.liquid for one in conditions) if liquid]
+    return [
+        f"“{liquid.replace('_', ' ')}”"
+        for liquid in dict.fromkeys(condition.liquid for condition in conditions)
+        if liquid
+    ]
 
 
 def _delays(conditions: Sequence[Setting]) -> list[float]:
@@ -130,7 +134,7 @@ def _delays(conditions: Sequence[Setting]) -> list[float]:
 
 
 def _displays(conditions: Sequence[Setting]) -> list[str]:
-    return list(dict.fromkeys(words for one in conditions for words in (one.link, one.view) if words))
+    return list(dict.fromkeys(words for condition in conditions for words in (condition.link, condition.view) if words))
 
 
 def _presented_words(conditions: Sequence[Setting]) -> tuple[str, ...]:
@@ -239,7 +243,7 @@ def _scale_words(contrast: ContrastResult, results: Results, numbers: Mapping[st
         return f" Values are in {level.unit}." if level.unit else ""
     if level is not None and of.measure == "d_prime":
         return " At chance, d′ is 0."
-    bounds = [one.bounds for one in numbers.get(of.form or "", ()) if one.id == of.measure]
+    bounds = [scale.bounds for scale in numbers.get(of.form or "", ()) if scale.id == of.measure]
     if bounds and bounds[0] is not None:
         return " The scale ranges from {:g} to {:g}.".format(*bounds[0])
     return ""
@@ -324,15 +328,19 @@ def _estimate_words(result: LevelsResult, group: Sequence[Any], attribute: str, 
     of_level, is_weber = attribute in ("threshold", "pse"), result.level_kind == "weber"
     before = "a Weber fraction of " if of_level and is_weber else ""
     after = f" {result.unit}" if of_level and not is_weber and result.unit else ""
-    for one in group:
-        place = place_of(one)
+    for estimate in group:
+        place = place_of(estimate)
         where = "" if place is None or len(group) == 1 else f" for {str(place).replace('_', ' ')}"
         if isinstance(place, float) and len(group) > 1:
             unit = "" if result.level_kind == "weber" and attribute == "value" else result.unit or ""
             where = f" at {place:g} {unit}".rstrip()
-        ends = "no interval" if None in (one.low, one.high) else f"95 % interval {_ends(one.low, one.high)}"
-        people = f"n = {getattr(one, 'participants', one.n)}"
-        value = f"{before}{significant(getattr(one, attribute))}{after}"
+        ends = (
+            "no interval"
+            if None in (estimate.low, estimate.high)
+            else f"95 % interval {_ends(estimate.low, estimate.high)}"
+        )
+        people = f"n = {getattr(estimate, 'participants', estimate.n)}"
+        value = f"{before}{significant(getattr(estimate, attribute))}{after}"
         yield f"The mean {words}{where} was {value} ({ends}, {people})."
 
 
@@ -349,15 +357,15 @@ def _questions(
     """
     levels, scores = {level.block for level in results.levels}, {score.where for score in results.scores}
     asked_at = [result for result in results.questions if result.where not in levels]
-    in_order = sorted(asked_at, key=lambda one: one.is_form + (one.is_form and one.where not in scores))
+    in_order = sorted(asked_at, key=lambda result: result.is_form + (result.is_form and result.where not in scores))
     for where in dict.fromkeys(result.where for result in in_order):
         asked = [result for result in results.questions if result.where == where and result.n]
-        numbers = [one for one in numbers_at.get(where, ()) if not _is_in_hypotheses(one, where, results)]
+        numbers = [entry for entry in numbers_at.get(where, ()) if not _is_in_hypotheses(entry, where, results)]
         if not asked:
             continue
         sentences = [
-            _number_words(one, presented if place == 0 else _NOT_PRESENTED)
-            for place, one in enumerate(numbers[:MOST_PANELS])
+            _number_words(entry, presented if place == 0 else _NOT_PRESENTED)
+            for place, entry in enumerate(numbers[:MOST_PANELS])
         ]
         chosen = [result for result in asked if result.measure == "counts"]
         sentences += [_choice_words(result) for result in chosen]
@@ -371,15 +379,23 @@ def _questions(
                     *([f"answers-{where}"] if numbers else ()),
                     *(f"question-{where}-{result.item}" for result in chosen),
                 ),
-                is_small=asked[0].is_form or all(len(one.by_setting) < 2 for one in numbers),
+                is_small=asked[0].is_form or all(len(entry.by_setting) < 2 for entry in numbers),
             )
 
 
 def _is_in_hypotheses(numbers: Numbers, where: str, results: Results) -> bool:
     """Return whether hypotheses show a number of a form after all blocks, and for all its participants."""
-    shown = [one for one in results.contrasts if (one.contrast.form, one.contrast.measure) == (where, numbers.id)]
-    blocks = {block for one in shown for block in one.contrast.blocks}
-    people = {who for one in shown for who in (*one.left_out, *(who for side in one.sides for who in side.values))}
+    shown = [
+        contrast
+        for contrast in results.contrasts
+        if (contrast.contrast.form, contrast.contrast.measure) == (where, numbers.id)
+    ]
+    blocks = {block for contrast in shown for block in contrast.contrast.blocks}
+    people = {
+        who
+        for contrast in shown
+        for who in (*contrast.left_out, *(who for side in contrast.sides for who in side.values))
+    }
     held = {who for _, values in numbers.by_setting for who in values}
     return bool(shown) and blocks >= {*numbers.codes} and people >= held
 

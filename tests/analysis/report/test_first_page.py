@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import binom
 
@@ -150,13 +151,25 @@ def test_the_page_says_what_each_block_presented() -> None:
         ),
         replace(late, id="e", settings=(Setting(code="L1"),)),
     ]
-    study: Any = SimpleNamespace(blocks=(), levels=blocks)
+    had = [*["late"] * 3, *["b"] * 2, "c"], [*["late"] * 3, *["b"] * 4, "c", "late"]
+    trials = pd.DataFrame(
+        [(who, block) for who, of in enumerate(had) for block in of], columns=["participant", "block"]
+    )
+    trials["counted"] = trials.index < len(trials) - 1
+    study: Any = SimpleNamespace(blocks=(), levels=blocks, trials=trials)
     assert {block: presented.sentence for block, presented in presented_in(study).items()} == {
         "late": (
-            "In the block “Liquids late” (ABX), the liquids were “slime” and “gear oil”, with a visual delay of 73 ms."
+            "In the block “Liquids late” (ABX, 3 trials per participant), the liquids were “slime” and “gear oil”, "
+            "with a visual delay of 73 ms."
         ),
-        "b": "In the block “Liquids late” (ABX), the liquid was “slime”, with visual delays of 0 and 41 ms.",
-        "c": "In the block “On time” (ABX), the liquid was “slime”, with no visual delay, force 20 ms late.",
+        "b": (
+            "In the block “Liquids late” (ABX, 2 to 4 trials per participant), the liquid was “slime”, with visual "
+            "delays of 0 and 41 ms."
+        ),
+        "c": (
+            "In the block “On time” (ABX, 1 trial per participant), the liquid was “slime”, with no visual delay, "
+            "force 20 ms late."
+        ),
         "d": (
             "In the block “Liquids late” (two-interval forced choice), the liquid was “slime”, with a varied visual "
             "delay."
