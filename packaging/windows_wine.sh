@@ -51,8 +51,12 @@ linux_study() {
         LIQUID_STUDY_WORKSPACE=$folder/linux QT_QPA_PLATFORM=offscreen "$here/.venv/bin/python" -m study_app "$@" 2>&1
 }
 
-# End all programs of this prefix, and the screen: what is left would draw on a screen that no longer exists.
-end_programs() { (cd "$folder" && wine /usr/lib/wine/wineserver -k) 2>/dev/null || true; }
+# End all programs of both prefixes: what is left would draw on a screen that no longer exists.
+end_programs() {
+    for name in prefix fresh; do
+        if [ -e "$folder/$name" ]; then (cd "$folder" && WINEPREFIX=$folder/$name wine /usr/lib/wine/wineserver -k) || true; fi
+    done 2>/dev/null
+}
 trap 'end_programs; kill "${server:-}" 2>/dev/null || true' EXIT
 
 # make_prefix NAME: make an empty Windows in this folder.

@@ -1,9 +1,11 @@
 """Tasks that this process shares with a copy of itself."""
 
 import multiprocessing
+import signal
 import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator, MutableSequence, Sequence
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Generic, TypeVar
 
@@ -28,11 +30,11 @@ class SharedTasks(Generic[Result]):
             # Without a lock: if both processes begin a task at the same moment, both compute the same result.
             self._begun = context.RawArray("b", len(tasks))
             self._other_results, sender = context.Pipe(duplex=False)
-            self._process = context.Process(target=self._send_results, args=(sender,), daemon=True)
+            self._process = context.Process(target=self._send_results, args=(self._other_results, sender), daemon=True)
             self._process.start()
             sender.close()
 
-    def results(self, tell: Callable[[Result], object] = bool) -> list[Result]:
+    def results(self, tell: Callable[[Result], object] | None = None) -> list[Result]:
         """Compute the remaining tasks, and return all results in the order of the tasks.
 
         ``tell`` is called with each result that is computed in this process.
@@ -42,21 +44,28 @@ class SharedTasks(Generic[Result]):
         def compute(indices: Iterable[int]) -> None:
             for index in indices:
                 computed[index] = self._tasks[index]()
-                tell(computed[index])
+                if tell is not None:
+                    tell(computed[index])
 
-        compute(self._not_begun(range(len(self._tasks))))
-        if self._other_results is not None:
-            try:
-                computed |= self._other_results.recv()
-            except (EOFError, OSError):
-                compute(index for index in range(len(self._tasks)) if index not in computed)
-            finally:
+        try:
+            compute(self._not_begun(range(len(self._tasks))))
+            if self._other_results is not None:
+                with suppress(EOFError, OSError):
+                    computed |= self._other_results.recv()
+            compute(index for index in range(len(self._tasks)) if index not in computed)
+        finally:
+            if self._other_results is not None:
                 self._other_results.close()
+                self._process.terminate()
                 self._process.join()
         return [computed[index] for index in range(len(self._tasks))]
 
-    def _send_results(self, sender: Connection) -> None:
-        sender.send({index: self._tasks[index]() for index in self._not_begun(reversed(range(len(self._tasks))))})
+    def _send_results(self, receiver: Connection, sender: Connection) -> None:
+        receiver.close()  # sending fails once the other process has ended
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl+C ends the other process, which ends this one
+        computed = {index: self._tasks[index]() for index in self._not_begun(reversed(range(len(self._tasks))))}
+        with suppress(BrokenPipeError):
+            sender.send(computed)
 
     def _not_begun(self, indices: Iterable[int]) -> Iterator[int]:
         for index in indices:

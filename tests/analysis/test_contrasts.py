@@ -119,9 +119,7 @@ def test_two_thresholds_are_compared_once_the_key_is_open(delayed: Path, tmp_pat
     standard = (
         "the liquid was “damper”, with varied damping at the hand (standard: 8 N·s/m) and a visual delay of 60 ms."
     )
-    counted = study.trials[study.trials["counted"] & (study.trials["block"] == "late")].groupby("participant").size()
-    trials = f"{counted.iloc[0]} trials" if counted.nunique() == 1 else f"{counted.min()} to {counted.max()} trials"
-    assert f"In the block “Late” (two-interval forced choice, {trials} per participant), {standard}" in first
+    assert f"In the block “Late” (two-interval forced choice, 20 trials per participant), {standard}" in first
     apart = "Late (60 ms of visual delay) than in Prompt (no visual delay)"
     asked = f"Threshold is higher in {apart}, with an equivalence bound of 1.25"
     assert first.index(asked) < first.index("Prompt: ")

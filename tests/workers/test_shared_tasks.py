@@ -2,10 +2,12 @@ import os
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from study_app.workers.shared_tasks import SharedTasks
+from tests.haptics.running import wait_until
 
 only_linux = pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks")
 
@@ -30,12 +32,39 @@ def test_two_processes_share_the_tasks_and_results_keep_their_order(without_othe
 
 
 @only_linux
-def test_what_a_dying_process_leaves_is_computed_here(without_other_threads: None) -> None:
-    here = os.getpid()
-    tasks = [lambda number=number: number if os.getpid() == here else os._exit(9) for number in range(3)]
-    shared = SharedTasks(tasks)
-    time.sleep(0.2)  # the other process has begun the last task
+def test_what_a_dying_process_leaves_is_computed_here(without_other_threads: None, tmp_path: Path) -> None:
+    here, died = os.getpid(), tmp_path / "died"
+
+    def compute(number: int) -> int:
+        if os.getpid() != here:
+            died.touch()
+            os._exit(9)
+        return number
+
+    shared = SharedTasks([lambda number=number: compute(number) for number in range(3)])
+    wait_until(died.exists)
     assert shared.results() == [0, 1, 2]
+
+
+@only_linux
+def test_an_exception_here_ends_the_other_process(without_other_threads: None, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    here = os.getpid()
+
+    def compute() -> None:
+        if os.getpid() != here:
+            other.write_text(f"{os.getpid()}", "ascii")
+            time.sleep(60)
+
+    def stop(_: None) -> None:
+        raise InterruptedError
+
+    shared = SharedTasks([compute, compute])
+    wait_until(lambda: other.exists() and other.read_text("ascii"))
+    with pytest.raises(InterruptedError):
+        shared.results(stop)
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(other.read_text("ascii")), 0)
 
 
 def test_a_program_with_threads_is_not_forked() -> None:

@@ -255,7 +255,8 @@ class ContrastsWithControl(Finding[tuple[ContrastWithControl, ...]]):
             yield (
                 f"{lead}: to show that a mean answer stays within {bound_text(first.bound)} of that at {control}, a "
                 f"study needs {min_sample_reason(first.alpha, first.bound)}. This study has "
-                f"{counted(result.n, 'participant')}, so it can show only that a mean answer differs by more."
+                f"{counted(result.n, 'participant')}"
+                f"{', so it can show only that a mean answer differs by more' if result.n > 1 else ''}."
             )
         open_ones = sum(tested.verdict in ("inconclusive", "out of reach") for tested in against)
         if open_ones:

@@ -666,8 +666,8 @@ class Thresholds(LevelStatistic[ThresholdEstimate]):
         ]:
             yield (
                 f"{self.found.title}: the answers do not rule out a mean lapse rate of {100 * MANY_LAPSES:g} %, at "
-                f"which the group's threshold would be {listed(thresholds)}. More catch trials far above the "
-                "threshold would provide a better estimate of the lapse rate."
+                f"which the group's threshold would be {listed(thresholds)}. The more catch trials far above the "
+                "threshold a block has, the better the lapse rate can be estimated."
             )
 
     def _limit_of_device(self) -> str:

@@ -99,7 +99,7 @@ def presented_in(study: Study) -> dict[str, Presented]:
             details.append(f"varied {quantity_words(stimulus.vary)}{_standards(block)}")
         details.append("no visual delay" if delays == [0.0] else delay)
         design = f" ({block.design.paper_name}{_trials(study, block)})" if isinstance(block, LevelBlock) else ""
-        by_condition: dict[str, list[Setting]] = {"": conditions}
+        by_condition: dict[str, list[Setting]] = {"": [*conditions]}
         for condition in conditions:
             by_condition.setdefault(condition.condition or "", []).append(condition)
         presented[block.id] = Presented(
@@ -162,9 +162,10 @@ def _told_apart(names: Sequence[str], presented: Sequence[tuple[str, ...]]) -> l
 def _is_said(part: str, name: str) -> bool:
     """Return whether a name says a liquid or delay: "60 ms late" says "60 ms of visual delay"."""
     if part == "no visual delay":
-        return re.search(r"\b(no|without|zero)\b.*\b(delay|latency|lag)|\b0 ms", name, re.IGNORECASE) is not None
-    said = part.removesuffix(" ms of visual delay").strip("“”")
-    return re.search(rf"\b{re.escape(said)}\b", name, re.IGNORECASE) is not None
+        said = r"\b(no|without|zero)\b.*\b(delay|latency|lag)\b|(?<![\d.])0 ms\b"
+    else:
+        said = rf"(?<![\w.]){re.escape(part.removesuffix(' of visual delay').strip('“”'))}\b"
+    return re.search(said, name, re.IGNORECASE) is not None
 
 
 def _standards(block: Block | LevelBlock) -> str:
@@ -235,10 +236,13 @@ def _question_words(contrast: ContrastResult, presented: Mapping[str, Presented]
 def _scale_words(contrast: ContrastResult, results: Results, numbers: Mapping[str, Sequence[Numbers]]) -> str:
     """Return a sentence on the unit or scale of the compared values, with a leading space; "" if there is none."""
     of = contrast.contrast
-    level = next((level for level in results.levels if level.block == of.blocks[0]), None)
+    levels = [level for level in results.levels if level.block in of.blocks]
+    level = levels[0] if levels else None
     if level is not None and of.measure in RATIOS:
         if level.level_kind == "weber":
-            at = "" if level.guess_rate is None else f" at {50 * (1 + level.guess_rate):.3g} % {level.counts}"
+            criteria = {(level.guess_rate, level.counts) for level in levels}
+            rate = level.guess_rate if len(criteria) == 1 else None
+            at = "" if rate is None else f" at {50 * (1 + rate):.3g} % {level.counts}"
             return f" Values are Weber fractions{at}; lower values mean better discrimination."
         return f" Values are in {level.unit}." if level.unit else ""
     if level is not None and of.measure == "d_prime":
@@ -389,6 +393,7 @@ def _is_in_hypotheses(numbers: Numbers, where: str, results: Results) -> bool:
         contrast
         for contrast in results.contrasts
         if (contrast.contrast.form, contrast.contrast.measure) == (where, numbers.id)
+        and any(side.values for side in contrast.sides)
     ]
     blocks = {block for contrast in shown for block in contrast.contrast.blocks}
     people = {
@@ -521,7 +526,7 @@ def _limits_by_subject(limits: Sequence[str], results: Results) -> list[tuple[st
     subjects = [*blocks, *(level.title for level in results.levels), "Hypothesis", *hypotheses]
     alike: dict[str, list[tuple[str, str]]] = {}
     for line in limits:
-        subject = next((subject for subject in subjects if line.startswith(f"{subject}: ")), "")
+        subject = max((subject for subject in subjects if line.startswith(f"{subject}: ")), key=len, default="")
         words = line.removeprefix(f"{subject}: ") if subject else line
         some = _IN_PARENTHESES.search(words) if subject else None
         alike.setdefault(words[: some.start()] if some else words, []).append((subject, some[1] if some else ""))

@@ -185,6 +185,7 @@ _OF_DELAYS = (("“oil”", "60 ms of visual delay", ""), ("“oil”", "no visu
     [
         (("Late", "160 ms"), _OF_DELAYS, [" (60 ms of visual delay)", " (no visual delay)"]),
         (("Oil 60 ms late", "Without delay"), _OF_DELAYS, ["", ""]),
+        (("60 g", "1.0 ms late"), _OF_DELAYS, [" (60 ms of visual delay)", " (no visual delay)"]),
         (("A", "Water"), (("“oil”", "", "force 9 ms late"), ("“water”", "", "")), [" (“oil”, force 9 ms late)", ""]),
         (("Sealed", "Late"), ((), _OF_DELAYS[0]), ["", ""]),
     ],
