@@ -327,7 +327,7 @@ def report_files(study: Study, progress: Progress = report_no_progress) -> tuple
         files |= {} if content is None else {file: content}
     files |= failures.value("exported tables", lambda: table_files(study, exported_tables(study)), {})
     progress("drawing", 0.8)
-    figures = figure_tasks.results(lambda _: progress("drawing", 0.9))
+    figures = figure_tasks.results()
     failures.found += [figure for figure in figures if isinstance(figure, Failure)]
     drawn = [figure for figure in figures if isinstance(figure, Picture)]
     for picture in drawn:

@@ -233,7 +233,7 @@ def releases(engine: _Engine, motion: Motion, delays: Sequence[int] = DELAYS) ->
     return Releases(motion.notes["liquid"], given_j, borne)
 
 
-def measure_model(
+def measure(
     engine: _Engine,
     over: Sequence[Motion],
     delays: Sequence[int] = DELAYS,
@@ -390,7 +390,7 @@ def main(words: Sequence[str] | None = None) -> int:
     try:
         with _engine_of(asked.program, asked.function) as engine:
             over = motions(only=asked.only)
-            scores, let = measure_model(engine, over, DELAYS, lambda line: print(line, "...", file=sys.stderr))  # noqa: T201
+            scores, let = measure(engine, over, DELAYS, lambda line: print(line, "...", file=sys.stderr))  # noqa: T201
     except _EngineError as error:
         print(f"score: {error}", file=sys.stderr)  # noqa: T201
         return 2

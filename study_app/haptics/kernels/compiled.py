@@ -54,7 +54,7 @@ PROCESSORS: Final = (_X86_64_V3 if get_default_triple().startswith("x86_64") els
 _KEPT_FOLDERS = 8  # caches kept at any age
 _UNUSED_S = 86_400.0  # a program that started less than a day ago keeps its cache
 _SWEPT_AT_ONCE = 8  # removals per start, which they delay
-_COMPILES = (b"compiled import", b"import compiled", b"import numba")
+_COMPILES = (b"compiled import", b"import compiled", b"import numba", b"haptics.kernels import")
 _IMPORTS = re.compile(r"from study_app\.([\w.]+) import \(?((?<=\()[^)]*|[^\n]*)")
 _DIGEST = re.compile(r"[0-9a-f]{16}")
 _HALF_REMOVED = re.compile(r"\.[0-9a-f]{16}\.[0-9a-f]{8}\.gone")

@@ -356,7 +356,7 @@ def agreed(match: re.Match[str], told: Told) -> bool:
     return (
         (int(match["agreed"]), int(match["n"])) == (above, n)
         and abs(float(match["share"]) - 100 * above / n) <= 0.5
-        and (shown[0] is None or all(abs(int(text) - 100 * end) <= 0.5 for text, end in zip(shown, ends, strict=True)))
+        and (shown[0] is None or all(abs(int(text) - 100 * end) < 0.501 for text, end in zip(shown, ends, strict=True)))
     )
 
 
@@ -888,7 +888,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
      when(lambda told: len(told.block["settings"]) == 1)),
     (r"The participants were SIMULATED, so this report is not evidence about people\.",
      when(lambda told: told.study.simulated)),
-    (r"No analysis was planned \(the table \[analysis\] is missing\), so all results are exploratory\.",
+    (r"No analysis was planned in the study file, so all results are exploratory\.",
      when(lambda told: not told.results["decided"]["made"])),
     (r"The decisions about the analysis changed between sessions, so all results are exploratory; the decisions from "
      r"the first session (are used|were used \(alpha = .*\))\.", when(lambda told: told.results["decided"]["changed"])),
@@ -911,7 +911,7 @@ TEMPLATES: Final[Sequence[tuple[str, Check]]] = (
     (rf"A smaller sample has more than a (?:< )?{R} % chance of including nobody from a minority of {R} % of the "
      rf"population; if the answers of such a minority differ by {R} points, they shift the mean by as much as the "
      r"bound\.", missed_minority),
-    (rf"This study has {N} participants?, so it can show only that a mean answer differs by more\.",
+    (rf"This study has {N} participants?(, so it can show only that a mean answer differs by more)?\.",
      lambda match, told: count(match[1]) == told.block["n"]),
     (rf"{LEAD}in (\d+) of (\d+) comparisons? with .* ms \(one for each statement and delay\), the data show "
      rf"neither that the mean answer stays within ±{R} points? nor that it differs by more\.", nobody_is_left),

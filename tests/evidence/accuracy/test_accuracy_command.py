@@ -6,7 +6,6 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.errors import StudyError
-from study_app.evidence.accuracy import accuracy_report, comparison
 from study_app.evidence.accuracy.comparison import accuracy
 from study_app.evidence.accuracy.survey import PUBLISHED, survey_scenes
 from study_app.evidence.table import Evidence
@@ -28,8 +27,8 @@ def test_a_motion_file_of_another_rate_is_brought_to_the_scenes(tmp_path, monkey
     rows = "\n".join(f"{k / 50},{k / 100},0,0" for k in range(21))
     (tmp_path / "slow.csv").write_text(f"t_s,x_m,y_m,z_m\n{rows}\n", encoding="utf-8", newline="\n")
     measured = []
-    monkeypatch.setattr(comparison, "accuracy", lambda *given, **_: measured.append(given))
-    monkeypatch.setattr(accuracy_report, "accuracy_evidence", lambda _found: Evidence("", {}))
+    monkeypatch.setattr("study_app.evidence.accuracy.accuracy", lambda *given, **_: measured.append(given))
+    monkeypatch.setattr("study_app.evidence.accuracy.accuracy_evidence", lambda _found: Evidence("", {}))
     words = ["accuracy", "rek2024", "--liquid", "water", "--path", str(tmp_path / "slow.csv"), "--to", str(tmp_path)]
     done = CliRunner().invoke(commands, words)
     assert done.exit_code == 0, done.output
