@@ -243,7 +243,8 @@ def _scale_words(contrast: ContrastResult, results: Results, numbers: Mapping[st
             criteria = {(level.guess_rate, level.counts) for level in levels}
             rate = level.guess_rate if len(criteria) == 1 else None
             at = "" if rate is None else f" at {50 * (1 + rate):.3g} % {level.counts}"
-            return f" Values are Weber fractions{at}; lower values mean better discrimination."
+            meaning = f"{at}; lower values mean better discrimination" if of.measure == "threshold" else ""
+            return f" Values are Weber fractions{meaning}."
         return f" Values are in {level.unit}." if level.unit else ""
     if level is not None and of.measure == "d_prime":
         return " At chance, d′ is 0."

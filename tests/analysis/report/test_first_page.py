@@ -196,6 +196,30 @@ def test_a_comparison_says_what_sets_its_sides_apart_unless_their_names_do(
     assert pages._told_apart(names, presented) == added
 
 
+@pytest.mark.parametrize(
+    ("measure", "rates", "said"),
+    [
+        (
+            "threshold",
+            (0.5, 0.5),
+            " Values are Weber fractions at 75 % correct; lower values mean better discrimination.",
+        ),
+        ("threshold", (1 / 3, 0.5), " Values are Weber fractions; lower values mean better discrimination."),
+        ("pse", (None, None), " Values are Weber fractions."),
+    ],
+)
+def test_what_weber_fractions_mean_is_said_of_thresholds_and_their_criterion_if_it_is_one(
+    measure: str, rates: tuple[float | None, ...], said: str
+) -> None:
+    levels = [
+        SimpleNamespace(block=block, level_kind="weber", guess_rate=rate, counts="correct")
+        for block, rate in zip("ab", rates, strict=True)
+    ]
+    contrast: Any = SimpleNamespace(contrast=SimpleNamespace(blocks=("a", "b"), measure=measure, form=None))
+    results: Any = SimpleNamespace(levels=levels)
+    assert pages._scale_words(contrast, results, {}) == said
+
+
 _ASKED_AFTER = {"a": {"P1": 40.0, "P2": 50.0}, "b": {"P1": 20.0, "P2": 40.0}, "c": {"P1": 10.0, "P2": 20.0}}
 
 
