@@ -9,7 +9,7 @@ from study_app.haptics.kernels.compiled import following_compilation
 from study_app.session.compile_worker import carry_out
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 
 with tempfile.TemporaryDirectory() as folder, following_compilation(lambda _share: None) as counter:
     names = (device.name for device in all_devices() if device.kind == "simulated" or device.name == "mouse")

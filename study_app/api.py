@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from study_app.protocol.simulated import TrialFeatures
     from study_app.session.pages import Page
     from study_app.session.simulated.rehearsal import Answer, Question
-    from study_app.store.sessions.open_session import SessionStore
+    from study_app.store.sessions import SessionStore
 
 __all__ = [
     "ForceLoop",
@@ -313,8 +313,8 @@ def read(results: str | Path) -> dict[str, pd.DataFrame]:
 
     Sealed columns are omitted until the study is unblinded. docs/data-dictionary.md declares every column.
     """
-    from study_app.analysis.data.study_tables import load_study
-    from study_app.analysis.export.tables import exported_tables
+    from study_app.analysis.data import load_study
+    from study_app.analysis.export import exported_tables
 
     return {table.name: table.frame for table in exported_tables(load_study(Path(results)))}
 
@@ -337,7 +337,7 @@ def unblind(results: str | Path, *, by: str, reason: str) -> None:
 @_checked(results=_PATH, to=_PATH)
 def report(results: str | Path, to: str | Path) -> Path:
     """Write the report of a study folder into the folder ``to``; return the path of ``report.html``."""
-    from study_app.analysis.report.write_report import report as write
+    from study_app.analysis.report import report as write
 
     return write(Path(results), Path(to))[0]
 
@@ -447,8 +447,8 @@ def open_session(
     """
     from study_app.protocol.load import load, parse, source_bytes
     from study_app.session.simulated import rehearsal
-    from study_app.store.blinded.allocation import check_choice, claims
-    from study_app.store.folders import StudyFolder
+    from study_app.store.blinded import check_choice, claims
+    from study_app.store.files import StudyFolder
 
     folder = StudyFolder(Path(results)).session(participant, session)
     if folder.journal.exists():

@@ -7,10 +7,7 @@
 Reading order: wording, worker_messages; statistics; data; results; page_layout, questions; html_page; levels; export,
 figures; findings; contrasts; evaluate, planning; planned_exclusions; report; export_study; study_worker.
 
-Public modules: contrasts, data.blocks, data.measures, data.study_tables, evaluate, export.psychds_dataset,
-export.table_files, export.tables, export_study, findings.delays, findings.finding, findings.recognition,
-findings.statement_tests, levels.exponents, levels.thresholds, levels.tracks, planning, planning.power_curves,
-planning.power_estimates, planning.preregistration, planning.simulated_studies, planning.threshold_studies,
-report.sections, report.study_figures, report.write_report, results, statistics.equivalence, statistics.mean_tests,
-statistics.outcome, statistics.recognition, statistics.thresholds, statistics.trend, worker_messages.
+Public modules: contrasts, data, evaluate, export, export_study, findings, levels.exponents, levels.thresholds,
+levels.tracks, planning, planning.power_curves, planning.power_estimates, planning.preregistration,
+planning.simulated_studies, planning.threshold_studies, report, results, statistics, worker_messages.
 """

@@ -9,7 +9,7 @@ from study_app.analysis.export import psychds_dataset
 from study_app.analysis.export.table_files import NOTHING_ELSE, Extra, file_name, table_bytes, table_files
 from study_app.analysis.export.tables import exported_tables, wide_table
 from study_app.analysis.results import Failure, Progress, report_no_progress
-from study_app.store.output_files import FileCopy, write_output
+from study_app.store.files import FileCopy, write_output
 
 
 def export(

@@ -33,10 +33,10 @@ from study_app.analysis.worker_messages import (
 from study_app.errors import StoreError
 from study_app.protocol.participants import EACH_GROUP
 from study_app.store import receipt
-from study_app.store.atomic import cannot_read
 from study_app.store.exclusions import exclude, include, keep
+from study_app.store.files import cannot_read
 from study_app.store.merged import all_exclusions, folders_of, locate_participant, sessions_in
-from study_app.store.tables.study_files import participants_of, study_folders
+from study_app.store.tables import participants_of, study_folders
 from study_app.store.unblinding import has_opened_keys, reveals_of, unblind_folder
 from study_app.workers.server import Stopped
 

@@ -35,11 +35,10 @@ from study_app.evidence.computer import LoadName, busy_cores
 from study_app.evidence.computer import machine as machine_here
 from study_app.evidence.timing import BESIDE, DELAYS_S, VIRTUAL_HZ, Delayed, Shown
 from study_app.gui.application import application_here
-from study_app.gui.display.screens import WITHOUT_OPENGL, choose_screens, place_window
-from study_app.gui.operator.servo_health import ServoHealth
-from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.display import WITHOUT_OPENGL, choose_screens, place_window
+from study_app.gui.operator import OperatorWindow, ServoHealth
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.gui.theme.theme import LIGHT
+from study_app.gui.theme import LIGHT
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders import Schedule, Trial, build_schedule
@@ -50,7 +49,7 @@ from study_app.session.resume import FIRST
 from study_app.session.start import NewSession, open_store
 from study_app.session.tasks import TankView, TaskView
 from study_app.store.recordings import read_frames
-from study_app.store.sessions.open_session import SessionStore
+from study_app.store.sessions import SessionStore
 
 _SIZE_PX: Final = (1920, 1080)
 _OPERATOR_PX: Final = (1600, 900)

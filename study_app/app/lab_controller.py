@@ -25,11 +25,10 @@ from study_app.devices import DEFAULT_DEVICE
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StudyError
 from study_app.evidence.appraisal import AppraisalClient, Costs, Errors, Question, start_appraisal_worker
-from study_app.gui.home.startup_window import LONG_AFTER_S
-from study_app.gui.kit.devices import device_choices
-from study_app.gui.lab.lab_state import CostRow, DeviceShown, ErrorRow, LabView, Now
-from study_app.gui.lab.view import LabPlace
-from study_app.gui.widgets.background import Background, delayed_call
+from study_app.gui.kit import device_choices
+from study_app.gui.lab import CostRow, DeviceShown, ErrorRow, LabPlace, LabView, Now
+from study_app.gui.startup_window import LONG_AFTER_S
+from study_app.gui.widgets import Background, delayed_call
 from study_app.haptics.model.effects import NAMED
 from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting, Side, Workbench

@@ -19,21 +19,16 @@ from study_app.app.timing import collecting_in_this_thread
 from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, StoreError, StudyError
 from study_app.gui.application import application_here
-from study_app.gui.devices.view import DevicesPlace
-from study_app.gui.display.screens import place_window
-from study_app.gui.home.dialogs import WorkspaceDialog
-from study_app.gui.home.main_window import MainWindow, bug_sentence
-from study_app.gui.home.study_facts import DraftWords
-from study_app.gui.home.view import HomePlace
-from study_app.gui.kit.commands import add_commands
-from study_app.gui.kit.devices import device_named, screen_number, settings_here, theme_named
+from study_app.gui.devices import DevicesPlace
+from study_app.gui.display import place_window
+from study_app.gui.home import DraftWords, HomePlace, MainWindow, WorkspaceDialog, bug_sentence
+from study_app.gui.kit import add_commands, device_named, screen_number, settings_here, theme_named
 from study_app.gui.settings.view import MachinePlace
-from study_app.gui.widgets.background import Background, wait_for_jobs
-from study_app.gui.widgets.main_view import Place
+from study_app.gui.widgets import Background, Place, wait_for_jobs
 from study_app.protocol.source import protocol_file
 from study_app.session.start import NewSession
 from study_app.store import workstation
-from study_app.store.study_runs import content_changes, recorded_contents
+from study_app.store.versions import content_changes, recorded_contents
 from study_app.store.workstation import DisplayOffset, MachineSettings, create_workspace
 from study_app.user_folder import settings_file
 from study_app.workspace import Workspace, chosen_workspace, offered_workspace, workspace
@@ -46,7 +41,7 @@ if TYPE_CHECKING:
     from study_app.designer.participant.playable import LabLiquids
     from study_app.designer.window import DesignerPlace
     from study_app.gui.help.view import HelpPlace
-    from study_app.gui.lab.view import LabPlace
+    from study_app.gui.lab import LabPlace
     from study_app.gui.results.view import ResultsPlace
     from study_app.gui.sessions.session_facts import SessionFacts
     from study_app.lab.ab_comparison import Setting, Side
@@ -284,7 +279,7 @@ class MainController(QObject):
     def _make_lab_place(self) -> LabPlace:
         self._loading.wait()  # two threads that import modules of the same cycle may see them partially initialised
         from study_app.app.lab_controller import LabController  # noqa: PLC0415 - pyqtgraph: only once it is needed
-        from study_app.gui.lab.view import LabPlace  # noqa: PLC0415
+        from study_app.gui.lab import LabPlace  # noqa: PLC0415
 
         made = LabPlace()
         settings = self.machine.settings

@@ -61,7 +61,7 @@ def export(
     """
     if validator is not None and not psych_ds:
         raise click.UsageError("--validator checks the folder written by --psych-ds, so add --psych-ds")
-    from study_app.analysis.export.table_files import Extra
+    from study_app.analysis.export import Extra
     from study_app.analysis.export_study import export as export_study
 
     asked: dict[Extra, bool] = {"wide": wide, "parquet": parquet, "sav": sav, "psych-ds": psych_ds}
@@ -86,7 +86,7 @@ def _report_failed_sections(failed: list[str]) -> None:
 def _run_validator(validator: Path, to: Path) -> None:
     import subprocess
 
-    from study_app.analysis.export.psychds_dataset import FOLDER
+    from study_app.analysis.export import FOLDER
 
     try:
         ended = subprocess.run([validator.absolute(), to / FOLDER], check=False)  # noqa: S603 - named by the user
@@ -100,7 +100,7 @@ def _run_validator(validator: Path, to: Path) -> None:
 @click.option("--to", required=True, type=Target(), metavar="DIR", help="Folder to write to.")
 def plot(results: Path, to: Path) -> None:
     """Plot the responses; conditions are labelled by code until the study is unblinded, and by name afterwards."""
-    from study_app.analysis.report.study_figures import plot as plot_study
+    from study_app.analysis.report import plot as plot_study
 
     with progress() as show:
         show("plotting the responses")
@@ -117,7 +117,7 @@ def report(results: Path, to: Path) -> None:
     The exit code is 3 if a section could not be computed; the report says which one, and contains all the others.
     """
     gc.set_threshold(50_000, 20, 100)  # collections took a tenth of the time of a report of 12
-    from study_app.analysis.report.write_report import report as write_report
+    from study_app.analysis.report import report as write_report
 
     failed: list[str] = []
     with progress() as show:
@@ -228,7 +228,7 @@ def include(
 )
 def withdraw(results: Path, participant: str, by: str, reason: str, also: tuple[Path, ...]) -> None:
     """Erase a participant's data; only the date, the operator, the reason and checksums are kept."""
-    from study_app.store.checksums import checked_line
+    from study_app.store.integrity import checked_line
     from study_app.store.merged import locate_participant
     from study_app.store.withdrawals import proof_of_withdrawal
     from study_app.store.withdrawals import withdraw as withdraw_from
@@ -277,7 +277,7 @@ def merge(sites: dict[str, Path], to: Path) -> None:
     Participant IDs are prefixed with the site's name (A-P001), and each site keeps its own sealed key. Use the
     merged folder as RESULTS in report, export, plot, verify, unblind, exclude and withdraw.
     """
-    from study_app.store.sites.merge import merge_sites
+    from study_app.store.sites import merge_sites
 
     with progress() as show:
         show("reading the sites")
@@ -292,7 +292,7 @@ def merge(sites: dict[str, Path], to: Path) -> None:
 @takes_session
 def rebuild(session: Path) -> None:
     """Rebuild a session's tables from its journal."""
-    from study_app.store.sessions.recovery import rebuild_session
+    from study_app.store.sessions import rebuild_session
 
     made = rebuild_session(session)
     for path in made.rewritten:
@@ -311,7 +311,7 @@ def rebuild(session: Path) -> None:
 @takes_session
 def reproduce(session: Path) -> None:
     """Recompute a session's orders and levels and compare them with the recorded ones."""
-    from study_app.store.verification.reproduction import reproduce_session
+    from study_app.store.verification import reproduce_session
 
     reproduction = reproduce_session(session)
     for line in (*reproduction.differences, *reproduction.followed):
@@ -340,8 +340,8 @@ def reproduce(session: Path) -> None:
 )
 def verify(results: Path, fingerprints: Path | None, xdf: Path | None) -> None:
     """Check everything in a study folder: columns, checksums, receipts, journals, the key and recordings."""
-    from study_app.store.verification.recorded_streams import check_recording
-    from study_app.store.verification.verify_study import verify_study as verify_folder
+    from study_app.store.verification import check_recording
+    from study_app.store.verification import verify_study as verify_folder
 
     with progress() as show:
         show("checking every file")
@@ -393,9 +393,8 @@ def proof(
     study with these lines.
     """
     from study_app.store import workstation
-    from study_app.store.atomic import write_file
-    from study_app.store.folders import StudyFolder
-    from study_app.store.verification.proofs import proof_text
+    from study_app.store.files import StudyFolder, write_file
+    from study_app.store.verification import proof_text
 
     text = proof_text(StudyFolder(results), server=server or "", sign=sign or None)
     changes = {"proofs": always and str(always.absolute()), "stamp_root": root and str(root.absolute())}

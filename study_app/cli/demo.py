@@ -52,8 +52,8 @@ def _run_sessions(study: Path) -> None:
     """Run or resume the session of each participant to its end."""
     from study_app.protocol.source import shipped_file
     from study_app.session.simulated.rehearsal import finish_session
-    from study_app.store.folders import StudyFolder
-    from study_app.store.sessions.begin import used_ids
+    from study_app.store.files import StudyFolder
+    from study_app.store.sessions import used_ids
 
     protocol = shipped_file(STUDY)
     if not used_ids(StudyFolder(study)).held:
@@ -100,14 +100,14 @@ def _unblind(study: Path) -> None:
 def _write_report(study: Path, to: Path) -> list[str]:
     """Write the report unless it exists; return the sections that failed."""
     from study_app.errors import MissingExtra, naming_the_extra
-    from study_app.store.output_files import outputs
+    from study_app.store.files import outputs
 
     failed: list[str] = []
     if any(output.to == to.resolve() and len(output.paths) == len(output.files) for output in outputs(study)):
         return failed
     try:
         with progress() as show, naming_the_extra():
-            from study_app.analysis.report.write_report import report
+            from study_app.analysis.report import report
 
             files = report(study, to, progress=show, warn=partial(click.echo, err=True), failed=failed.append)
     except MissingExtra as error:
@@ -122,7 +122,7 @@ def _write_report(study: Path, to: Path) -> list[str]:
 def _show_results(study: Path) -> int:
     """Open the program on the results and return its exit code; or print how to open it, and return 0."""
     from study_app.errors import DisplayError
-    from study_app.gui.display.display_check import check_display, missing_for_windows
+    from study_app.gui.display import check_display, missing_for_windows
 
     platform = os.environ.get("QT_QPA_PLATFORM", "").partition(":")[0]
     try:

@@ -102,7 +102,7 @@ def doctor(name: str, faults: tuple[str, ...], to: Path | None, device_options: 
     for line in report_lines(diagnosis):
         click.echo(line)
     if to is not None:
-        from study_app.store.support import write_support
+        from study_app.store.diagnostics import write_support
 
         write_support(to, "\n".join(report_lines(diagnosis)).strip() + "\n")
         click.echo(f"Written: {to}")
@@ -200,7 +200,7 @@ def _save_bench(results: Found, folder: Path, *, simulated: bool) -> None:
     """Write the report; for a real device store the numbers in this machine's settings."""
     from study_app.devices.bench.procedure import as_json, as_markdown, workstation_results
     from study_app.store import workstation
-    from study_app.store.atomic import write_file
+    from study_app.store.files import write_file
 
     day = date.today().isoformat()
     text = as_markdown(results, day)

@@ -39,10 +39,10 @@ def simulate(scene: str, liquid: str, path: str, to: Path, changes: tuple[str, .
     Each row of the motion is one tick, so the rows must be sampled at the scene's rate (1 kHz unless rate_hz is set).
     """
     from study_app import api
-    from study_app.store import csv_files
+    from study_app.store.files import write_columns
 
     table = api.simulate_force(scene, liquid, path, **_parse_changes(changes))
-    csv_files.write_columns(to, table)
+    write_columns(to, table)
     click.echo(f"{to}: {len(table)} rows")
 
 

@@ -204,7 +204,7 @@ def echo_files(written: Iterable[Path]) -> None:
 
 def make_output_folder(to: Path | None) -> None:
     """Create the output folder, if given, before a long computation."""
-    from study_app.store.atomic import make_folder
+    from study_app.store.files import make_folder
 
     if to is not None:
         make_folder(to, waits=False)

@@ -87,7 +87,7 @@ def power(
     from study_app.analysis.planning.threshold_studies import plans
     from study_app.protocol.load import load
     from study_app.session.simulated.rehearsal import condition_features
-    from study_app.store.atomic import make_folder
+    from study_app.store.files import make_folder
 
     study = load(protocol)
     if trials and not plans(study, trials):
@@ -133,7 +133,7 @@ def _write_estimate(estimate: PowerEstimate, to: Path | None) -> None:
     from study_app.analysis.planning.power_curves import Powers, write_power
     from study_app.analysis.planning.power_estimates import estimate_markdown
     from study_app.analysis.planning.threshold_studies import threshold_csv
-    from study_app.store.output_files import write_files
+    from study_app.store.files import write_files
 
     text = estimate_markdown(estimate)
     click.echo(text, nl=False)
@@ -164,7 +164,7 @@ def preregister(protocol: str, computed: Path | None, to: Path | None) -> None:
     from study_app.analysis.planning.preregistration import FILE as NAME
     from study_app.analysis.planning.preregistration import preregistration
     from study_app.protocol.load import parse, protocol_hash, source_bytes
-    from study_app.store.output_files import write_files
+    from study_app.store.files import write_files
 
     source = source_bytes(protocol)
     study = parse(source, protocol)

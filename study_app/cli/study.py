@@ -330,7 +330,7 @@ def language(code: str) -> None:
     """
     from study_app.errors import StudyError
     from study_app.protocol.wording import SHIPPED, language_template, read_language
-    from study_app.store.atomic import cannot_write, write_file
+    from study_app.store.files import cannot_write, write_file
     from study_app.workspace import workspace as workspace_here
 
     if len(code) != 2 or not (code.isascii() and code.islower()):
@@ -356,7 +356,7 @@ def sessions(named: str | None, results: Path | None) -> None:
     """List the sessions of a study, or of every study in the workspace, with the names that other commands accept."""
     from study_app.errors import StoreError
     from study_app.store.merged import all_exclusions, session_in
-    from study_app.store.tables.study_files import participants_of
+    from study_app.store.tables import participants_of
     from study_app.workspace import workspace as workspace_here
 
     at = workspace_here().results
@@ -382,7 +382,7 @@ def _local_time(written: str | None) -> str:
 
 
 def _study_folders(results: Path) -> Iterator[Path]:
-    from study_app.store.tables.study_files import study_folders
+    from study_app.store.tables import study_folders
 
     if results.is_dir():
         yield from study_folders(results)

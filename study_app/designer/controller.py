@@ -42,8 +42,7 @@ from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.protocol.source import Path as Place
 from study_app.protocol.source import protocol_file
-from study_app.store.drafts import draft_of
-from study_app.store.study_settings import keep_original
+from study_app.store.versions import draft_of, keep_original
 
 _REST_MS: Final = 200
 

@@ -28,12 +28,8 @@ from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import common_ends, spans_of, with_line_feeds
 from study_app.designer.form.fields import HAND_ON_MS, KEYS_OF_PLACE
 from study_app.designer.parts import cut_text
-from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import Theme
-from study_app.gui.theme.themed import Coloured
-from study_app.gui.widgets.boxes import hbox
-from study_app.gui.widgets.cards import Card, Icon
-from study_app.gui.widgets.labels import label
+from study_app.gui.theme import Coloured, Theme, draw_icon
+from study_app.gui.widgets import Card, Icon, hbox, label
 from study_app.protocol.load import located_problems
 from study_app.protocol.source import Path, places_of
 

@@ -15,15 +15,25 @@ from study_app.designer.measures.cards import INKS
 from study_app.designer.parts import KeysOpenList
 from study_app.designer.problems import ProblemRow
 from study_app.designer.version_rows import VersionChip
-from study_app.gui.kit.commands import command_tip, key_cap, keys_of, with_key
-from study_app.gui.kit.dialogs import choose_protocol
-from study_app.gui.theme.theme import RADIUS_CARD, SHADOW, Tone, font
-from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.accessible import announce
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Chip, Icon, chip_size, paint_chip, smooth_painter
-from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
-from study_app.gui.widgets.labels import label
+from study_app.gui.kit import choose_protocol, command_tip, key_cap, keys_of, with_key
+from study_app.gui.theme import RADIUS_CARD, SHADOW, Themed, Tone, font, remove_widget
+from study_app.gui.widgets import (
+    STRETCH,
+    ActionButton,
+    Card,
+    Chip,
+    Icon,
+    IconButton,
+    PressedByEnter,
+    add_parts,
+    announce,
+    chip_size,
+    hbox,
+    label,
+    paint_chip,
+    smooth_painter,
+    vbox,
+)
 from study_app.number_text import counted
 
 _MOST_PROBLEMS = 6

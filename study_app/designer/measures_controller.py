@@ -27,11 +27,10 @@ from study_app.designer.measures.study_facts import facts, valid_part
 from study_app.designer.prompts import ConfirmCard
 from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
-from study_app.gui.widgets.background import delayed_call
+from study_app.gui.widgets import delayed_call
 from study_app.number_text import capitalised, counted
 from study_app.protocol.source import protocol_hash, source_bytes
-from study_app.store.folders import study_folder
-from study_app.store.output_files import write_files
+from study_app.store.files import study_folder, write_files
 from study_app.workers.server import Crashed
 
 log = logging.getLogger(__name__)

@@ -44,17 +44,41 @@ from study_app.designer.problems import problem_rows
 from study_app.designer.templates import FOLDER, QUESTIONS, templates
 from study_app.designer.version_rows import VersionChip
 from study_app.errors import StudyError
-from study_app.gui.home.study_facts import holds_liquids_alone, is_shipped, known_sources
-from study_app.gui.kit.commands import command_tip, key_cap
-from study_app.gui.kit.dialogs import choose_protocol
-from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CARD, SHADOW, TANK, font
-from study_app.gui.theme.themed import Themed, name_scroll_bars, remove_widget, replace_inside
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.boxes import grid as grid_of
-from study_app.gui.widgets.cards import Card, Chip, Icon, Rule, fill_rounded, scrolled, smooth_painter
-from study_app.gui.widgets.controls import ActionButton, Check, IconButton
-from study_app.gui.widgets.labels import Clamped, figures, label
-from study_app.gui.widgets.main_view import last_focused
+from study_app.gui.home import holds_liquids_alone, is_shipped, known_sources
+from study_app.gui.kit import choose_protocol, command_tip, key_cap
+from study_app.gui.theme import (
+    PARTICIPANT,
+    RADIUS_CARD,
+    SHADOW,
+    TANK,
+    Themed,
+    font,
+    name_scroll_bars,
+    remove_widget,
+    replace_inside,
+)
+from study_app.gui.widgets import (
+    STRETCH,
+    ActionButton,
+    Card,
+    Check,
+    Chip,
+    Clamped,
+    Icon,
+    IconButton,
+    Rule,
+    add_layout,
+    add_parts,
+    figures,
+    fill_rounded,
+    hbox,
+    label,
+    last_focused,
+    scrolled,
+    smooth_painter,
+    vbox,
+)
+from study_app.gui.widgets import grid as grid_of
 from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers, unclear_number
 from study_app.protocol.load import read_document
@@ -63,8 +87,7 @@ from study_app.protocol.orders import expected_duration_s, orders_of, step_durat
 from study_app.protocol.source import Path as Place
 from study_app.protocol.source import names, protocol_file, shipped, shipped_file
 from study_app.protocol.wording import LANGUAGES, languages_of
-from study_app.store.drafts import draft_of, drafted_files, unsaved_files
-from study_app.store.study_settings import kept_original
+from study_app.store.versions import draft_of, drafted_files, kept_original, unsaved_files
 from study_app.workspace import workspace
 
 FILE: Final = FOLDER / "known_answers.json"

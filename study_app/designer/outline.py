@@ -49,15 +49,20 @@ from study_app.designer.document.fields import EXCLUSIONS, distinguishing_key, e
 from study_app.designer.document.steps import AddElement, AddInstrument, AddLiquid, shipped_liquids_to_add
 from study_app.designer.document.study import Study
 from study_app.designer.parts import make_dense
-from study_app.gui.kit.commands import command_tip, key_cap, keys_of, with_key
-from study_app.gui.theme.icons import draw_icon, icon
-from study_app.gui.theme.theme import RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Coloured, Themed
-from study_app.gui.widgets.accessible import announce, plain_tip
-from study_app.gui.widgets.boxes import add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, fill_rounded
-from study_app.gui.widgets.controls import ActionButton
-from study_app.gui.widgets.labels import Elided, label
+from study_app.gui.kit import command_tip, key_cap, keys_of, with_key
+from study_app.gui.theme import RADIUS_CONTROL, Coloured, Theme, Themed, draw_icon, font, icon
+from study_app.gui.widgets import (
+    ActionButton,
+    Card,
+    Elided,
+    add_parts,
+    announce,
+    fill_rounded,
+    hbox,
+    label,
+    plain_tip,
+    vbox,
+)
 from study_app.number_text import counted, duration
 from study_app.protocol.checks import OWN
 from study_app.protocol.questionnaires import instrument, instruments

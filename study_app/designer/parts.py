@@ -7,12 +7,8 @@ from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtGui import QFontMetricsF, QKeyEvent
 from PySide6.QtWidgets import QSizePolicy, QWidget
 
-from study_app.gui.theme.theme import TypeRole, font
-from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.accessible import plain_tip
-from study_app.gui.widgets.boxes import hbox
-from study_app.gui.widgets.controls import ActionButton, Choice, PressedByEnter
-from study_app.gui.widgets.labels import Elided, Ink
+from study_app.gui.theme import Themed, TypeRole, font, remove_widget
+from study_app.gui.widgets import ActionButton, Choice, Elided, Ink, PressedByEnter, hbox, plain_tip
 
 INSIDE, BETWEEN, SEGMENT_PX = 3, 4, 28
 

@@ -17,13 +17,24 @@ from study_app.designer.document.fields import key_order, label_of
 from study_app.designer.document.study import Study
 from study_app.designer.outline import icon_of
 from study_app.designer.parts import Segments, small_button
-from study_app.gui.kit.commands import command_tip, key_cap
-from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Coloured, replace_inside
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card, Icon, Rule, paint_ground
-from study_app.gui.widgets.controls import ActionButton, IconButton, PressedByEnter
-from study_app.gui.widgets.labels import Clamped, Elided, label
+from study_app.gui.kit import command_tip, key_cap
+from study_app.gui.theme import Coloured, Theme, font, replace_inside
+from study_app.gui.widgets import (
+    STRETCH,
+    ActionButton,
+    Card,
+    Clamped,
+    Elided,
+    Icon,
+    IconButton,
+    PressedByEnter,
+    Rule,
+    add_parts,
+    hbox,
+    label,
+    paint_ground,
+    vbox,
+)
 from study_app.number_text import capitalised, counted
 from study_app.protocol.source import Fault, Path, names, places_of
 from study_app.protocol.warnings import untranslated_texts

@@ -12,10 +12,7 @@ from study_app.designer.document.steps import DeleteElement, DuplicateElement, M
 from study_app.designer.document.study import Study
 from study_app.designer.document.toml_text import Refused
 from study_app.designer.parts import make_dense
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import Card
-from study_app.gui.widgets.controls import ActionButton, Choice
-from study_app.gui.widgets.labels import label, set_ink
+from study_app.gui.widgets import STRETCH, ActionButton, Card, Choice, add_layout, add_parts, hbox, label, set_ink, vbox
 from study_app.number_text import capitalised, typed_numbers
 from study_app.protocol.source import Path, names, value_at
 

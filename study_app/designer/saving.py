@@ -19,11 +19,9 @@ from study_app.designer.version_rows import FILE, Comparison
 from study_app.designer.versions import KnownRuns, SaveCard, compare, latest_run, version_of
 from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
-from study_app.gui.home.study_facts import time_text
+from study_app.gui.home import time_text
 from study_app.number_text import counted
-from study_app.store.drafts import draft_of
-from study_app.store.study_settings import keep_original
-from study_app.store.study_versions import ChangedOutsideError, kept_versions
+from study_app.store.versions import ChangedOutsideError, draft_of, keep_original, kept_versions
 
 _DRAFT_MS: Final = 50
 _RETRY_MS: Final = 2_000

@@ -13,11 +13,10 @@ from study_app.designer.document.elements import element_of, study_title, title_
 from study_app.designer.document.fields import label_of
 from study_app.designer.document.study import Study
 from study_app.gui.sessions.session_facts import start_time_text
-from study_app.gui.theme.theme import Tone
+from study_app.gui.theme import Tone
 from study_app.number_text import counted
 from study_app.protocol.descriptions import document_differences
-from study_app.store.study_runs import Run
-from study_app.store.study_versions import Kept, kept_content
+from study_app.store.versions import Kept, Run, kept_content
 
 FILE: Final = "file"
 """The key of what the file holds."""

@@ -24,21 +24,36 @@ from study_app.designer.prompts import ConfirmCard, Prompt
 from study_app.designer.version_rows import FILE, Comparison, VersionChip, run_counts, version_chip, version_choices
 from study_app.designer.window import DesignerPlace, PanePage
 from study_app.errors import StoreError
-from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Coloured
-from study_app.gui.widgets.background import Background, delayed_call
-from study_app.gui.widgets.boxes import add_layout, add_parts, hbox
-from study_app.gui.widgets.cards import Card, Icon
-from study_app.gui.widgets.controls import ActionButton, Choice
-from study_app.gui.widgets.labels import label
+from study_app.gui.theme import Coloured, Theme, font
+from study_app.gui.widgets import (
+    ActionButton,
+    Background,
+    Card,
+    Choice,
+    Icon,
+    add_layout,
+    add_parts,
+    delayed_call,
+    hbox,
+    label,
+)
 from study_app.number_text import capitalised, counted
 from study_app.protocol.descriptions import differences
 from study_app.protocol.source import Path as Place
 from study_app.protocol.source import unbundle, value_at, with_liquid_files
-from study_app.store.folders import SessionFolder
+from study_app.store.files import SessionFolder
 from study_app.store.receipt import without_conditions
-from study_app.store.study_runs import Run, keep_run_content, recorded_items, run_of, runs_of_study, source_of
-from study_app.store.study_versions import content_hash, kept_content, kept_versions
+from study_app.store.versions import (
+    Run,
+    content_hash,
+    keep_run_content,
+    kept_content,
+    kept_versions,
+    recorded_items,
+    run_of,
+    runs_of_study,
+    source_of,
+)
 
 _LOOK_MS: Final = 150
 

@@ -35,14 +35,20 @@ from study_app.designer.outline import Addable, AddList, ElementPath, OutlineCar
 from study_app.designer.parts import Segments, small_button
 from study_app.designer.problems import ProblemRow, ProblemsCard
 from study_app.designer.prompts import Prompt
-from study_app.gui.kit.commands import COMMANDS, add_commands, command_tip, connect_button, key_cap, keys_of
-from study_app.gui.theme.theme import SHADOW, font
-from study_app.gui.theme.themed import name_scroll_bars, remove_widget
-from study_app.gui.widgets.accessible import announce
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Icon
-from study_app.gui.widgets.controls import PressedByEnter
-from study_app.gui.widgets.main_view import Place, last_focused
+from study_app.gui.kit import COMMANDS, add_commands, command_tip, connect_button, key_cap, keys_of
+from study_app.gui.theme import SHADOW, font, name_scroll_bars, remove_widget
+from study_app.gui.widgets import (
+    QWIDGETSIZE_MAX,
+    STRETCH,
+    Icon,
+    Place,
+    PressedByEnter,
+    add_parts,
+    announce,
+    hbox,
+    last_focused,
+    vbox,
+)
 
 FACTS_FROM, FACTS_FROM_OWN, FACTS_LEAST = 740, 560, 110
 """The height of the window and of the pane from which there is room for facts, and what they need themselves [px]."""

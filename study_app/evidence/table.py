@@ -12,8 +12,7 @@ from matplotlib.figure import Figure
 
 from study_app.errors import StudyError
 from study_app.figure_style import PLOT_SETTINGS, file_bytes
-from study_app.store.csv_files import csv_text_of
-from study_app.store.output_files import write_files
+from study_app.store.files import csv_text_of, write_files
 
 TURN_S: Final = 0.25
 """How long a loop runs until it is another's turn."""

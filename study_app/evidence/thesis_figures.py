@@ -23,8 +23,7 @@ from study_app.haptics.model.effects import Wake
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.haptics.runtime.offline import Table, simulate
-from study_app.store.atomic import make_folder
-from study_app.store.output_files import write_files
+from study_app.store.files import make_folder, write_files
 
 _RATE_HZ: Final = 1000.0
 LENGTH: Final = 5000

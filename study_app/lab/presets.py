@@ -11,7 +11,7 @@ from study_app.haptics.model.scene import Scene
 from study_app.lab.ab_comparison import Setting
 from study_app.protocol.file_format import scene_text, with_default_estimator
 from study_app.protocol.load import load_scene, load_scenes, shipped
-from study_app.store.atomic import write_file
+from study_app.store.files import write_file
 from study_app.workspace import workspace
 
 

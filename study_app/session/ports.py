@@ -6,7 +6,7 @@ from typing import Any, Protocol
 
 from study_app.haptics.model.scene import Scene
 from study_app.session.pages import Page
-from study_app.store.blinded.blinding import Key
+from study_app.store.blinded import Key
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event
 from study_app.video.frames import VideoFrame, VideoSource

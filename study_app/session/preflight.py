@@ -25,8 +25,8 @@ from study_app.protocol.presented import highest_damping
 from study_app.protocol.randomization import enrolment_number
 from study_app.protocol.warnings import UntranslatedText, listed_places
 from study_app.protocol.wording import language_name
-from study_app.store.blinded.sealing import recording_bytes
-from study_app.store.missing_trials import limit_reason
+from study_app.store.blinded import recording_bytes
+from study_app.store.session_progress import limit_reason
 from study_app.video.sources import VideosFound
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from study_app.haptics.runtime.offline import law_along
 from study_app.haptics.runtime.telemetry import timing
 from study_app.session.ports import ServoPort
 from study_app.session.preflight import Measurements, Screen
-from study_app.store.atomic import probe_free_bytes
-from study_app.store.blinded.blinding import sealed_hash
+from study_app.store.blinded import sealed_hash
+from study_app.store.files import probe_free_bytes
 
 _LOOK_S = 1 / 60
 

@@ -35,14 +35,11 @@ from study_app.protocol.orders import adjusting_of, design_of
 from study_app.protocol.presented import link_seed, recorded_presentation, scene_of
 from study_app.protocol.trials import Stimulated
 from study_app.store import receipt, recordings
-from study_app.store.atomic import is_there
-from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import Key, complete_protocol, open_events, protocol_errors, recorded_protocol
-from study_app.store.delivered import Delivered, delivered_error, delivered_values, judged_fields
-from study_app.store.folders import locate_session
+from study_app.store.blinded import Key, complete_protocol, open_events, protocol_errors, read_key, recorded_protocol
+from study_app.store.files import is_there, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.progress import attempt_name
+from study_app.store.session_progress import Delivered, attempt_name, delivered_error, delivered_values, judged_fields
 
 _TOLERANCE: Final = 1e-9
 
@@ -205,7 +202,7 @@ def replay(session_folder: Path) -> Replayed:
     began = time.perf_counter()
     study, session = locate_session(session_folder)
     kept = receipt.read(session.receipt)
-    key = blinding.read_key(study.path)
+    key = read_key(study.path)
     if key.hash != kept["key_hash"]:
         raise StoreError(f"{study.key} is not the key for session {session.path}: restore it from a backup")
     lines = open_events(journal.read(session.journal), key)
@@ -454,7 +451,7 @@ def _recorded_presentations(
 
 
 def _recorded_setup(
-    path: Path, kept: Mapping[str, Any], key: blinding.Key, lines: Sequence[events.Event]
+    path: Path, kept: Mapping[str, Any], key: Key, lines: Sequence[events.Event]
 ) -> tuple[Protocol, dict[str | None, _Device], tuple[int, str]]:
     """Return protocol, devices, and seed with participant of a session from its receipt ``kept`` at ``path``.
 

@@ -13,10 +13,10 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders import FormStep, PageStep, Schedule, Step, Trial, build_schedule
 from study_app.protocol.source import has_hash
 from study_app.protocol.trials import TrialResult
-from study_app.store.blinded.blinding import Key, open_events, place_number
+from study_app.store.blinded import Key, open_events, place_number
 from study_app.store.journals.journal_events import Event, SessionStarted
-from study_app.store.progress import Progress, progress_of, trial_results
-from study_app.store.sessions.recovery import sealed_source
+from study_app.store.session_progress import Progress, progress_of, trial_results
+from study_app.store.sessions import sealed_source
 from study_app.store.workstation import recent_protocols
 
 REHEARSED_SCREENS: dict[str, Any] = {"participant": "simulated", "refresh_hz": 60}

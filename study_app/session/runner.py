@@ -34,8 +34,8 @@ from study_app.session.transitions import events
 from study_app.session.transitions.state import FINAL, Phase, SessionState, Stall
 from study_app.session.transitions.table import advance, initial_state
 from study_app.session.trial import Recording, RunningTrial, is_ball_at_start, resting_view
-from study_app.store.delivered import broken_interval_limits, broken_limits, delivered_values
 from study_app.store.journals.journal_events import TargetReached
+from study_app.store.session_progress import broken_interval_limits, broken_limits, delivered_values
 
 _STOOD_STILL_S = 3.0  # a longer gap between two trials is noted; in a trial see `trial.FROZEN_S` [choice]
 RETRY_S = 1.0  # interval between attempts to write after a failure [s]

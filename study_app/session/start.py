@@ -24,19 +24,25 @@ from study_app.protocol.warnings import check_translated, untranslated_on_pages
 from study_app.session.preflight import Masking, Measurements, Screen
 from study_app.session.resume import find_protocol, source_to_resume
 from study_app.store import workstation
-from study_app.store.blinded.allocation import check_session
-from study_app.store.blinded.blinding import check_conditions, open_events, opened_key, read_key
-from study_app.store.delivered import TOLERATED_TICKS, late_device_text
-from study_app.store.folders import ID_PATTERN, StudyFolder, locate_session, study_folder
+from study_app.store.blinded import check_conditions, check_session, open_events, opened_key, read_key
+from study_app.store.files import ID_PATTERN, StudyFolder, locate_session, study_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import start_of
-from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStart, begin_session, check_participant, refuse_never_begun, used_ids
-from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import check_resumable, refuse_finished, reopen_store
-from study_app.store.study_runs import run_of
-from study_app.store.tables.study_files import check_study
+from study_app.store.session_progress import TOLERATED_TICKS, late_device_text, progress_of
+from study_app.store.sessions import (
+    SessionStart,
+    SessionStore,
+    begin_session,
+    check_participant,
+    check_resumable,
+    refuse_finished,
+    refuse_never_begun,
+    reopen_store,
+    used_ids,
+)
+from study_app.store.tables import check_study
+from study_app.store.versions import run_of
 from study_app.store.workstation import MachineSettings
 from study_app.video.sources import Videos
 

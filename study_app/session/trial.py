@@ -20,7 +20,7 @@ from study_app.protocol.trials import AnyTask
 from study_app.session.ports import RecorderPort, ServoPort
 from study_app.session.tasks import Outcome, TankView, TargetReached, TaskView, new_tracker
 from study_app.session.transitions.events import StartTrial
-from study_app.store.delivered import JUDGED, delivered_error, judged_fields, late_device_ticks
+from study_app.store.session_progress import JUDGED, delivered_error, judged_fields, late_device_ticks
 from study_app.video.frames import VideoFrame, VideoSource, VideoStatistics
 
 _LEAD_S = 0.6  # time of samples kept for the next recording [s]: longer than the slowest fade
@@ -297,7 +297,7 @@ class RunningTrial:
         return self._servo.now_ns() if self._tracker.end_ns is None else self._tracker.end_ns
 
     def summary(self) -> dict[str, Any]:
-        """Return the columns of its row so far (``store.columns``)."""
+        """Return the columns of its row so far (``store.files.columns``)."""
         dropped = 0 if self._serial is None else self._reader.dropped - self._dropped_before
         measured = {
             **_sample_columns(self._samples, self._servo.rate_hz, dropped, self._servo.worst_gap_s),

@@ -22,7 +22,7 @@ from study_app.session.pages import Interval, TaskPage
 from study_app.session.tasks import TankView, Tracker, new_tracker
 from study_app.session.transitions.page_builder import task_page
 from study_app.store import receipt
-from study_app.store.blinded.blinding import (
+from study_app.store.blinded import (
     Key,
     complete_protocol,
     open_events,
@@ -31,10 +31,10 @@ from study_app.store.blinded.blinding import (
     protocol_errors,
     read_key,
 )
-from study_app.store.folders import StudyFolder, locate_session
+from study_app.store.files import StudyFolder, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.progress import progress_of
+from study_app.store.session_progress import progress_of
 
 _MOTION_HIDDEN: Final = (
     "Hidden while the study is blinded, because with this device the recorded motion would reveal the liquid."

@@ -13,14 +13,14 @@ from typing import Any
 from study_app.errors import StoreError
 from study_app.protocol.model import RULES
 from study_app.protocol.source import did_you_mean
-from study_app.store.atomic import append_line, parse_json, read_own_if_there, write_file
 from study_app.store.blinded.blinding import reveals
-from study_app.store.columns import EXCLUSIONS
-from study_app.store.csv_files import MISSING, csv_bytes, header, unguard_formula
-from study_app.store.folder_lock import lock_folder
-from study_app.store.folders import StudyFolder, check_name_and_reason
+from study_app.store.files.atomic import append_line, parse_json, read_own_if_there, write_file
+from study_app.store.files.columns import EXCLUSIONS
+from study_app.store.files.csv_files import MISSING, csv_bytes, header, unguard_formula
+from study_app.store.files.folders import StudyFolder, check_name_and_reason
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.journals import journal
-from study_app.store.progress import progress_of
+from study_app.store.session_progress.progress import progress_of
 from study_app.text_tables import decoded, separator_of, wrong_length
 
 _NAMED_IDS = 6

@@ -4,7 +4,7 @@
 
     pooled/
       sites.json      which sites there are; a folder below sites/ that it does not list does not count
-      sites/A/        the results folder of site A, as it was (see `store.folders`), with its sealed key
+      sites/A/        the results folder of site A, as it was (see `store.files.folders`), with its sealed key
       sites/B/
 
 There are no merged tables on the disk: whoever reads the folder makes them from the sites, so that a withdrawal, an
@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Final
 
 from study_app.errors import StoreError
-from study_app.store.atomic import cannot_read, parse_json, read_regular
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, check_study_name
+from study_app.store.files.atomic import cannot_read, parse_json, read_regular
+from study_app.store.files.folders import ID_PATTERN, SessionFolder, StudyFolder, check_study_name
 from study_app.store.journals.journal_events import is_valid_value, shorten_value
 
 MANIFEST: Final = "sites.json"

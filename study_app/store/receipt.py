@@ -21,7 +21,7 @@ from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import block_codes, order_of
-from study_app.store.atomic import parse_json, read_own, study_root, write_file
+from study_app.store.files.atomic import parse_json, read_own, study_root, write_file
 from study_app.store.journals.journal_events import SessionStarted, is_valid_value, plain_json, shorten_value
 
 GENERATOR = (

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from study_app.errors import StoreError
-from study_app.store.atomic import sync_folder, system_message
+from study_app.store.files.atomic import sync_folder, system_message
 from study_app.store.journals.journal_events import Recorded, RecordingLost, Which
 
 if TYPE_CHECKING:

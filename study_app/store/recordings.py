@@ -27,9 +27,9 @@ from pyarrow import parquet
 
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, SampleField, records
-from study_app.store.atomic import cannot_read, parse_json, read_regular, write_file
 from study_app.store.blinded.sealing import MARK, frames_bytes, open_file, samples_bytes, seal_file
-from study_app.store.csv_files import Column, Kind
+from study_app.store.files.atomic import cannot_read, parse_json, read_regular, write_file
+from study_app.store.files.csv_files import Column, Kind
 from study_app.store.journals.journal_events import plain_json
 
 FRAMES: tuple[Column, ...] = (

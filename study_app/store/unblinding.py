@@ -17,15 +17,6 @@ from study_app.errors import StoreError
 from study_app.protocol.blocks import block_titles
 from study_app.protocol.model import quoted_title
 from study_app.store import receipt
-from study_app.store.atomic import (
-    is_there,
-    read_if_there,
-    read_own,
-    remove_old_temporary_files,
-    remove_temporary_files,
-    study_root,
-    write_file,
-)
 from study_app.store.blinded.blinding import (
     Codes,
     Key,
@@ -36,7 +27,6 @@ from study_app.store.blinded.blinding import (
     reveals,
     verified_key,
 )
-from study_app.store.checksums import replace_checksums
 from study_app.store.exclusions import (
     MISSING_RULE,
     Exclusion,
@@ -46,12 +36,22 @@ from study_app.store.exclusions import (
     exclusions,
     reversals,
 )
-from study_app.store.folder_lock import is_open, lock_folder
-from study_app.store.folders import ReportProgress, SessionFolder, StudyFolder
+from study_app.store.files.atomic import (
+    is_there,
+    read_if_there,
+    read_own,
+    remove_old_temporary_files,
+    remove_temporary_files,
+    study_root,
+    write_file,
+)
+from study_app.store.files.folders import ReportProgress, SessionFolder, StudyFolder
+from study_app.store.integrity.checksums import replace_checksums
+from study_app.store.integrity.folder_lock import is_open, lock_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import Event, Recorded, SessionEnded, TrialStarted, start_of
 from study_app.store.merged import folders_of
-from study_app.store.progress import trial_results
+from study_app.store.session_progress.progress import trial_results
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.tables.study_files import has_sealed_columns, refuse_earlier_columns, write_study_files
 

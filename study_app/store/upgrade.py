@@ -13,12 +13,12 @@ from study_app.errors import StoreError
 from study_app.protocol.load import read_document
 from study_app.protocol.source import source_bytes
 from study_app.protocol.upgrade import needs_upgrade, upgraded_file
-from study_app.store.atomic import is_there, read_if_there, read_regular, write_file
 from study_app.store.blinded.blinding import opened_key
-from study_app.store.checksums import replace_checksums
-from study_app.store.csv_files import has_same_cells
-from study_app.store.folder_lock import is_never_begun, lock_folder
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.atomic import is_there, read_if_there, read_regular, write_file
+from study_app.store.files.csv_files import has_same_cells
+from study_app.store.files.folders import SessionFolder, StudyFolder
+from study_app.store.integrity.checksums import replace_checksums
+from study_app.store.integrity.folder_lock import is_never_begun, lock_folder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import SessionEnded, start_of
 from study_app.store.sessions.open_session import Place, table_files

@@ -18,7 +18,8 @@ from pathlib import Path
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.store.atomic import (
+from study_app.store.exclusions import exclusion_bytes, exclusions
+from study_app.store.files.atomic import (
     append_line,
     cannot_write,
     is_there,
@@ -31,14 +32,13 @@ from study_app.store.atomic import (
     sync_folder,
     write_file,
 )
-from study_app.store.checksums import fingerprint, place_of, proof_of, read_checksums, sha256
-from study_app.store.exclusions import exclusion_bytes, exclusions
-from study_app.store.folder_lock import lock_folder, refuse_if_open
-from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder, check_name_and_reason
+from study_app.store.files.folders import ID_PATTERN, SessionFolder, StudyFolder, check_name_and_reason
+from study_app.store.files.output_files import Output, erase_outputs
+from study_app.store.integrity.checksums import fingerprint, place_of, proof_of, read_checksums, sha256
+from study_app.store.integrity.folder_lock import lock_folder, refuse_if_open
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import is_valid_value
 from study_app.store.merged import MANIFEST, merged_above
-from study_app.store.output_files import Output, erase_outputs
 from study_app.store.tables.study_files import described_study, write_participants
 from study_app.workspace import workspace
 

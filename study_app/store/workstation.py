@@ -19,7 +19,7 @@ from study_app.devices import DEFAULT_DEVICE, NAME_PATTERN, WITHOUT_FORCE
 from study_app.errors import StoreError
 from study_app.outlets.session_outlets import SampleChoice
 from study_app.protocol.source import faults_of
-from study_app.store.atomic import cannot_read, cannot_write, write_file
+from study_app.store.files.atomic import cannot_read, cannot_write, write_file
 from study_app.user_folder import FOLDER_VARIABLE, settings_file
 from study_app.workspace import Workspace, setting_of, workspace
 

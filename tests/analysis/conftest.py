@@ -14,10 +14,10 @@ from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import Key
-from study_app.store.columns import RESPONSES, TRIALS
-from study_app.store.csv_files import Column, csv_bytes
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.columns import RESPONSES, TRIALS
+from study_app.store.files.csv_files import Column, csv_bytes
+from study_app.store.files.folders import SessionFolder, StudyFolder
 
 SMALL = (Path(__file__).parent / "small.toml").read_text(encoding="utf-8")
 """A study with repetitions, an optional item, an answer off the scale and questions in practice."""

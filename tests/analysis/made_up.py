@@ -9,8 +9,8 @@ import pandas as pd
 
 from study_app.analysis.data.blocks import NOTHING_DECIDED, Block, Decided, Item, Setting
 from study_app.analysis.data.study_tables import Study
-from study_app.store.columns import RESPONSES, TRIALS
-from study_app.store.csv_files import Column
+from study_app.store.files.columns import RESPONSES, TRIALS
+from study_app.store.files.csv_files import Column
 
 TYPES = {"text": "string", "time": "string", "integer": "Int64", "number": "Float64", "flag": "boolean"}
 ITEMS = ("different", "harder")

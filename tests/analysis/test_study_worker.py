@@ -36,7 +36,7 @@ from study_app.gui.sessions.session_facts import session_facts
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclusions
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.sites.merge import merge_sites
 from study_app.workers.server import Refused, Stopped
 from tests.studies import made_up, rehearsed

@@ -19,7 +19,7 @@ from study_app.haptics.runtime import offline
 from study_app.protocol.load import load_scene
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.documented import ROOT, blocks
 from tests.golden import compare

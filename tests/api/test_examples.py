@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.documented import ROOT
 from tests.protocol.trials import level_studies

@@ -15,7 +15,7 @@ from study_app.protocol.wording.languages import words
 from study_app.session.pages import TaskPage
 from study_app.session.transitions.events import Continue
 from study_app.store.journals import journal_events
-from study_app.store.progress import Progress
+from study_app.store.session_progress.progress import Progress
 
 
 class World:

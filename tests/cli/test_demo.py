@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from study_app.cli import commands
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.studies import made_up
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 from PySide6.QtWidgets import QApplication
 
-from study_app.store.drafts import draft_of
+from study_app.store.versions.drafts import draft_of
 from tests.designer.support.inputs import QtInput
 from tests.designer.support.made_studies import STUDIES, check_file, save
 from tests.designer.support.users import USERS

@@ -15,9 +15,9 @@ from study_app.designer.new_study_page import _listed_title
 from study_app.designer.outline import ROW_ROLE
 from study_app.number_text import duration
 from study_app.protocol.source.files import shipped
-from study_app.store.drafts import Keeper
-from study_app.store.study_settings import keep_original
-from study_app.store.study_versions import content_hash
+from study_app.store.versions.drafts import Keeper
+from study_app.store.versions.study_settings import keep_original
+from study_app.store.versions.study_versions import content_hash
 
 pytestmark = pytest.mark.slow
 

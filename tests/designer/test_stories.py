@@ -28,10 +28,10 @@ from study_app.designer.document.study import read_study
 from study_app.errors import StoreError
 from study_app.gui.widgets.cards import Chip
 from study_app.protocol.source.files import protocol_hash
-from study_app.store.drafts import Draft, draft_of, write_draft
-from study_app.store.folder_lock import lock_folder
-from study_app.store.study_settings import keep_original, kept_original
-from study_app.store.study_versions import content_hash
+from study_app.store.integrity.folder_lock import lock_folder
+from study_app.store.versions.drafts import Draft, draft_of, write_draft
+from study_app.store.versions.study_settings import keep_original, kept_original
+from study_app.store.versions.study_versions import content_hash
 from tests.designer.support.designer import DEMO
 from tests.designer.support.runs import run
 from tests.designer.support.story import Story

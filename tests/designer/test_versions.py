@@ -20,8 +20,8 @@ from study_app.designer.document.steps import SetValue
 from study_app.gui.sessions.session_facts import SessionFacts
 from study_app.gui.widgets.cards import Chip
 from study_app.protocol.source.files import protocol_hash, shipped_file
-from study_app.store.drafts import draft_of
-from study_app.store.study_versions import kept_content, kept_versions
+from study_app.store.versions.drafts import draft_of
+from study_app.store.versions.study_versions import kept_content, kept_versions
 from tests.designer.support.designer import Designer
 from tests.designer.support.runs import run
 

@@ -17,8 +17,8 @@ from study_app.designer.file import file_text
 from study_app.designer.new_study_page import KnownAnswer, header_state, template_choice
 from study_app.designer.problems import fault_rows, problem_rows, warning_rows
 from study_app.errors import StudyError
-from study_app.store.study_runs import Run
-from study_app.store.study_versions import Kept
+from study_app.store.versions.study_runs import Run
+from study_app.store.versions.study_versions import Kept
 from tests.designer.support.designer import DEMO
 from tests.golden import check_kept
 from tests.transcripts import calls, played

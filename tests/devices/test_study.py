@@ -20,9 +20,9 @@ from study_app.protocol.load import load
 from study_app.session.simulated import rehearsal
 from study_app.session.simulated.observers import exploration
 from study_app.session.simulated.rehearsal import RehearsedSession
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.store.forging import parquet_of
 

@@ -17,15 +17,15 @@ from study_app.session.simulated.answers_only import DEVICE, Answering, Kept, Si
 from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.session.transitions.table import initial_state
 from study_app.store.blinded.allocation import session_protocol
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
-from study_app.store.progress import progress_of
+from study_app.store.session_progress.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen_store
 from study_app.store.unblinding import unblind_folder
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.end_to_end.drawn_studies import drawn
 from tests.studies import begun, made_up
 

@@ -20,7 +20,7 @@ from study_app.session.simulated.answers_only import DEVICE, Answering, Simulate
 from study_app.session.transitions.table import initial_state
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.user_folder import data_folder
 from tests.studies import begun, made_up, rehearsed
 

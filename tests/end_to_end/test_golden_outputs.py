@@ -13,7 +13,7 @@ import pytest
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.csv_files import unguard_formula
+from study_app.store.files.csv_files import unguard_formula
 from study_app.store.unblinding import unblind_folder
 from tests.analysis.levels.level_studies import levels_file
 from tests.analysis.outputs import figures_as_lines, sav_labels

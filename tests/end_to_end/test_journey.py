@@ -28,10 +28,10 @@ from study_app.session.transitions.events import Chosen, Event, Submitted
 from study_app.session.transitions.table import initial_state
 from study_app.store.blinded.allocation import session_protocol
 from study_app.store.exclusions import exclude, exclusions, include
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
-from study_app.store.progress import progress_of
+from study_app.store.session_progress.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen_store
 from study_app.store.unblinding import unblind_folder

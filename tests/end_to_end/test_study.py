@@ -14,9 +14,9 @@ from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.protocol.source.files import shipped
 from study_app.session.replay import replay
 from study_app.store.blinded.blinding import open_events, open_or_draw_key, read_key
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 

@@ -20,7 +20,7 @@ from PySide6.QtGui import QColor
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
-from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
+from study_app.gui.operator.operator_view import OperatorView, Session, stages, view_session
 from study_app.gui.operator.servo_health import ServoHealth
 from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import parse
@@ -42,7 +42,7 @@ from study_app.session.transitions.events import (
 )
 from study_app.session.transitions.state import FINAL
 from study_app.session.transitions.table import advance, initial_state
-from study_app.store.progress import Progress
+from study_app.store.session_progress.progress import Progress
 from tests.end_to_end.real_windows import Program, wait_for
 from tests.journal_lines import event_of
 
@@ -153,7 +153,7 @@ class Pages:
             device_icon="mouse",
             device_rows=(("Priority", "normal"),),
         )
-        return operator_view(session, ended, ServoHealth(1000.0).vitals(), now_s=1.0, force_on=False)
+        return view_session(session, ended, ServoHealth(1000.0).vitals(), now_s=1.0, force_on=False)
 
 
 class Person:

@@ -16,13 +16,14 @@ from study_app import workspace
 from study_app.analysis.planning import preregistration
 from study_app.devices.falcon import calibration
 from study_app.errors import StudyError
-from study_app.store import drafts, workstation
+from study_app.store import workstation
 from study_app.store.blinded.allocation import claims
-from study_app.store.checksums import read_list, unreadable_lines
 from study_app.store.exclusions import Exclusion, reversals
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.files.output_files import outputs
+from study_app.store.integrity.checksums import read_list, unreadable_lines
 from study_app.store.merged import Merged, Site, all_exclusions, read_merged
-from study_app.store.output_files import outputs
+from study_app.store.versions import drafts
 from study_app.store.withdrawals import ErasedSession, Tombstone, tombstones
 from study_app.user_folder import data_folder, settings_file
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting

@@ -19,7 +19,7 @@ from study_app.store.exclusions import exclude
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.benchmarks.sessions import disk
 from tests.faults.support.worlds import StoredWorld

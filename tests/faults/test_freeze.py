@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.benchmarks.devices import ends
 from tests.compiled import needs_servo
 from tests.journal_lines import raw

@@ -9,10 +9,10 @@ import pytest
 
 from study_app.protocol.load import load
 from study_app.protocol.orders.block_orders import orders_of
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.tables import session_tables
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.killer_runs import outcomes_of

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.faults.support import short
 from tests.faults.support.command_killer import COMMANDS

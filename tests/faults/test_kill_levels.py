@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.columns import DELIVERED, TRIALS
-from study_app.store.folders import StudyFolder
+from study_app.store.files.columns import DELIVERED, TRIALS
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.faults.support.killer_runs import outcomes_of
 from tests.journal_lines import raw

@@ -17,7 +17,7 @@ from study_app.session import start
 from study_app.session.pages import TaskPage
 from study_app.store import receipt
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.leaks import Telltales, find_leaks, presented_numbers, recorded_numbers, telltales
 from tests.compiled import needs_servo

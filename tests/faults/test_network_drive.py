@@ -18,12 +18,12 @@ from study_app.session.pages import TroublePage
 from study_app.session.runner import RETRY_S
 from study_app.session.transitions.events import Note
 from study_app.session.transitions.state import Phase
-from study_app.store import folder_lock
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity import folder_lock
 from study_app.store.journals import journal_events
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen_store
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.faults.support.worlds import StoredWorld
 from tests.session import small
 from tests.studies import rehearsed

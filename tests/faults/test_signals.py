@@ -12,9 +12,9 @@ import pytest
 
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.sessions.recovery import check_resumable
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import COMPILED_S, Program, needs_display, virtual_display, wait_for
 from tests.faults.support import short

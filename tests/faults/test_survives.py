@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from study_app.session.replay import replay
-from study_app.store.folders import StudyFolder
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.files.folders import StudyFolder
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.end_to_end.real_windows import COMPILED_S, needs_display, virtual_display
 

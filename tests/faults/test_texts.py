@@ -9,10 +9,10 @@ import pytest
 from study_app.analysis.data.study_tables import load_study
 from study_app.session.transitions.events import EndRequested, Note, RepeatRequested
 from study_app.session.transitions.state import Phase
-from study_app.store.csv_files import unguard_formula
 from study_app.store.exclusions import exclude, exclusions
+from study_app.store.files.csv_files import unguard_formula
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.faults.support.worlds import StoredWorld
 from tests.journal_lines import raw
 

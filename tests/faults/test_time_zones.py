@@ -11,9 +11,9 @@ from PySide6.QtCore import QLocale
 from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.gui.sessions.session_page import read_record
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.studies import rehearsed
 
 pytestmark = [

@@ -17,9 +17,9 @@ import pytest
 from study_app.cli import main
 from study_app.errors import StoreError
 from study_app.store.exclusions import exclusions
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests import studies
 from tests.faults.support.racers import race
 from tests.journal_lines import raw

@@ -16,10 +16,10 @@ from study_app.devices.doctor import Report
 from study_app.devices.falcon.failures import failures_on
 from study_app.gui.devices.diagnosis_dialog import DiagnosisDialog
 from study_app.gui.home.dialogs import NewSessionDialog
-from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.home.study_facts import Interrupted
 from study_app.gui.kit.devices import devices_shown
 from study_app.gui.preflight.window import computer_checks
+from study_app.gui.startup_window import OpeningWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.haptics.runtime.clocks.grants import Grant

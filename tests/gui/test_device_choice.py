@@ -9,7 +9,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 
 from study_app.errors import DeviceError, DeviceNotFound
-from study_app.gui.home.startup_window import OpeningWindow
+from study_app.gui.startup_window import OpeningWindow
 from study_app.protocol.load import load
 from study_app.session.start import NewSession, check_choices, study_results
 

@@ -16,7 +16,6 @@ from study_app.gui.display.screens import ScreenShown
 from study_app.gui.help.view import HelpPlace
 from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.home.main_window import MainWindow
-from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.home.study_facts import study_facts
 from study_app.gui.kit.devices import devices_shown
 from study_app.gui.lab.view import LabPlace
@@ -26,6 +25,7 @@ from study_app.gui.results.figures import unblinding_text
 from study_app.gui.results.view import ResultsPlace
 from study_app.gui.settings import view as settings_view
 from study_app.gui.settings.view import DisplayTest, MachinePlace
+from study_app.gui.startup_window import OpeningWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.main_view import Place

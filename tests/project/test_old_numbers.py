@@ -41,8 +41,8 @@ def test_sections_older_than_their_code_and_without_a_date_are_told_apart(tmp_pa
         "CHANGELOG.md": CHANGELOG,
         "docs/page.md": PAGE,
         "study_app/haptics/tick.py": "",
-        "study_app/store/folders.py": "",
-        "tests/benchmarks/x.py": "from study_app.store.folders import StudyFolder\n",
+        "study_app/store/files/folders.py": "",
+        "tests/benchmarks/x.py": "from study_app.store.files.folders import StudyFolder\n",
     }
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)

@@ -25,9 +25,9 @@ from study_app.session.transitions.page_builder import build_page
 from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import initial_state
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.studies import begun
 

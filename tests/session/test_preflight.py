@@ -24,7 +24,7 @@ from study_app.session.preflight import Measurements, PredictedDelivery, Screen,
 from study_app.session.preflight_measurements import measure_servo_and_disk
 from study_app.session.start import NewSession, participant_with_other_contents, seen_late
 from study_app.store import receipt
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal_events import TrialStarted
 from study_app.store.unblinding import unblind
 from study_app.store.workstation import DEFAULTS, DeviceBench, save_settings

@@ -31,7 +31,7 @@ from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import event_from, event_of
 from tests.outlets.collector import Collector
 from tests.session import small

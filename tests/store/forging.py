@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from study_app.store.blinded.blinding import open_events, opened_key, read_key, seal_event
-from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.journals.journal import line_bytes, read
 from study_app.store.recordings import opened_content
 from study_app.store.sessions.open_session import Place, table_files

@@ -131,7 +131,7 @@ def _path_of(descriptor: int) -> Path:
 
 
 def _store_functions(frame: FrameType | None) -> Iterator[str]:
-    """Yield the functions of the store in a stack, as "store/atomic.py:write_file"."""
+    """Yield the functions of the store in a stack, as "store/files/atomic.py:write_file"."""
     while frame is not None:
         _, store, module = frame.f_code.co_filename.rpartition(STORE)
         if store:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.atomic import (
+from study_app.store.files.atomic import (
     OLD_S,
     append_line,
     create_folder,
@@ -17,7 +17,7 @@ from study_app.store.atomic import (
     temporary_path,
     write_file,
 )
-from study_app.store.checksums import sha256
+from study_app.store.integrity.checksums import sha256
 from tests.platforms import files_up_to, needs_posix
 
 

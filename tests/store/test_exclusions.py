@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.store import unblinding
 from study_app.store.exclusions import Exclusion, exclude, exclusions, include, keep, reversals
 from study_app.store.unblinding import late_exclusions, unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.platforms import files_up_to, needs_links
 from tests.store.conftest import Start
 

@@ -28,28 +28,20 @@ from study_app import api
 from study_app.cli import commands
 from study_app.errors import StudyError
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store import (
-    atomic,
-    csv_files,
-    drafts,
-    exclusions,
-    folder_lock,
-    output_files,
-    program_log,
-    study_settings,
-    study_versions,
-    support,
-    workstation,
-)
-from study_app.store.atomic import temporary_path
-from study_app.store.folders import StudyFolder
+from study_app.store import exclusions, workstation
+from study_app.store.diagnostics import program_log, support
+from study_app.store.files import atomic, csv_files, output_files
+from study_app.store.files.atomic import temporary_path
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity import folder_lock
 from study_app.store.journals import journal_events as events
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import rebuild_session, reopen_store
 from study_app.store.sites.merge import merge_sites
 from study_app.store.upgrade import upgrade
 from study_app.store.verification.proofs import write_proof
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
+from study_app.store.versions import drafts, study_settings, study_versions
 from study_app.workspace import Workspace
 from tests import studies
 from tests.journal_lines import event_of

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from study_app.store.checksums import is_system_file
-from study_app.store.study_versions import Kept, keep_version, kept_versions
+from study_app.store.integrity.checksums import is_system_file
+from study_app.store.versions.study_versions import Kept, keep_version, kept_versions
 
 
 @pytest.mark.parametrize(

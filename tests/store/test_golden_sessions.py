@@ -12,9 +12,9 @@ import pytest
 
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude, include
-from study_app.store.progress import Progress
+from study_app.store.session_progress.progress import Progress
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests import golden
 from tests.golden_values import changed, table_lines, value_lines
 from tests.journal_lines import event_of

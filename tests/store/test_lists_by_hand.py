@@ -15,27 +15,18 @@ import pytest
 
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store import (
-    atomic,
-    csv_files,
-    drafts,
-    exclusions,
-    merged,
-    output_files,
-    receipt,
-    study_runs,
-    study_settings,
-    study_versions,
-)
+from study_app.store import exclusions, merged, receipt
 from study_app.store.blinded import blinding
-from study_app.store.checksums import file_hash, note_rebuilt, read_checksums, renew_checksums
-from study_app.store.delivered import broken_limits, delay_error_ms, is_within_limits
 from study_app.store.exclusions import Exclusion
-from study_app.store.folder_lock import remove_abandoned_claims
-from study_app.store.folders import SessionFolder, StudyFolder, rehearsal_folder
+from study_app.store.files import atomic, csv_files, output_files
+from study_app.store.files.folders import SessionFolder, StudyFolder, rehearsal_folder
+from study_app.store.integrity.checksums import file_hash, note_rebuilt, read_checksums, renew_checksums
+from study_app.store.integrity.folder_lock import remove_abandoned_claims
 from study_app.store.recorder import Recorder
+from study_app.store.session_progress.delivered import broken_limits, delay_error_ms, is_within_limits
 from study_app.store.sessions import begin
 from study_app.store.sites import merge
+from study_app.store.versions import drafts, study_runs, study_settings, study_versions
 from study_app.user_folder import data_folder
 from tests.platforms import needs_links
 
@@ -357,7 +348,7 @@ def test_a_message_names_the_file_and_then_the_reason(
     (tmp_path / "r").write_bytes(b"[")
     if "No space" in sentence:
         for name in ("sync_folder", "shutil.copytree"):
-            monkeypatch.setattr(f"study_app.store.atomic.{name}", refuse)
+            monkeypatch.setattr(f"study_app.store.files.atomic.{name}", refuse)
         monkeypatch.setattr(Path, "unlink", refuse)
         if "read" in sentence:
             monkeypatch.setattr(Path, "stat", refuse)

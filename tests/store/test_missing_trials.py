@@ -3,8 +3,8 @@
 import pytest
 
 from study_app.store.journals.journal_events import Event
-from study_app.store.missing_trials import MissingTrials
-from study_app.store.progress import Progress
+from study_app.store.session_progress.missing_trials import MissingTrials
+from study_app.store.session_progress.progress import Progress
 from tests.journal_lines import event_of
 
 ATTEMPTS = 2

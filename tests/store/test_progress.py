@@ -8,9 +8,9 @@ from study_app.protocol.load import parse
 from study_app.protocol.randomization.streams import stream
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.store.blinded.blinding import complete_protocol, open_or_draw_key, read_key
-from study_app.store.folders import StudyFolder
-from study_app.store.progress import Progress
+from study_app.store.files.folders import StudyFolder
 from study_app.store.receipt import without_conditions
+from study_app.store.session_progress.progress import Progress
 from tests.journal_lines import event_of
 from tests.protocol.edited_studies import STUDIES
 from tests.protocol.trials.level_studies import text_of

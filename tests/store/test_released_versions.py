@@ -14,11 +14,11 @@ from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.session.replay import replay
 from study_app.session.simulated import rehearsal
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
 from study_app.store.upgrade import upgrade
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 

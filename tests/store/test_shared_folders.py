@@ -17,7 +17,7 @@ from study_app.protocol.source.files import has_hash, protocol_hash, shipped_fil
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.exclusions import exclude, exclusions, include
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 
 pytestmark = pytest.mark.slow
 

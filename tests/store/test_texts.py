@@ -9,7 +9,7 @@ from jsonschema import Draft7Validator
 
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
-from study_app.store.csv_files import Column, guard_formula, header, read_table, table_problems
+from study_app.store.files.csv_files import Column, guard_formula, header, read_table, table_problems
 from study_app.store.journals.journal_events import journal_schema, line_problem
 from study_app.store.sessions.begin import check_participant
 from study_app.store.verification.leaks import telltales

@@ -12,14 +12,14 @@ from study_app.errors import ProtocolError, StoreError
 from study_app.haptics.model.estimators import Ewma
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.source.files import shipped_file
-from study_app.store.atomic import write_file
-from study_app.store.folder_lock import lock_folder
-from study_app.store.folders import StudyFolder
+from study_app.store.files.atomic import write_file
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.sessions.recovery import check_resumable
 from study_app.store.tables.study_files import check_study
 from study_app.store.unblinding import unblind
 from study_app.store.upgrade import upgrade
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.store.conftest import contents
 
 RELEASES = Path(__file__).parent / "releases"

@@ -50,7 +50,7 @@ def folder(tmp_path, monkeypatch):
 def test_a_write_that_fails_leaves_the_old_settings(folder, monkeypatch):
     save_settings(ALL)
     assert load_settings() == ALL
-    monkeypatch.setattr("study_app.store.atomic.os.fsync", _full)
+    monkeypatch.setattr("study_app.store.files.atomic.os.fsync", _full)
     with pytest.raises(StoreError, match="machine"):
         save_settings(DEFAULTS)
     monkeypatch.undo()

@@ -22,7 +22,7 @@ parser.add_argument(
 given = parser.parse_args()
 os.environ["QT_QPA_PLATFORM"] = "offscreen"  # the same pictures on every machine
 
-from study_app.store.atomic import make_folder  # noqa: E402 - Qt reads the platform when it is loaded
+from study_app.store.files.atomic import make_folder  # noqa: E402 - Qt reads the platform when it is loaded
 from tools.screenshots import screenshots  # noqa: E402
 
 make_folder(given.to, waits=False)

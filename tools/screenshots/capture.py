@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from study_app.errors import StudyError
 from study_app.gui.widgets.background import wait_for_jobs
-from study_app.store.atomic import write_file
+from study_app.store.files.atomic import write_file
 
 PATIENCE_S: Final = 180.0  # the first session after an installation compiles
 SETTLED_MS: Final = 250

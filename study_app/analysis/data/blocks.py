@@ -37,7 +37,7 @@ from study_app.protocol.trials import (
     default_design,
     rises,
 )
-from study_app.store.blinded.blinding import Key, complete_protocol
+from study_app.store.blinded import Key, complete_protocol
 
 Kind: TypeAlias = Compared
 

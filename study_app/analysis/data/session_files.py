@@ -23,16 +23,26 @@ from study_app.analysis.data.blocks import (
 from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.blocks import display_language
 from study_app.protocol.source import text_in
-from study_app.store.atomic import parse_json, read_regular
-from study_app.store.blinded.blinding import Key
-from study_app.store.columns import INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING
-from study_app.store.csv_files import MISSING, Column, header, read_cells
+from study_app.store.blinded import Key
 from study_app.store.exclusions import Exclusion, describe_exclusion
-from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.files import (
+    INTERVALS,
+    MISSING,
+    RESPONSES,
+    TRIALS,
+    TRIALS_MISSING,
+    Column,
+    SessionFolder,
+    StudyFolder,
+    check_study_name,
+    header,
+    parse_json,
+    read_cells,
+    read_regular,
+)
 from study_app.store.journals import journal
-from study_app.store.missing_trials import MissingTrials
-from study_app.store.progress import progress_of
-from study_app.store.tables.study_files import has_intervals
+from study_app.store.session_progress import MissingTrials, progress_of
+from study_app.store.tables import has_intervals
 
 _DTYPES: Final[dict[str, Any]] = {
     "text": "string",

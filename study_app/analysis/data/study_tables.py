@@ -56,18 +56,16 @@ from study_app.errors import AnalysisError, StoreError
 from study_app.protocol.model import RULES, Contrast
 from study_app.protocol.participants import EACH_GROUP
 from study_app.protocol.questions import STATEMENT
-from study_app.store.blinded import blinding
-from study_app.store.blinded.blinding import Key
-from study_app.store.columns import INTERVALS, SEALED
+from study_app.store.blinded import Key, revealed_key
 from study_app.store.exclusions import MISSING_RULE, Exclusion, exclusions, reversals
-from study_app.store.folder_lock import is_never_begun
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files import INTERVALS, SEALED, SessionFolder, StudyFolder
+from study_app.store.integrity import is_never_begun
 from study_app.store.journals.journal_events import INCOMPLETE, REACHED_END
 from study_app.store.merged import DASH, Merged, read_merged
-from study_app.store.sessions.open_session import Place
-from study_app.store.tables.study_files import has_intervals, refuse_earlier_columns
+from study_app.store.sessions import Place
+from study_app.store.tables import has_intervals, refuse_earlier_columns
 from study_app.store.unblinding import has_opened_keys, late_exclusions
-from study_app.store.verification.verify_session import Discrepancy, session_discrepancies
+from study_app.store.verification import Discrepancy, session_discrepancies
 from study_app.store.withdrawals import Tombstone, tombstones
 
 Settings: TypeAlias = Mapping[tuple[str, str], Setting]
@@ -155,7 +153,7 @@ _TRIAL: Final = ["participant", "session", "trial"]
 class Study:
     """All sessions of one study.
 
-    ``responses`` and ``trials`` have the columns of ``store.columns``, with ``session_status``, ``excluded``,
+    ``responses`` and ``trials`` have the columns of ``store.files.columns``, with ``session_status``, ``excluded``,
     ``exclusion_reason`` and ``counted`` added; ``participants`` has one row per session, with the last three and its
     `MissingTrials`. ``blocks`` are the main blocks with questions; ``settings`` maps every (block, code) to its
     condition, and is empty while the key is sealed; ``exclusions`` are all exclusions, ``late`` those that a person
@@ -493,7 +491,7 @@ def _without_columns(table: pd.DataFrame, columns: AbstractSet[str]) -> pd.DataF
 def _key(place: StudyFolder, sessions: Sequence[SessionFolder]) -> Key | None:
     """Return the opened key; raise a specific error if a session belongs to another study."""
     try:
-        return blinding.revealed_key(place.path)
+        return revealed_key(place.path)
     except StoreError:
         first, *others = [read_session(session, None) for session in sessions]
         for other in others:

@@ -25,11 +25,9 @@ from study_app.protocol.source import (
     unbundle,
     without_byte_order_mark,
 )
-from study_app.store.atomic import open_regular, system_message
-from study_app.store.blinded.blinding import revealed_key
-from study_app.store.csv_files import Column
+from study_app.store.blinded import revealed_key
+from study_app.store.files import Column, FileCopy, open_regular, system_message
 from study_app.store.merged import read_merged
-from study_app.store.output_files import FileCopy
 
 
 class Materials(NamedTuple):

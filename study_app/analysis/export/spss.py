@@ -21,7 +21,7 @@ from study_app.analysis.data.blocks import PlacedQuestion, PlacedScore
 from study_app.analysis.data.measures import LEVELS
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells
-from study_app.store.csv_files import Column
+from study_app.store.files import Column
 
 _EXCLUDED: Final = 97
 _CANNOT_JUDGE: Final = 98

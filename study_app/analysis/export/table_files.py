@@ -14,8 +14,7 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import spss
 from study_app.analysis.export.tables import Cells, Delivered, QuestionCells, names_of_sealed
 from study_app.analysis.levels.statistic import statistics
-from study_app.store.columns import SEALED
-from study_app.store.csv_files import COMPUTED, MISSING, Column, csv_bytes, header
+from study_app.store.files import COMPUTED, MISSING, SEALED, Column, csv_bytes, header
 from study_app.store.unblinding import reveals_of
 
 _CREDITS: Final = {"authors": "author", "license": "license", "citation": "citation", "funder": "funder", "url": "url"}

@@ -20,8 +20,17 @@ from study_app.analysis.levels.evaluate import level_results
 from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS, tracks
 from study_app.analysis.questions import scored
-from study_app.store.columns import INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING
-from study_app.store.csv_files import Column, Kind, header, optional, unsealed_columns
+from study_app.store.files import (
+    INTERVALS,
+    RESPONSES,
+    TRIALS,
+    TRIALS_MISSING,
+    Column,
+    Kind,
+    header,
+    optional,
+    unsealed_columns,
+)
 
 
 @dataclass(frozen=True, eq=False)

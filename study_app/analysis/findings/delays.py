@@ -41,7 +41,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.equivalence import Equivalence, fewest_participants, tost
 from study_app.analysis.statistics.equivalence import Verdict as Nearness
 from study_app.analysis.statistics.thresholds import Threshold, noticed
-from study_app.analysis.statistics.trend import StepDown, Trend, step_down
+from study_app.analysis.statistics.trend_tests import StepDown, Trend, step_down
 from study_app.analysis.wording import (
     all_of,
     bound_text,

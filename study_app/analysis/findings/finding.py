@@ -19,7 +19,7 @@ from study_app.analysis.results import BlockResult, Failure, Failures, NotTested
 from study_app.analysis.statistics.outcome import DRAWS, Outcome, draws_for, false_discovery, holm
 from study_app.analysis.statistics.rank_tests import DRAWN_UP_TO
 from study_app.errors import StudyError
-from study_app.store.csv_files import Column, optional
+from study_app.store.files import Column, optional
 
 _T = TypeVar("_T")
 _U = TypeVar("_U")

@@ -25,8 +25,8 @@ from study_app.analysis.findings.statement_tests import Effects, Pairs, Settings
 from study_app.analysis.html_page import ends_of, heading, paragraph, table_of
 from study_app.analysis.page_layout import Drawing, Picture, tab_separated
 from study_app.analysis.results import BlockResult, NotTested, Verdict, name, short_text
-from study_app.analysis.statistics.recognition import MOST as MOST_NAMED
-from study_app.analysis.statistics.recognition import Recognition, named_labels, recognition
+from study_app.analysis.statistics.recognition_tests import MOST as MOST_NAMED
+from study_app.analysis.statistics.recognition_tests import Recognition, named_labels, recognition
 from study_app.analysis.wording import interval, listed, number, p_equals, p_value
 from study_app.protocol.participants import EACH_GROUP
 

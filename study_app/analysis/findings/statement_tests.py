@@ -44,7 +44,7 @@ from study_app.analysis.results import (
 from study_app.analysis.statistics.outcome import Interval, Outcome, false_discovery, holm, student_interval
 from study_app.analysis.statistics.rank_tests import Paired, friedman, global_permutation, paired
 from study_app.analysis.statistics.slope_tests import HOTELLING, T_TEST, SlopeTest, slope_test
-from study_app.analysis.statistics.trend import trend
+from study_app.analysis.statistics.trend_tests import trend
 from study_app.analysis.wording import all_of, counted, listed, number, p_equals, p_value, percent, significant
 
 ONE_DELAY: Final = "the block has only one delay, so there is nothing to compare it with"

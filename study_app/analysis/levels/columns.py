@@ -7,9 +7,8 @@ without the libraries of the analysis, which may not be installed.
 from dataclasses import replace
 from typing import Final, NamedTuple
 
-from study_app.store.columns import INTERVALS, PARTICIPANTS, TRIALS_MISSING, with_missing_trials
-from study_app.store.csv_files import Column, optional
-from study_app.store.tables.column_dictionary import table_markdown
+from study_app.store.files import INTERVALS, PARTICIPANTS, TRIALS_MISSING, Column, optional, with_missing_trials
+from study_app.store.tables import table_markdown
 
 _STATUS: Final = next(column for column in with_missing_trials(PARTICIPANTS) if column.name == "status")
 

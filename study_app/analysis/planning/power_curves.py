@@ -41,8 +41,7 @@ from study_app.analysis.wording import bound_text, listed
 from study_app.protocol.model import Contrast
 from study_app.protocol.participants import CONSISTENT, NOISY, STATED
 from study_app.psychophysics.grid import Z_95
-from study_app.store.csv_files import Column, csv_bytes, optional
-from study_app.store.output_files import write_files
+from study_app.store.files import Column, csv_bytes, optional, write_files
 
 Question: TypeAlias = Literal["settings differ", "trend", "lowest delay", "equivalence", "contrast"]
 

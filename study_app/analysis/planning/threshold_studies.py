@@ -43,7 +43,7 @@ from study_app.protocol.warnings import (
 )
 from study_app.psychophysics.grid import Z_95
 from study_app.psychophysics.people import BETWEEN_PEOPLE, ESTIMATE_NOISE, Estimates, Person
-from study_app.store.csv_files import Column, csv_bytes, optional
+from study_app.store.files import Column, csv_bytes, optional
 
 BATCH: Final = 10
 """Studies of one case; which studies these are does not depend on how many are asked for."""

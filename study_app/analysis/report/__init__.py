@@ -2,3 +2,9 @@
 
 Reading order: methods, questions_in_full; sections, study_figures; first_page; write_report.
 """
+
+from study_app.analysis.report.sections import answers
+from study_app.analysis.report.study_figures import plot
+from study_app.analysis.report.write_report import report
+
+__all__ = ["answers", "plot", "report"]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from study_app.analysis.html_page import bullets, heading, paragraph, table_of
 from study_app.analysis.wording import listed
-from study_app.store.study_runs import RecordedContent, content_changes
+from study_app.store.versions import RecordedContent, content_changes
 
 
 class _Text(NamedTuple):

@@ -52,11 +52,10 @@ from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
 from study_app.protocol.model import RULES, quoted_title
 from study_app.protocol.orders import Evenness, session_steps_of
-from study_app.store.delivered import broken_limits
 from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of
-from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials
-from study_app.store.study_runs import recorded_contents
+from study_app.store.session_progress import MISSING_PERCENT, MissingTrials, broken_limits
+from study_app.store.versions import recorded_contents
 
 
 def of_levels(results: Results) -> tuple[str, ...]:

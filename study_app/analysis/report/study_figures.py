@@ -18,7 +18,7 @@ from study_app.analysis.page_layout import Drawing, FigureTask, draw_figures
 from study_app.analysis.questions import question_results
 from study_app.analysis.results import Failures, Results
 from study_app.errors import AnalysisError
-from study_app.store.output_files import write_output
+from study_app.store.files import write_output
 
 
 def block_figure_tasks(study: Study, results: Results, forms: Sequence[str] = style.FORMATS) -> Iterator[FigureTask]:

@@ -55,15 +55,12 @@ from study_app.errors import AnalysisError
 from study_app.figure_style import FORMATS
 from study_app.number_text import capitalised
 from study_app.protocol.model import Contrast, Published
-from study_app.store.checksums import sha256
-from study_app.store.columns import TRIALS_MISSING
-from study_app.store.csv_files import Column, csv_bytes, optional
-from study_app.store.folders import StudyFolder
+from study_app.store.files import TRIALS_MISSING, Column, StudyFolder, csv_bytes, optional, write_output
+from study_app.store.integrity import sha256
 from study_app.store.merged import MANIFEST, folders_of
-from study_app.store.output_files import write_output
 from study_app.store.receipt import recorded_plug_ins
-from study_app.store.study_runs import recorded_contents
 from study_app.store.unblinding import RULES, reveals_of
+from study_app.store.versions import recorded_contents
 from study_app.workers.shared_tasks import SharedTasks
 
 _OF_FORMAT_2: Final = {

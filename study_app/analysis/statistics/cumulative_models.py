@@ -20,7 +20,7 @@ from scipy.special import expit, fdtrc, logsumexp, stdtrit
 
 from study_app.analysis.statistics.outcome import Array, Interval, Outcome, checked_values
 from study_app.analysis.statistics.slope_tests import student_test
-from study_app.analysis.statistics.trend import Direction
+from study_app.analysis.statistics.trend_tests import Direction
 from study_app.errors import AnalysisError
 
 _MODEL: Final = "cumulative mixed model"

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.special import fdtrc, stdtr, stdtrit
 
 from study_app.analysis.statistics.outcome import FEW, NO_VARIATION, Array, Interval, Outcome, complete_rows
-from study_app.analysis.statistics.trend import Direction
+from study_app.analysis.statistics.trend_tests import Direction
 from study_app.errors import AnalysisError
 
 _SURE: Final = 0.95

@@ -26,13 +26,19 @@ from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.registry import descriptor_of
 from study_app.discovery import explain_error
 from study_app.errors import DeviceError, DisplayError, ServoFault, StudyError, VideoError
-from study_app.gui.display.screens import Frames, has_graphics_card, place_window
-from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
-from study_app.gui.operator.servo_health import Forces, ServoHealth
-from study_app.gui.operator.session_panels import Strip
-from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.display import Frames, has_graphics_card, place_window
+from study_app.gui.operator import (
+    Forces,
+    OperatorView,
+    OperatorWindow,
+    ServoHealth,
+    Session,
+    Strip,
+    stages,
+    view_session,
+)
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.gui.widgets.background import Background
+from study_app.gui.widgets import Background
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import PageStep, Schedule, expected_duration_s, orders_of
 from study_app.protocol.randomization import stream
@@ -57,24 +63,22 @@ from study_app.session.transitions.events import (
     WriteRetried,
     broken,
 )
-from study_app.store.blinded.allocation import session_protocol
-from study_app.store.blinded.blinding import open_events
-from study_app.store.folders import StudyFolder
+from study_app.store.blinded import open_events, session_protocol
+from study_app.store.diagnostics import DEVICE_FAILED
+from study_app.store.files import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal_events import start_of
-from study_app.store.program_log import DEVICE_FAILED
-from study_app.store.progress import Progress, progress_of
+from study_app.store.session_progress import Progress, progress_of
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
     from study_app.devices.rig import Rig
-    from study_app.gui.theme.theme import Theme
+    from study_app.gui.theme import Theme
     from study_app.haptics.model.ranges import Vector
     from study_app.haptics.runtime.servo import Servo
     from study_app.outlets.session_outlets import Outlets
     from study_app.session.start import NewSession
-    from study_app.store.recorder import Recorder
-    from study_app.store.sessions.open_session import SessionStore
+    from study_app.store.sessions import Recorder, SessionStore
     from study_app.video.sources import Videos
 
 _TRACES_S = 0.030  # every second frame of 60 a second, every fifth of 144
@@ -433,7 +437,7 @@ class SessionBridge(QObject):
         parts, stalled = self.parts, self.runner.stalled
         self._count_faults()
         trouble = (parts.journal.progress.broke and self.runner.cause) or self.trouble
-        view = operator_view(
+        view = view_session(
             parts.session,
             parts.journal.progress,
             self.health.vitals(),

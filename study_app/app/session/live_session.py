@@ -29,11 +29,11 @@ from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.discovery import explain_error
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.gui.application import application_here
-from study_app.gui.display.screens import choose_screens, place_window
-from study_app.gui.home.startup_window import OpeningWindow
-from study_app.gui.kit.devices import described_screens, screen_number, settings_here, text_scale_on
-from study_app.gui.theme.theme import LIGHT, Theme
-from study_app.gui.widgets.background import Background
+from study_app.gui.display import choose_screens, place_window
+from study_app.gui.kit import described_screens, screen_number, settings_here, text_scale_on
+from study_app.gui.startup_window import OpeningWindow
+from study_app.gui.theme import LIGHT, Theme
+from study_app.gui.widgets import Background
 from study_app.protocol.load import load, parse
 from study_app.session.preflight import preflight_checks, refusal_reasons
 from study_app.session.resume import is_rehearsal
@@ -50,11 +50,11 @@ from study_app.session.start import (
     unopened_videos,
 )
 from study_app.store import receipt
-from study_app.store.folders import locate_session
+from study_app.store.files import locate_session
 from study_app.store.journals import journal_events
-from study_app.store.sessions.begin import refuse_never_begun
-from study_app.store.study_versions import keep_content
-from study_app.store.verification.proofs import write_proof
+from study_app.store.sessions import refuse_never_begun
+from study_app.store.verification import write_proof
+from study_app.store.versions import keep_content
 from study_app.store.workstation import remember_protocol
 from study_app.workspace import workspace
 
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from study_app.app.session.bridge import SessionBridge
     from study_app.app.session.preflight_controller import Preflight
     from study_app.outlets.session_outlets import Outlets
-    from study_app.store.sessions.open_session import SessionStore
+    from study_app.store.sessions import SessionStore
     from study_app.video.sources import Videos
 
 
@@ -70,7 +70,7 @@ def load_windows() -> None:
     """Load modules and versions that the session's windows need while the opening window is shown."""
     import study_app.app.session.bridge  # noqa: PLC0415
     import study_app.app.session.preflight_controller  # noqa: PLC0415
-    import study_app.gui.devices.diagnosis_dialog  # noqa: PLC0415
+    import study_app.gui.devices  # noqa: PLC0415
     import study_app.store.receipt  # noqa: PLC0415
     import study_app.store.recordings  # noqa: PLC0415 - and pyarrow, which the recorder needs
 
@@ -315,7 +315,7 @@ class LiveSession(QObject):
 
     def diagnose(self) -> None:
         """Open the diagnosis of the device above the operator's window; the bridge has stopped the force."""
-        from study_app.gui.devices.diagnosis_dialog import open_diagnosis  # noqa: PLC0415 - the note comes before it
+        from study_app.gui.devices import open_diagnosis  # noqa: PLC0415 - the note comes before it
 
         assert self.bridge is not None  # noqa: S101 - the window that asks exists
         name = self.chosen.device

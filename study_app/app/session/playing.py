@@ -28,17 +28,16 @@ from study_app.designer.participant.playable import NotPlayableError, Playable, 
 from study_app.designer.problems import fault_rows
 from study_app.devices.registry import descriptor_of, title_of
 from study_app.errors import StoreError, StudyError
-from study_app.gui.kit.devices import device_choices, settings_here
-from study_app.gui.widgets.background import Background
+from study_app.gui.kit import device_choices, settings_here
+from study_app.gui.widgets import Background
 from study_app.session.simulated.answers_only import begin_session_at_step
 from study_app.session.start import NewSession, resumed_choices
 from study_app.session.transitions.events import EndRequested, ForceStopped, ResumeRequested
 from study_app.session.transitions.page_builder import PARTICIPANT
 from study_app.session.transitions.state import Phase, SessionState
-from study_app.store.atomic import copy_folder, write_file
-from study_app.store.folders import kept_pilot_folder
-from study_app.store.sessions.begin import SessionStart
-from study_app.store.study_versions import keep_content
+from study_app.store.files import copy_folder, kept_pilot_folder, write_file
+from study_app.store.sessions import SessionStart
+from study_app.store.versions import keep_content
 
 _END_SHOWN_MS: Final = 2500
 log = logging.getLogger(__name__)

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QWidget
 from study_app.devices.registry import descriptor_of
 from study_app.errors import StudyError
 from study_app.evidence.appraisal import Costs, DeliveryQuestion, Errors, Question, start_appraisal_worker
-from study_app.gui.display.screens import place_window
+from study_app.gui.display import place_window
 from study_app.gui.preflight.window import (
     ComputerWindow,
     PreflightView,
@@ -24,8 +24,8 @@ from study_app.gui.preflight.window import (
     planned_rows,
     resumed_rows,
 )
-from study_app.gui.theme.theme import Theme
-from study_app.gui.widgets.background import Background
+from study_app.gui.theme import Theme
+from study_app.gui.widgets import Background
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
 from study_app.protocol.model import Protocol
@@ -33,9 +33,8 @@ from study_app.protocol.trials import Stroke
 from study_app.session.preflight import Check, Measurements, PredictedDelivery, Screen, preflight_checks
 from study_app.session.resume import begun_schedule
 from study_app.session.start import NewSession, Ready, measure_rig
-from study_app.store.blinded.allocation import session_protocol
-from study_app.store.blinded.blinding import read_key
-from study_app.store.folders import StudyFolder, locate_session
+from study_app.store.blinded import read_key, session_protocol
+from study_app.store.files import StudyFolder, locate_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 

@@ -34,12 +34,19 @@ from study_app.protocol.source import (
     without_byte_order_mark,
 )
 from study_app.protocol.wording import languages_of
-from study_app.store.atomic import cannot_write
-from study_app.store.drafts import Draft, Keeper, draft_of, unsaved_files
-from study_app.store.folder_lock import is_open
-from study_app.store.folders import StudyFolder
-from study_app.store.study_runs import Run
-from study_app.store.study_versions import content_hash, keep_content, save_study, write_whole
+from study_app.store.files import StudyFolder, cannot_write
+from study_app.store.integrity import is_open
+from study_app.store.versions import (
+    Draft,
+    Keeper,
+    Run,
+    content_hash,
+    draft_of,
+    keep_content,
+    save_study,
+    unsaved_files,
+    write_whole,
+)
 from study_app.workspace import workspace
 
 

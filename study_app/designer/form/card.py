@@ -57,17 +57,30 @@ from study_app.designer.form.special import (
 )
 from study_app.designer.parts import FIELD_PX, Segments, cut_text, small_button
 from study_app.designer.problems import ProblemRow, RepairButton
-from study_app.gui.kit.commands import command_tip, with_key
-from study_app.gui.kit.dialogs import choose_protocol
-from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import RADIUS_CONTROL, font
-from study_app.gui.theme.themed import Themed, name_scroll_bars, remove_widget
-from study_app.gui.widgets.accessible import button_text
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, hbox, insert_layout, vbox
-from study_app.gui.widgets.boxes import grid as grid_of
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, Icon, Rule, fill_rounded, scrolled, smooth_painter
-from study_app.gui.widgets.controls import IconButton
-from study_app.gui.widgets.labels import Elided, Ink, label, set_property
+from study_app.gui.kit import choose_protocol, command_tip, with_key
+from study_app.gui.theme import RADIUS_CONTROL, Themed, draw_icon, font, name_scroll_bars, remove_widget
+from study_app.gui.widgets import (
+    QWIDGETSIZE_MAX,
+    STRETCH,
+    Card,
+    Elided,
+    Icon,
+    IconButton,
+    Ink,
+    Rule,
+    add_layout,
+    add_parts,
+    button_text,
+    fill_rounded,
+    hbox,
+    insert_layout,
+    label,
+    scrolled,
+    set_property,
+    smooth_painter,
+    vbox,
+)
+from study_app.gui.widgets import grid as grid_of
 from study_app.number_text import capitalised
 from study_app.protocol.questionnaires import instruments
 from study_app.protocol.source import Path

@@ -7,9 +7,8 @@ from PySide6.QtCore import QRectF, QSize, Qt
 from PySide6.QtGui import QColor, QIcon, QPainter, QPen, QPixmap
 
 from study_app.designer.document.fields import default_designs
-from study_app.gui.theme.theme import Theme, font
-from study_app.gui.theme.themed import Coloured
-from study_app.gui.widgets.controls import Choice
+from study_app.gui.theme import Coloured, Theme, font
+from study_app.gui.widgets import Choice
 from study_app.protocol.trials import Design
 
 _SIDE_PX, _GAP_PX, _RATIO = 14, 4, 3

@@ -25,11 +25,8 @@ from study_app.designer.measures.levels import (
     log_ticks,
     rounded,
 )
-from study_app.gui.theme.icons import draw_icon
-from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.cards import smooth_painter
-from study_app.gui.widgets.numbers import Range
+from study_app.gui.theme import Themed, draw_icon, font
+from study_app.gui.widgets import Range, smooth_painter
 from study_app.number_text import capitalised, duration, exact_duration
 from study_app.protocol.orders import ANSWER_S, CHOICE_S, design_of, method_of
 from study_app.protocol.presented import level_limits, levels

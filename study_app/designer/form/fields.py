@@ -22,13 +22,23 @@ from study_app.designer.document.study import Study
 from study_app.designer.form.design_list import DesignList
 from study_app.designer.form.rows import FormRow, choice_label, is_right_to_left
 from study_app.designer.parts import FIELD_PX, Segments, cut_text, make_dense, small_button
-from study_app.gui.kit.commands import keys_of, with_key
-from study_app.gui.theme.theme import font
-from study_app.gui.theme.themed import Themed
-from study_app.gui.widgets.accessible import plain_tip
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.controls import ActionButton, Check, Choice, IconButton, Toggle
-from study_app.gui.widgets.labels import Elided, label, set_property
+from study_app.gui.kit import keys_of, with_key
+from study_app.gui.theme import Themed, font
+from study_app.gui.widgets import (
+    STRETCH,
+    ActionButton,
+    Check,
+    Choice,
+    Elided,
+    IconButton,
+    Toggle,
+    add_parts,
+    hbox,
+    label,
+    plain_tip,
+    set_property,
+    vbox,
+)
 from study_app.number_text import number_of, typed_numbers, unclear_number
 from study_app.protocol.questions import STATEMENT
 from study_app.protocol.wording import language_name

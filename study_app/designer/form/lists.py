@@ -27,11 +27,9 @@ from study_app.designer.form.rows import FormRow
 from study_app.designer.measures.cards import UNKNOWN
 from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.parts import FIELD_PX, KeysOpenList, cut_text, make_dense, small_button
-from study_app.gui.kit.commands import keys_of, with_key
-from study_app.gui.theme.themed import name_scroll_bars
-from study_app.gui.widgets.boxes import STRETCH, add_layout, hbox
-from study_app.gui.widgets.controls import ActionButton, IconButton
-from study_app.gui.widgets.labels import Elided, figures, label
+from study_app.gui.kit import keys_of, with_key
+from study_app.gui.theme import name_scroll_bars
+from study_app.gui.widgets import STRETCH, ActionButton, Elided, IconButton, add_layout, figures, hbox, label
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import typed_numbers
 from study_app.protocol.source import Path

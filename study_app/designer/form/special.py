@@ -33,14 +33,27 @@ from study_app.designer.form.rows import FormRow, QuestionLine, is_right_to_left
 from study_app.designer.measures.cards import Verdict
 from study_app.designer.measures.study_facts import valid_part
 from study_app.designer.parts import make_dense, small_button
-from study_app.gui.kit.commands import with_key
-from study_app.gui.theme.theme import TypeRole, font
-from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.accessible import plain_tip
-from study_app.gui.widgets.boxes import STRETCH, add_layout, add_parts, grid, hbox, vbox
-from study_app.gui.widgets.cards import Chip, Icon, Rule, paint_ground
-from study_app.gui.widgets.controls import ActionButton, Choice, IconButton
-from study_app.gui.widgets.labels import Ink, figures, label
+from study_app.gui.kit import with_key
+from study_app.gui.theme import Themed, TypeRole, font, remove_widget
+from study_app.gui.widgets import (
+    STRETCH,
+    ActionButton,
+    Chip,
+    Choice,
+    Icon,
+    IconButton,
+    Ink,
+    Rule,
+    add_layout,
+    add_parts,
+    figures,
+    grid,
+    hbox,
+    label,
+    paint_ground,
+    plain_tip,
+    vbox,
+)
 from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
 from study_app.protocol.model import OF_LEVELS

@@ -9,13 +9,25 @@ from PySide6.QtGui import QColor, QHideEvent, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QGridLayout, QSizePolicy, QWidget
 
 from study_app.designer.parts import cut_text
-from study_app.gui.theme.theme import Tone, font
-from study_app.gui.theme.themed import Themed, remove_widget
-from study_app.gui.widgets.accessible import plain_tip
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox, vbox
-from study_app.gui.widgets.boxes import grid as grid_of
-from study_app.gui.widgets.cards import Bar, Card, Icon, Rule, fill_rounded, smooth_painter
-from study_app.gui.widgets.labels import Elided, Ink, figures, label
+from study_app.gui.theme import Themed, Tone, font, remove_widget
+from study_app.gui.widgets import (
+    STRETCH,
+    Bar,
+    Card,
+    Elided,
+    Icon,
+    Ink,
+    Rule,
+    add_parts,
+    figures,
+    fill_rounded,
+    hbox,
+    label,
+    plain_tip,
+    smooth_painter,
+    vbox,
+)
+from study_app.gui.widgets import grid as grid_of
 from study_app.protocol.source import Path
 
 UNKNOWN: Final = "–"

@@ -10,9 +10,7 @@ from study_app.designer.measures.cards import CardGrid
 from study_app.designer.measures.measures_view import MeasuresView
 from study_app.designer.measures.simulation import Simulated
 from study_app.designer.parts import small_button
-from study_app.gui.widgets.boxes import add_parts, vbox
-from study_app.gui.widgets.cards import Card
-from study_app.gui.widgets.labels import label
+from study_app.gui.widgets import Card, add_parts, label, vbox
 
 _EARLIER = "These numbers describe the last valid version of the study. Correct the problems to update them."
 FACTS_MOST, FACTS_LEAST = 366, 190

@@ -32,7 +32,7 @@ from study_app.protocol.randomization import row_count
 from study_app.protocol.source import Fault, Path, frozen, has, value_at
 from study_app.protocol.warnings import describe_untranslated, untranslated_texts, warnings
 from study_app.protocol.wording import languages_of
-from study_app.store.verification.leaks import Telltales
+from study_app.store.verification import Telltales
 from study_app.store.workstation import device_without_force
 
 _PLANNED: Final = ("analysis", "participants")

@@ -29,7 +29,7 @@ from study_app.protocol.source import Path, has, liquid_file_name, unbundle, val
 from study_app.protocol.wording import language_name, languages_of
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
-from study_app.store.study_versions import kept_content, kept_versions
+from study_app.store.versions import kept_content, kept_versions
 
 
 @dataclass(frozen=True, slots=True)

@@ -57,19 +57,24 @@ from study_app.designer.participant.playable import (
 from study_app.designer.parts import Segments, make_dense
 from study_app.designer.problems import problem_rows
 from study_app.designer.window import DesignerPlace, PanePage
-from study_app.gui.display.screens import choose_screens
-from study_app.gui.kit.commands import add_commands, command_tip
-from study_app.gui.kit.devices import screen_number, settings_here, text_scale_on
+from study_app.gui.display import choose_screens
+from study_app.gui.kit import add_commands, command_tip, screen_number, settings_here, text_scale_on
 from study_app.gui.participant.forms.questions_page import QuestionsPage
 from study_app.gui.participant.window import ParticipantWindow
-from study_app.gui.theme.theme import PARTICIPANT, RADIUS_CONTROL, Theme, font
-from study_app.gui.theme.themed import Coloured
-from study_app.gui.widgets.accessible import announce
-from study_app.gui.widgets.background import delayed_call
-from study_app.gui.widgets.boxes import STRETCH, add_parts, hbox
-from study_app.gui.widgets.cards import QWIDGETSIZE_MAX, Card, fill_rounded
-from study_app.gui.widgets.controls import Choice, IconButton
-from study_app.gui.widgets.labels import label
+from study_app.gui.theme import PARTICIPANT, RADIUS_CONTROL, Coloured, Theme, font
+from study_app.gui.widgets import (
+    QWIDGETSIZE_MAX,
+    STRETCH,
+    Card,
+    Choice,
+    IconButton,
+    add_parts,
+    announce,
+    delayed_call,
+    fill_rounded,
+    hbox,
+    label,
+)
 from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import Trial

@@ -28,7 +28,7 @@ from study_app.evidence.cfd.stored_flows import (
 )
 from study_app.evidence.computer import machine
 from study_app.haptics.model.motion import Floats
-from study_app.store.atomic import make_folder, write_file
+from study_app.store.files import make_folder, write_file
 
 COMMAND: Final = "liquid-study cfd --solve"
 GRID: Final = Grid(ahead=40, behind=80, aside=40, ball=0.1, near=0.4, far=8)

@@ -19,7 +19,7 @@ from study_app.evidence.reference_solutions import Case, Truth, along_x
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Scene
 from study_app.lab.identify.measured_force import vectors_x
-from study_app.store.csv_files import csv_text_of
+from study_app.store.files import csv_text_of
 
 MOTION: Final = ("t_s", "velocity_mps", "force_n")
 """Along one axis; the force on the ball, so against the motion at first."""

@@ -25,7 +25,7 @@ from study_app.evidence.cfd.stored_flows import file_bytes, package, read_table
 from study_app.evidence.table import Evidence, Table
 from study_app.haptics.model.laws import HerschelBulkley, creeping_n
 from study_app.haptics.model.motion import Floats
-from study_app.store.atomic import make_folder, write_file
+from study_app.store.files import make_folder, write_file
 
 COMMAND: Final = "liquid-study cfd --materials --solve"
 FILE: Final = "herschel_bulkley.csv"

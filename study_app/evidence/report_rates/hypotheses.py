@@ -16,13 +16,19 @@ import numpy as np
 from scipy.optimize import brentq
 
 from study_app.analysis.contrasts import Compared, Measured
-from study_app.analysis.findings.recognition import RecognitionResult, recognised
+from study_app.analysis.findings import RecognitionResult, recognised
 from study_app.analysis.results import Verdict
-from study_app.analysis.statistics.equivalence import STEPS, p_equivalent, tost
-from study_app.analysis.statistics.mean_tests import means_of, p_differs
-from study_app.analysis.statistics.outcome import Array, holm
-from study_app.analysis.statistics.recognition import recognition
-from study_app.analysis.statistics.trend import trend
+from study_app.analysis.statistics import (
+    STEPS,
+    Array,
+    holm,
+    means_of,
+    p_differs,
+    p_equivalent,
+    recognition,
+    tost,
+    trend,
+)
 from study_app.protocol.trials import ForcedChoice, Stimulus, UpDown
 from study_app.protocol.warnings import ThresholdPlan
 from study_app.psychophysics.people import BETWEEN_PEOPLE

@@ -19,26 +19,29 @@ import numpy as np
 from scipy.special import expit
 from scipy.stats import binomtest
 
-from study_app.analysis.data.blocks import Block, Decided, Spending
-from study_app.analysis.data.measures import Array
+from study_app.analysis.data import Array, Block, Decided, Spending
 from study_app.analysis.evaluate import evaluate_block
-from study_app.analysis.findings.delays import ContrastsWithControl, DetectionThreshold, LowestDelay, common_ms
-from study_app.analysis.findings.finding import FOUND, BlockAnswers, of_tables
-from study_app.analysis.findings.recognition import LiquidRecognition
-from study_app.analysis.findings.statement_tests import (
+from study_app.analysis.findings import (
+    FOUND,
+    BlockAnswers,
+    ContrastsWithControl,
     DelayTrend,
+    DetectionThreshold,
+    LiquidRecognition,
+    LowestDelay,
     MeanTests,
     OverAll,
     Pairs,
     SettingsDiffer,
+    common_ms,
+    of_tables,
     with_gates,
 )
 from study_app.analysis.planning.power_curves import interval
 from study_app.analysis.planning.simulated_studies import Opinions, Plan, draw_opinions
-from study_app.analysis.report.sections import answers as answered
+from study_app.analysis.report import answers as answered
 from study_app.analysis.results import BlockResult, Failures, Results
-from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.thresholds import noticed
+from study_app.analysis.statistics import noticed, tost
 from study_app.evidence.report_rates.hypotheses import false_claims, true_claims
 from study_app.evidence.table import Evidence, Table
 from study_app.protocol.participants import REHEARSED

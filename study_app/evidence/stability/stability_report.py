@@ -40,7 +40,7 @@ from study_app.evidence.table import Evidence, Table, plot_files, run
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.haptics.model.scene import Ewma
 from study_app.haptics.model.slope_limits import slope_limit, slope_limit_table
-from study_app.store.csv_files import csv_text_of
+from study_app.store.files import csv_text_of
 
 _HEIGHT_PT: Final = 256.0
 _PLOT_PT: Final = 146.0

@@ -24,13 +24,11 @@ from numpy.typing import ArrayLike
 from scipy.stats import beta
 from scipy.stats import t as student
 
-from study_app.analysis.data.blocks import LevelBlock
-from study_app.analysis.data.measures import Array
-from study_app.analysis.data.study_tables import load_study
+from study_app.analysis.data import Array, LevelBlock, load_study
 from study_app.analysis.levels.exponents import estimate_slope, estimated_exponents, jnd_slope
 from study_app.analysis.levels.thresholds import thresholds
 from study_app.analysis.levels.tracks import tracks
-from study_app.analysis.statistics.outcome import student_interval
+from study_app.analysis.statistics import student_interval
 from study_app.evidence.table import Evidence, Table, run
 from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.slope_limits import steady_force
@@ -52,10 +50,9 @@ from study_app.psychophysics.people import (
 )
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.folders import StudyFolder
+from study_app.store.files import StudyFolder
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification import reproduce_session, verify_study
 
 _SHIPPED: Final[dict[str, Observer]] = {
     "viscosityjnd": OBSERVER,

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from study_app import figure_style as style
-from study_app.analysis.statistics.thresholds import Threshold, noticed
+from study_app.analysis.statistics import Threshold, noticed
 from study_app.evidence.table import Evidence, Table
 from study_app.evidence.thresholds.known_values import KnownThreshold, known_value
 from study_app.protocol.load import load

@@ -13,11 +13,11 @@ from PySide6.QtWidgets import QDialog, QLineEdit, QWidget
 from study_app.devices.registry import descriptor_of, list_devices
 from study_app.errors import StoreError, StudyError
 from study_app.gui.display.screens import screens_shown
-from study_app.gui.home.startup_window import FIRST_TIME
 from study_app.gui.home.study_facts import StudyFacts
 from study_app.gui.kit.devices import device_label, device_or_default, window_options
 from study_app.gui.kit.dialogs import Question, Work
 from study_app.gui.kit.fields import Editor, Field, choice_field, seed_field, typed_file
+from study_app.gui.startup_window import FIRST_TIME
 from study_app.gui.theme.theme import LIGHT, Theme
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.background import Background
@@ -33,11 +33,10 @@ from study_app.protocol.warnings import check_translated
 from study_app.protocol.wording import LANGUAGES, language_name
 from study_app.session.simulated.rehearsal_worker import TASK, RehearsalClient, RehearsalOrder
 from study_app.session.start import MAX_SEED, NewSession, check_row, draw_seed, study_results
-from study_app.store.blinded.allocation import Claim, check_choice, claims
-from study_app.store.blinded.blinding import check_conditions
-from study_app.store.folders import StudyFolder, rehearsal_folder
-from study_app.store.sessions.begin import MAX_SESSION, UsedIds, check_participant, used_ids
-from study_app.store.tables.study_files import check_study
+from study_app.store.blinded import Claim, check_choice, check_conditions, claims
+from study_app.store.files import StudyFolder, rehearsal_folder
+from study_app.store.sessions import MAX_SESSION, UsedIds, check_participant, used_ids
+from study_app.store.tables import check_study
 from study_app.store.workstation import DEFAULTS, MachineSettings
 from study_app.workers.client import WorkerClient
 from study_app.workspace import workspace

@@ -28,14 +28,12 @@ from study_app.protocol.source import known_protocols, protocol_file, shipped, s
 from study_app.protocol.wording import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
-from study_app.store.blinded.allocation import session_protocol
-from study_app.store.blinded.blinding import read_key
-from study_app.store.drafts import draft_files, draft_of, unsaved_files
-from study_app.store.folder_lock import is_open
-from study_app.store.folders import locate_session
+from study_app.store.blinded import read_key, session_protocol
+from study_app.store.files import locate_session
+from study_app.store.integrity import is_open
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import COMPLETED, INCOMPLETE, start_of
-from study_app.store.study_settings import kept_original
+from study_app.store.versions import draft_files, draft_of, kept_original, unsaved_files
 from study_app.store.workstation import recent_protocols
 from study_app.workspace import workspace
 

@@ -1,1 +1,6 @@
 """The liquid lab's place in the operator's window."""
+
+from study_app.gui.lab.lab_state import CostRow, DeviceShown, ErrorRow, LabView, Now
+from study_app.gui.lab.view import LabPlace
+
+__all__ = ["CostRow", "DeviceShown", "ErrorRow", "LabPlace", "LabView", "Now"]

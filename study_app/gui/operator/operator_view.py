@@ -17,11 +17,9 @@ from study_app.number_text import grouped, minutes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import FormStep, Schedule, Step, Trial, design_of
 from study_app.protocol.wording import words
-from study_app.store.columns import SEALED
-from study_app.store.delivered import Broken
+from study_app.store.files import SEALED
 from study_app.store.journals.journal_events import Note
-from study_app.store.missing_trials import REASONS
-from study_app.store.progress import Progress, TrialAnswer
+from study_app.store.session_progress import REASONS, Broken, Progress, TrialAnswer
 
 State = Literal["preparing", "running", "paused", "force off", "trouble", "ended"]
 _StepState = Literal["done", "now", "open"]
@@ -165,7 +163,7 @@ class Session:
         }
 
 
-def operator_view(
+def view_session(
     session: Session,
     progress: Progress,
     vitals: Vitals,

@@ -38,7 +38,7 @@ from study_app.session.preflight import (
 )
 from study_app.session.resume import resume_at
 from study_app.store.journals.journal_events import Event
-from study_app.store.progress import progress_of
+from study_app.store.session_progress import progress_of
 
 _WAITING = "measuring …"
 

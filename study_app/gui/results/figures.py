@@ -39,8 +39,8 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Elided, label
 from study_app.number_text import counted
 from study_app.protocol.participants import EACH_GROUP
-from study_app.store.atomic import write_file
 from study_app.store.exclusions import Exclusion
+from study_app.store.files import write_file
 
 _NAMED: int = 5
 """Of so many sessions that are not in the figures each is named."""

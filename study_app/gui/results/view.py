@@ -68,7 +68,7 @@ from study_app.gui.widgets.main_view import Place
 from study_app.number_text import counted
 from study_app.protocol.participants import EACH_GROUP
 from study_app.store.exclusions import Exclusion
-from study_app.store.folders import StudyFolder
+from study_app.store.files import StudyFolder
 from study_app.store.merged import FOLDER, folders_of
 from study_app.workers.server import Crashed, Refused
 

@@ -14,17 +14,15 @@ from study_app.protocol.descriptions import number_range
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import FormStep, PageStep, expected_duration_s, orders_of, variants
 from study_app.store import receipt
-from study_app.store.columns import TRIALS_MISSING
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.folder_lock import is_open
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files import TRIALS_MISSING, SessionFolder, StudyFolder
+from study_app.store.integrity import is_open
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import REACHED_END
 from study_app.store.merged import session_in
-from study_app.store.missing_trials import MissingTrials
-from study_app.store.progress import progress_of
-from study_app.store.study_runs import run_of
-from study_app.store.tables.study_files import participant_rows
+from study_app.store.session_progress import MissingTrials, progress_of
+from study_app.store.tables import participant_rows
+from study_app.store.versions import run_of
 
 Kind: TypeAlias = Literal["", "pilot", "simulated", "sample"]
 KINDS: dict[Kind, str] = {"": "Participants", "pilot": "Pilot", "simulated": "Simulated", "sample": "Sample"}

@@ -29,10 +29,9 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import label, set_ink
 from study_app.gui.widgets.row_table import CHIP_ROLE, Rows, Table
 from study_app.number_text import capitalised, counted
-from study_app.store.blinded.blinding import Codes, open_events, opened_key
-from study_app.store.delivered import beyond_limits, late_device_text
+from study_app.store.blinded import Codes, open_events, opened_key
 from study_app.store.exclusions import Exclusion, exclusions
-from study_app.store.folders import locate_session
+from study_app.store.files import locate_session
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import (
     UNDELIVERED,
@@ -44,10 +43,14 @@ from study_app.store.journals.journal_events import (
     TrialStarted,
     start_of,
 )
-from study_app.store.missing_trials import MISSING_PERCENT, MissingTrials
-from study_app.store.progress import progress_of
-from study_app.store.tables import session_tables
-from study_app.store.tables.study_files import row_of
+from study_app.store.session_progress import (
+    MISSING_PERCENT,
+    MissingTrials,
+    beyond_limits,
+    late_device_text,
+    progress_of,
+)
+from study_app.store.tables import SessionRows, participant_row, row_of
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +106,7 @@ def read_record(folder: Path) -> SessionRecord:
     (facts,) = session_facts(study.path, row_of(session, key), listed, {})
     own = tuple(exclusion for exclusion in listed if exclusion.what[:2] == (facts.participant, facts.session))
     start = start_of(lines)
-    rows = session_tables.SessionRows(lines).trials
+    rows = SessionRows(lines).trials
     last = lines[-1]
     verdict = last.within_limits if key is None and isinstance(last, SessionEnded) else None
     trials = _trial_records(rows, lines, start.limits, own, verdict=verdict, codes=key.codes if key else {})
@@ -195,7 +198,7 @@ def _trial_records(
     is_hidden = verdict is False and all(row["valid"] is not False for row in rows)
     answered: dict[tuple[int, int], int] = {}
     unconfirmed = progress_of(lines).unconfirmed
-    for row in session_tables.SessionRows(lines).responses:
+    for row in SessionRows(lines).responses:
         which = (row["trial"], row["attempt"])
         answered[which] = answered.get(which, 0) + (row["first_choice_s"] is not None)
     return tuple(
@@ -237,7 +240,7 @@ def _setting_text(row: Mapping[str, Any], codes: Codes) -> str:
 
 
 def _about_text(lines: Sequence[Event], happened: str) -> str:
-    start, row = start_of(lines), session_tables.participant_row(lines)
+    start, row = start_of(lines), participant_row(lines)
     ended = row["session_ended_at"]
     said = [
         f"group {start.group}" if start.group is not None else "",

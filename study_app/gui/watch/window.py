@@ -35,7 +35,7 @@ from study_app.gui.widgets.numbers import MARGIN, Range, Slider
 from study_app.protocol.wording import words_or_english
 from study_app.session.tasks import TankView
 from study_app.session.watch import Kind, Watched, read_watched
-from study_app.store.atomic import write_file
+from study_app.store.files import write_file
 from study_app.video.encoding import VideoWriter
 
 LEAST_N, LEAST_MPS = 0.05, 0.01  # lower peaks are not drawn larger

@@ -11,9 +11,7 @@ from study_app.lab.identify.fit import CurveFit, Fit
 from study_app.lab.identify.measured_force import FLOW_CURVE
 from study_app.lab.identify.parameters import Parameter
 from study_app.protocol.file_format import scene_text, with_default_estimator
-from study_app.store.atomic import make_folder
-from study_app.store.csv_files import csv_text_of
-from study_app.store.output_files import write_files
+from study_app.store.files import csv_text_of, make_folder, write_files
 
 COLUMNS: Final = ("t_s", *(f"{kind}_{axis}_n" for kind in ("measured", "fitted", "residual") for axis in "xyz"))
 _CURVE_COLUMNS: Final[tuple[str, ...]] = (*FLOW_CURVE, "fitted_pa", "residual_pa")

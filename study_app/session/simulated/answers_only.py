@@ -47,13 +47,12 @@ from study_app.session.transitions.events import (
 from study_app.session.transitions.page_builder import preview
 from study_app.session.transitions.state import FINAL, SessionState
 from study_app.session.transitions.table import advance, initial_state
-from study_app.store.blinded.allocation import simulated_groups
-from study_app.store.folders import StudyFolder, rehearsal_folder
+from study_app.store.blinded import simulated_groups
+from study_app.store.files import StudyFolder, rehearsal_folder
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import FormShown, Note, PageShown, TrialStarted, start_of
-from study_app.store.sessions.begin import SessionStart, begin_session
-from study_app.store.sessions.simulated_sessions import SimulatedStudy
+from study_app.store.sessions import SessionStart, SimulatedStudy, begin_session
 from study_app.workspace import workspace
 
 DEVICE = {"name": "answers-only", "measured": False}

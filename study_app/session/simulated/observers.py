@@ -23,7 +23,7 @@ from study_app.protocol.trials import Reach, Task
 from study_app.psychophysics.delivery import lag
 from study_app.session.pages import DesignPage, QuestionnairePage, TextPage
 from study_app.session.tasks import TankView, new_tracker
-from study_app.store.delivered import LONGEST_S
+from study_app.store.session_progress import LONGEST_S
 
 Floats: TypeAlias = NDArray[np.float64]
 Draw: TypeAlias = Callable[[], float]

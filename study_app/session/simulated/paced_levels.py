@@ -16,7 +16,7 @@ from study_app.protocol.model import Follow, Protocol
 from study_app.protocol.orders import condition_of, stimulus_of
 from study_app.protocol.presented import extreme_levels
 from study_app.protocol.trials import OF_CONDITION, Stimulated
-from study_app.store.delivered import broken_interval_limits, delivered_values, judged_fields
+from study_app.store.session_progress import broken_interval_limits, delivered_values, judged_fields
 
 _INERTIAL = {effect.name for effect in EFFECTS if effect.damping_nspm is not None}
 

@@ -75,21 +75,16 @@ from study_app.session.simulated.participant import LOOK_AT_SETTING_S, Adjusting
 from study_app.session.tasks import TankView
 from study_app.session.transitions.events import Begin, Continue, Event, ResumeRequested, Stepped, Submitted
 from study_app.store import receipt
-from study_app.store.atomic import is_there
-from study_app.store.blinded.allocation import session_protocol, simulated_groups
-from study_app.store.blinded.blinding import Key
-from study_app.store.checksums import place_of, read_list
-from study_app.store.folder_lock import is_never_begun
-from study_app.store.folders import StudyFolder, locate_session, rehearsal_folder
+from study_app.store.blinded import Key, session_protocol, simulated_groups
+from study_app.store.files import StudyFolder, is_there, locate_session, rehearsal_folder
+from study_app.store.integrity import is_never_begun, place_of, read_list
 from study_app.store.journals import journal
 from study_app.store.journals.journal import SessionClock
 from study_app.store.journals.journal_events import Event as Line
 from study_app.store.journals.journal_events import start_of
-from study_app.store.progress import progress_of
-from study_app.store.sessions.begin import SessionStart, begin_session, used_ids
-from study_app.store.sessions.open_session import SessionStore
-from study_app.store.sessions.recovery import rebuild_session, reopen_store
-from study_app.store.tables.study_files import check_study
+from study_app.store.session_progress import progress_of
+from study_app.store.sessions import SessionStart, SessionStore, begin_session, rebuild_session, reopen_store, used_ids
+from study_app.store.tables import check_study
 from study_app.store.withdrawals import tombstones
 from study_app.workspace import workspace
 

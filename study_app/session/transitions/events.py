@@ -145,7 +145,7 @@ class LanguageChosen(Event):
 
 @dataclass(frozen=True, slots=True)
 class TaskDone(Event):
-    """The task of the running trial is over; ``summary`` has the columns of its row (see ``store.columns``).
+    """The task of the running trial is over; ``summary`` has the columns of its row (see ``store.files.columns``).
 
     ``invalid`` names the limits that an interval violated, so that it was not delivered as requested.
     """

@@ -54,9 +54,9 @@ from study_app.session.transitions.steps import (
     start_interval,
     start_trial,
 )
-from study_app.store.delivered import broken_trial_limits, delay_error_ms
 from study_app.store.journals import journal_events as journal
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
+from study_app.store.session_progress import broken_trial_limits, delay_error_ms
 
 _STOPPABLE = {Phase.READING, Phase.TASK, Phase.RESTING, Phase.ANSWERING, Phase.FEEDBACK, Phase.PAUSED}
 

@@ -28,7 +28,9 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders import own_protocol
 from study_app.protocol.participants import check_session_number, next_group
 from study_app.protocol.randomization import enrolment_number, group_of
-from study_app.store.atomic import (
+from study_app.store.blinded.blinding import Key, read_key
+from study_app.store.blinded.sealing import open_text, seal_values
+from study_app.store.files.atomic import (
     cannot_write,
     is_there,
     open_regular,
@@ -37,9 +39,7 @@ from study_app.store.atomic import (
     sync_folder,
     write_new_file,
 )
-from study_app.store.blinded.blinding import Key, read_key
-from study_app.store.blinded.sealing import open_text, seal_values
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 
 _STEM: Final = re.compile(r"(?:[a-z0-9_]+-)?[0-9]{3,}(?:-[A-Za-z0-9]+)?")
 

@@ -37,10 +37,10 @@ from study_app.protocol.randomization import draw_secret, enrolment_number, grou
 from study_app.protocol.source import RECORDED
 from study_app.protocol.upgrade import needs_upgrade, upgraded_tables
 from study_app.store import receipt
-from study_app.store.atomic import append_line, create_folder, is_there, parse_json, read_own
 from study_app.store.blinded.sealing import TASK_BYTES, open_text, seal_values
-from study_app.store.columns import SEALED
-from study_app.store.folders import SessionFolder, StudyFolder, check_name_and_reason
+from study_app.store.files.atomic import append_line, create_folder, is_there, parse_json, read_own
+from study_app.store.files.columns import SEALED
+from study_app.store.files.folders import SessionFolder, StudyFolder, check_name_and_reason
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 

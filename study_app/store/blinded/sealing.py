@@ -16,7 +16,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from study_app.store.atomic import parse_json
+from study_app.store.files.atomic import parse_json
 from study_app.store.journals import journal_events as events
 
 MARK: Final = b"This file is sealed until the study is unblinded: liquid-study unblind RESULTS\n"

@@ -28,7 +28,7 @@ from typing import Any, BinaryIO
 import study_app
 from study_app.errors import StoreError
 from study_app.protocol.source import without_byte_order_mark
-from study_app.store.atomic import (
+from study_app.store.files.atomic import (
     cannot_write,
     flush_file,
     parse_json,

@@ -16,8 +16,8 @@ from typing import Annotated, Any, ClassVar, TypeAlias, dataclass_transform, get
 
 from study_app.errors import StoreError
 from study_app.protocol.questions import STATEMENT
-from study_app.store.columns import DELIVERED, TRIALS
-from study_app.store.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
+from study_app.store.files.columns import DELIVERED, TRIALS
+from study_app.store.files.folders import PARTICIPANT_ID, RECORDING_NAME, STUDY_NAME
 
 _SHOWN = 200  # greatest number of characters of a bad value shown in messages
 

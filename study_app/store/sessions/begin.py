@@ -18,7 +18,9 @@ from study_app.protocol.randomization import stream
 from study_app.protocol.source import unbundle
 from study_app.protocol.trials import LEVEL_RULES
 from study_app.store import receipt
-from study_app.store.atomic import (
+from study_app.store.blinded.allocation import Allocation, allocate, allocation_of, check_session
+from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals, sealed_model
+from study_app.store.files.atomic import (
     cannot_write,
     is_there,
     make_folder,
@@ -28,23 +30,21 @@ from study_app.store.atomic import (
     system_message,
     temporary_path,
 )
-from study_app.store.blinded.allocation import Allocation, allocate, allocation_of, check_session
-from study_app.store.blinded.blinding import Key, open_or_draw_key, reveals, sealed_model
-from study_app.store.folder_lock import (
+from study_app.store.files.folders import ID_PATTERN, SessionFolder, StudyFolder
+from study_app.store.integrity.folder_lock import (
     Opening,
     create_locked_folder,
     is_abandoned,
     remove_abandoned_claims,
     take_over_folder,
 )
-from study_app.store.folders import ID_PATTERN, SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import FORMAT, Journal, SessionClock
 from study_app.store.journals.journal_events import Allocated, SessionStarted, start_of
 from study_app.store.recorder import Recorder
 from study_app.store.sessions.open_session import Place, SessionStore
-from study_app.store.study_versions import saver_of
 from study_app.store.tables.study_files import check_study, update_participants, write_description
+from study_app.store.versions.study_versions import saver_of
 from study_app.store.withdrawals import tombstones
 
 _MAX_ID_LENGTH = 32

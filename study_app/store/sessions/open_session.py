@@ -18,18 +18,19 @@ from study_app.errors import StoreError
 from study_app.outlets.markers import Marker, marker_of
 from study_app.outlets.session_outlets import Outlets
 from study_app.protocol.model import Protocol
-from study_app.store import csv_files, receipt
-from study_app.store.atomic import write_file
+from study_app.store import receipt
 from study_app.store.blinded.blinding import Key, open_events, opened_key, recorded_protocol, seal_event
-from study_app.store.checksums import fingerprint, note_fingerprint, write_checksums
 from study_app.store.exclusions import exclude_incomplete
-from study_app.store.folder_lock import Opening
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files import csv_files
+from study_app.store.files.atomic import write_file
+from study_app.store.files.folders import SessionFolder, StudyFolder
+from study_app.store.integrity.checksums import fingerprint, note_fingerprint, write_checksums
+from study_app.store.integrity.folder_lock import Opening
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Journal
-from study_app.store.missing_trials import MissingTrials
-from study_app.store.progress import progress_of
 from study_app.store.recorder import LEAVING_S, Kept, Recorder
+from study_app.store.session_progress.missing_trials import MissingTrials
+from study_app.store.session_progress.progress import progress_of
 from study_app.store.tables import session_tables
 from study_app.store.tables.study_files import update_participants
 

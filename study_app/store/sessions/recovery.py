@@ -22,7 +22,6 @@ from study_app.protocol.randomization import stream
 from study_app.protocol.source import bundle, has_hash, hashes_in, unbundle
 from study_app.protocol.upgrade import needs_upgrade
 from study_app.store import receipt
-from study_app.store.atomic import is_there, paths_in, read_own, remove_temporary_files, write_file
 from study_app.store.blinded.blinding import (
     Key,
     complete_protocol,
@@ -32,7 +31,9 @@ from study_app.store.blinded.blinding import (
     protocol_errors,
     read_key,
 )
-from study_app.store.checksums import (
+from study_app.store.files.atomic import is_there, paths_in, read_own, remove_temporary_files, write_file
+from study_app.store.files.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate_session
+from study_app.store.integrity.checksums import (
     fingerprint,
     note_fingerprint,
     note_rebuilt,
@@ -41,14 +42,13 @@ from study_app.store.checksums import (
     read_list,
     renew_checksums,
 )
-from study_app.store.folder_lock import lock_folder, refuse_if_open
-from study_app.store.folders import RECORDING_NAME, SessionFolder, StudyFolder, locate_session
+from study_app.store.integrity.folder_lock import lock_folder, refuse_if_open
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents, Journal, SessionClock
 from study_app.store.merged import refuse_merged
-from study_app.store.progress import Progress, progress_of, recordable
 from study_app.store.recorder import lost_event, recorded_event, recording_files
+from study_app.store.session_progress.progress import Progress, progress_of, recordable
 from study_app.store.sessions.begin import make_recorder, note_allocation, refuse_never_begun, session_environment
 from study_app.store.sessions.open_session import Place, SessionStore, table_files
 from study_app.store.tables import session_tables

@@ -20,12 +20,12 @@ from study_app.protocol.orders import own_protocol
 from study_app.protocol.randomization import stream
 from study_app.protocol.source import unbundle
 from study_app.store import receipt
-from study_app.store.atomic import create_folder, make_folder
 from study_app.store.blinded.allocation import Entries, allocate
 from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, seal_event
-from study_app.store.checksums import checksum_bytes, fingerprint, note_fingerprint
-from study_app.store.folder_lock import Opening, lock_folder
-from study_app.store.folders import StudyFolder
+from study_app.store.files.atomic import create_folder, make_folder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.checksums import checksum_bytes, fingerprint, note_fingerprint
+from study_app.store.integrity.folder_lock import Opening, lock_folder
 from study_app.store.journals.journal import SessionClock, line_bytes, line_of
 from study_app.store.journals.journal_events import Allocated, Event, SessionEnded, plain_json, read_event, start_of
 from study_app.store.sessions.begin import SessionStart, check_participant, first_records, used_ids

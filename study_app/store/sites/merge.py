@@ -16,7 +16,8 @@ from typing import Final
 from study_app.errors import StoreError
 from study_app.ids import file_name_fault
 from study_app.store import receipt
-from study_app.store.atomic import (
+from study_app.store.blinded.blinding import Key, verified_key
+from study_app.store.files.atomic import (
     cannot_read,
     cannot_write,
     flush_entry,
@@ -32,10 +33,15 @@ from study_app.store.atomic import (
     temporary_path,
     write_file,
 )
-from study_app.store.blinded.blinding import Key, verified_key
-from study_app.store.checksums import is_system_file
-from study_app.store.folder_lock import create_locked_folder, is_never_begun, is_open, lock_folder, refuse_if_open
-from study_app.store.folders import ID_PATTERN, ReportProgress, StudyFolder
+from study_app.store.files.folders import ID_PATTERN, ReportProgress, StudyFolder
+from study_app.store.integrity.checksums import is_system_file
+from study_app.store.integrity.folder_lock import (
+    create_locked_folder,
+    is_never_begun,
+    is_open,
+    lock_folder,
+    refuse_if_open,
+)
 from study_app.store.merged import FOLDER, Merged, Site, merged_above, read_merged
 from study_app.store.tables.study_files import described_study
 from study_app.store.withdrawals import describe_session, tombstones

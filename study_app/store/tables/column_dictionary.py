@@ -2,8 +2,16 @@
 
 from collections.abc import Sequence
 
-from study_app.store.columns import EXCLUSIONS, GROUP, INTERVALS, PARTICIPANTS, RESPONSES, TRIALS, with_missing_trials
-from study_app.store.csv_files import Column
+from study_app.store.files.columns import (
+    EXCLUSIONS,
+    GROUP,
+    INTERVALS,
+    PARTICIPANTS,
+    RESPONSES,
+    TRIALS,
+    with_missing_trials,
+)
+from study_app.store.files.csv_files import Column
 from study_app.store.journals.journal_events import EVENTS
 from study_app.store.recordings import FRAMES, SAMPLES
 

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Sequence
 from typing import Any, Final
 
 from study_app.errors import StoreError
-from study_app.store.columns import DELIVERED, INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING
-from study_app.store.csv_files import Column, Row, header, unsealed_columns
-from study_app.store.delivered import is_within_limits
+from study_app.store.files.columns import DELIVERED, INTERVALS, RESPONSES, TRIALS, TRIALS_MISSING
+from study_app.store.files.csv_files import Column, Row, header, unsealed_columns
 from study_app.store.journals import journal_events as events
-from study_app.store.progress import progress_of
+from study_app.store.session_progress.delivered import is_within_limits
+from study_app.store.session_progress.progress import progress_of
 
 VALID: Final = "valid"
 _PRESENTED: Final = {"S": "standard", "C": "comparison"}

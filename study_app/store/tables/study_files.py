@@ -15,13 +15,14 @@ from typing import Any, Final
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.source import text_in
-from study_app.store import csv_files, receipt
-from study_app.store.atomic import is_there, parse_json, read_own, write_file
+from study_app.store import receipt
 from study_app.store.blinded.blinding import Key, open_events, opened_key, reveals
-from study_app.store.columns import GROUP, PARTICIPANTS, SEALED, TRIALS_MISSING, every_column, with_missing_trials
-from study_app.store.csv_files import Column, Row, header
-from study_app.store.folder_lock import is_never_begun
-from study_app.store.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.files import csv_files
+from study_app.store.files.atomic import is_there, parse_json, read_own, write_file
+from study_app.store.files.columns import GROUP, PARTICIPANTS, SEALED, TRIALS_MISSING, every_column, with_missing_trials
+from study_app.store.files.csv_files import Column, Row, header
+from study_app.store.files.folders import SessionFolder, StudyFolder, check_study_name
+from study_app.store.integrity.folder_lock import is_never_begun
 from study_app.store.journals import journal
 from study_app.store.merged import MANIFEST, folders_of, refuse_merged
 from study_app.store.tables import session_tables

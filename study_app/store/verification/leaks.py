@@ -17,8 +17,8 @@ from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import adjusting_of, design_of, method_of, standards_of, stimulus_of
-from study_app.store.atomic import cannot_read, parse_json, paths_in
-from study_app.store.folders import StudyFolder
+from study_app.store.files.atomic import cannot_read, parse_json, paths_in
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal_events import Event, Stepped, TrialStarted
 
 Tables: TypeAlias = Mapping[str, Any]

@@ -17,11 +17,11 @@ from typing import Any, Final
 
 from study_app.errors import StoreError
 from study_app.store import workstation
-from study_app.store.atomic import read_if_there, write_file
 from study_app.store.blinded.blinding import reveals
-from study_app.store.checksums import Proofs, checked_line, parse_copy, proof_of, read_list
 from study_app.store.exclusions import exclusions, reversals
-from study_app.store.folders import StudyFolder
+from study_app.store.files.atomic import read_if_there, write_file
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.checksums import Proofs, checked_line, parse_copy, proof_of, read_list
 from study_app.store.merged import folders_of
 from study_app.store.verification.time_stamps import WAITS_S, checked_stamp, optional_library, request_stamp
 from study_app.store.withdrawals import proof_of_withdrawal, tombstones

@@ -19,7 +19,7 @@ from study_app.errors import StoreError
 from study_app.number_text import counted
 from study_app.outlets.markers import marker_of
 from study_app.outlets.streams import MARKERS, SAMPLES, TICKS
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.merged import read_merged
 from study_app.store.verification.verify_session import Finding, Findings

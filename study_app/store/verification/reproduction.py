@@ -27,10 +27,10 @@ from study_app.protocol.trials import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import complete_protocol, open_events, participant_group, place_number, read_key
-from study_app.store.folders import locate_session
+from study_app.store.files.folders import locate_session
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
-from study_app.store.progress import trial_results
+from study_app.store.session_progress.progress import trial_results
 
 
 @dataclass(slots=True)

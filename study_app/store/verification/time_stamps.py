@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 from study_app.errors import StoreError
 from study_app.store import workstation
-from study_app.store.atomic import read_regular
+from study_app.store.files.atomic import read_regular
 
 _EXTRA: Final = "from the optional proofs extra: pip install 'liquid-study[proofs]'"
 WAITS_S: Final = 10.0

@@ -23,18 +23,19 @@ from study_app.errors import PlugInError, StoreError
 from study_app.number_text import counted
 from study_app.protocol.upgrade import needs_upgrade
 from study_app.protocol.wording import SHIPPED
-from study_app.store import csv_files, receipt
-from study_app.store.atomic import is_there, parse_json, read_own, read_regular, study_root, temporary_files
+from study_app.store import receipt
 from study_app.store.blinded.blinding import Key, complete_protocol, open_events, opened_key
-from study_app.store.checksums import file_hash, fingerprint, read_checksums, session_files, system_files
-from study_app.store.csv_files import Column
-from study_app.store.folder_lock import is_never_begun, is_open
-from study_app.store.folders import FINGERPRINTS, SessionFolder
+from study_app.store.files import csv_files
+from study_app.store.files.atomic import is_there, parse_json, read_own, read_regular, study_root, temporary_files
+from study_app.store.files.csv_files import Column
+from study_app.store.files.folders import FINGERPRINTS, SessionFolder
+from study_app.store.integrity.checksums import file_hash, fingerprint, read_checksums, session_files, system_files
+from study_app.store.integrity.folder_lock import is_never_begun, is_open
 from study_app.store.journals import journal
 from study_app.store.journals import journal_events as events
 from study_app.store.journals.journal import Contents
-from study_app.store.progress import Progress, attempt_name, progress_of, recordable
 from study_app.store.recorder import recording_files
+from study_app.store.session_progress.progress import Progress, attempt_name, progress_of, recordable
 from study_app.store.sessions.open_session import Place, table_files
 from study_app.store.sessions.recovery import RESTORE, files_beyond_journal
 from study_app.store.tables.session_tables import table_columns

@@ -10,9 +10,9 @@ from study_app.analysis.export.table_files import table_bytes
 from study_app.analysis.export.tables import Delivered
 from study_app.analysis.export_study import export
 from study_app.errors import AnalysisError
-from study_app.store.columns import SEALED
-from study_app.store.csv_files import Column, unguard_formula
-from study_app.store.output_files import write_files
+from study_app.store.files.columns import SEALED
+from study_app.store.files.csv_files import Column, unguard_formula
+from study_app.store.files.output_files import write_files
 from tests.analysis.conftest import Results
 
 pytestmark = pytest.mark.slow

@@ -18,8 +18,8 @@ from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export.psychds_dataset import FOLDER
 from study_app.analysis.export_study import export
 from study_app.protocol.load import parse
-from study_app.store.columns import RESPONSES, TRIALS
-from study_app.store.csv_files import Column, csv_bytes, read_table
+from study_app.store.files.columns import RESPONSES, TRIALS
+from study_app.store.files.csv_files import Column, csv_bytes, read_table
 from study_app.store.verification.verify_session import Discrepancy
 from tests.analysis.conftest import CANNOT_JUDGE, SMALL, Results, make_results
 

@@ -9,7 +9,7 @@ import pytest
 from study_app import documentation
 from study_app.analysis.export_study import export
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.csv_files import Column, csv_bytes
+from study_app.store.files.csv_files import Column, csv_bytes
 from study_app.store.unblinding import unblind
 from tests.protocol.forms.mixed import mixed_file
 

@@ -19,8 +19,8 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.source.files import protocol_hash, shipped_file
 from study_app.store.blinded.blinding import reveal
-from study_app.store.csv_files import Column, optional
-from study_app.store.output_files import FileCopy, write_files
+from study_app.store.files.csv_files import Column, optional
+from study_app.store.files.output_files import FileCopy, write_files
 from tests.analysis.export.described import undescribed
 from tests.analysis.made_up import everybody, liquids, study
 from tests.studies import rehearsed

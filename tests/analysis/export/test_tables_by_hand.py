@@ -19,8 +19,8 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import psychds_dataset, spss
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name, table_files
 from study_app.analysis.export.tables import Delivered, exported_tables, names_of_sealed, wide_table
-from study_app.store.columns import INTERVALS
-from study_app.store.csv_files import Column, header, optional, unsealed_columns
+from study_app.store.files.columns import INTERVALS
+from study_app.store.files.csv_files import Column, header, optional, unsealed_columns
 from tests.analysis.made_up import ITEMS, study
 from tests.golden import as_on_linux
 

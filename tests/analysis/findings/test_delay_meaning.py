@@ -12,7 +12,7 @@ from study_app.analysis.report.sections import limits
 from study_app.analysis.results import BlockResult
 from study_app.analysis.results import Results as Found
 from study_app.analysis.statistics.equivalence import tost
-from study_app.analysis.statistics.trend import step_down
+from study_app.analysis.statistics.trend_tests import step_down
 from tests.analysis.conftest import Results
 
 CALM = [1, 1, 0, 0, -1] * 6

@@ -18,8 +18,8 @@ from study_app.analysis.levels.tracks import OF_INTERVALS
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
-from study_app.store.columns import INTERVALS, TRIALS_MISSING
-from study_app.store.folders import StudyFolder
+from study_app.store.files.columns import INTERVALS, TRIALS_MISSING
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.receipt import read
 from study_app.store.verification.leaks import certain_telltales, presented_numbers

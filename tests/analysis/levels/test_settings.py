@@ -17,7 +17,7 @@ from study_app.protocol.trials.methods import default_method
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
 from tests.analysis.levels.level_studies import matching_file

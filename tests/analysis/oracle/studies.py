@@ -14,9 +14,9 @@ import pytest
 from study_app.analysis.report import study_figures, write_report
 from study_app.protocol.load import load
 from study_app.session.simulated.answers_only import rehearse_answers
-from study_app.store.columns import INTERVALS, RESPONSES, TRIALS
 from study_app.store.exclusions import exclude
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.columns import INTERVALS, RESPONSES, TRIALS
+from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.sites.merge import merge_sites
 from study_app.store.unblinding import unblind
 from study_app.store.withdrawals import withdraw as erase

@@ -17,9 +17,9 @@ from study_app.analysis.report.write_report import as_json_types
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.mean_tests import means_of, p_differs
 from study_app.analysis.statistics.rank_tests import global_permutation
-from study_app.analysis.statistics.recognition import recognition
+from study_app.analysis.statistics.recognition_tests import recognition
 from study_app.analysis.statistics.thresholds import noticed
-from study_app.analysis.statistics.trend import trend
+from study_app.analysis.statistics.trend_tests import trend
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.oracle import studies

@@ -8,7 +8,7 @@ import pytest
 from study_app.analysis.planning import simulated_studies
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
-from study_app.analysis.statistics.trend import trend
+from study_app.analysis.statistics.trend_tests import trend
 
 pytestmark = pytest.mark.slow
 

@@ -19,7 +19,7 @@ from study_app.analysis.planning.simulated_studies import (
     plan,
     sweep,
 )
-from study_app.analysis.statistics.trend import step_down
+from study_app.analysis.statistics.trend_tests import step_down
 from study_app.cli import commands
 from study_app.errors import AnalysisError
 from study_app.protocol.load import load

@@ -19,7 +19,7 @@ from study_app.analysis.planning.preregistration import (
 from study_app.analysis.report.write_report import report, report_files
 from study_app.errors import AnalysisError
 from study_app.store.exclusions import Exclusion, exclusion_bytes, exclusions
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from tests.analysis.conftest import Results
 
 HASH = "ab" * 32

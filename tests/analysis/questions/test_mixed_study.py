@@ -16,9 +16,9 @@ from study_app.protocol.load import load
 from study_app.protocol.warnings.study_warnings import warnings
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import exclude
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.protocol.forms.mixed import mixed_file
 from tests.studies import made_up
 

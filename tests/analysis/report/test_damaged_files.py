@@ -14,7 +14,7 @@ from click.testing import CliRunner
 from study_app.analysis.data.study_tables import load_study
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.sessions.recovery import rebuild_session
 from tests.analysis.conftest import SAMPLE
 

@@ -24,7 +24,7 @@ from study_app.analysis.report import sections
 from study_app.analysis.report.first_page import Card, Presented, first_page, presented_in
 from study_app.analysis.report.sections import CLAIMS, answers, empty_studies
 from study_app.analysis.results import Results
-from study_app.analysis.statistics.recognition import recognition
+from study_app.analysis.statistics.recognition_tests import recognition
 from study_app.protocol.trials.designs import default_design
 from tests.analysis.made_up import DECIDED, ITEMS, delays, everybody, liquids, study
 from tests.analysis.report.sentences import Told, check

@@ -17,7 +17,7 @@ from study_app.analysis.figures.summary_figures import Numbers
 from study_app.analysis.report import first_page, methods, sections
 from study_app.analysis.results import BlockResult, Delivered, GroupAnswers, LevelsResult, QuestionResult
 from study_app.store.exclusions import Exclusion
-from study_app.store.missing_trials import MISSING_PERCENT
+from study_app.store.session_progress.missing_trials import MISSING_PERCENT
 from study_app.store.withdrawals import Tombstone
 from tests.analysis.made_up import delays, everybody, liquids, study
 from tests.analysis.report.read_report import seen

@@ -23,7 +23,7 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
 from study_app.store.exclusions import exclude, include
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.analysis.conftest import SAMPLE, Results, make_results, twelve
 from tests.protocol.groups.grouped import GROUPS, STUDY
 

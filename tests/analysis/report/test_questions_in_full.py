@@ -12,10 +12,10 @@ from study_app.analysis.report.sections import changed_questions
 from study_app.analysis.report.write_report import appendix, report
 from study_app.protocol.source.files import shipped_file
 from study_app.store import receipt
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.sites.merge import merge_sites
-from study_app.store.study_runs import RecordedContent, content_changes, recorded_contents
-from study_app.store.study_versions import save_study
+from study_app.store.versions.study_runs import RecordedContent, content_changes, recorded_contents
+from study_app.store.versions.study_versions import save_study
 from study_app.store.workstation import DEFAULTS, save_settings
 from tests.analysis.conftest import Results
 from tests.studies import begun

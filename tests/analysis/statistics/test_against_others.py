@@ -13,10 +13,10 @@ from scipy.stats import t as student
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.outcome import false_discovery, holm
 from study_app.analysis.statistics.rank_tests import friedman, paired
-from study_app.analysis.statistics.recognition import kappa
+from study_app.analysis.statistics.recognition_tests import kappa
 from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.analysis.statistics.thresholds import group_mean
-from study_app.analysis.statistics.trend import trend
+from study_app.analysis.statistics.trend_tests import trend
 
 pytestmark = pytest.mark.slow
 

@@ -14,10 +14,16 @@ from scipy.stats import binom
 from study_app.analysis.statistics.equivalence import tost
 from study_app.analysis.statistics.outcome import Outcome
 from study_app.analysis.statistics.rank_tests import friedman, global_permutation, paired
-from study_app.analysis.statistics.recognition import UNANSWERED, UNDECIDED, Recognition, named_labels, recognition
+from study_app.analysis.statistics.recognition_tests import (
+    UNANSWERED,
+    UNDECIDED,
+    Recognition,
+    named_labels,
+    recognition,
+)
 from study_app.analysis.statistics.slope_tests import slope_test
 from study_app.analysis.statistics.thresholds import noticed
-from study_app.analysis.statistics.trend import step_down, trend
+from study_app.analysis.statistics.trend_tests import step_down, trend
 from study_app.errors import AnalysisError
 
 RNG = np.random.default_rng(11)

@@ -8,7 +8,7 @@ from scipy.stats import binom, page_trend_test, spearmanr, wilcoxon
 
 from study_app.analysis.statistics import trend as trend_module
 from study_app.analysis.statistics.rank_tests import paired
-from study_app.analysis.statistics.trend import step_down, trend
+from study_app.analysis.statistics.trend_tests import step_down, trend
 from study_app.errors import AnalysisError
 
 # Siegel & Castellan, p. 186.

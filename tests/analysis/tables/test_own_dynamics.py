@@ -18,7 +18,7 @@ from study_app.analysis.data.study_tables import load_study, pool_sites
 from study_app.errors import AnalysisError
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import TrialEnded
 from study_app.store.unblinding import unblind

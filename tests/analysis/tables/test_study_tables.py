@@ -14,8 +14,8 @@ from study_app.errors import StoreError
 from study_app.protocol.blocks import block_titles
 from study_app.protocol.load import parse
 from study_app.protocol.source.files import source_bytes
-from study_app.store.columns import RESPONSES
-from study_app.store.csv_files import table_problems
+from study_app.store.files.columns import RESPONSES
+from study_app.store.files.csv_files import table_problems
 from tests.analysis import made_up
 from tests.analysis.conftest import Results, make_results
 from tests.analysis.tables.differing_answers import by_condition, refusal

@@ -13,7 +13,7 @@ from study_app.evidence.stability.bench import Bench, lowest_balance, new_trace
 from study_app.evidence.stability.stability_cases import CIRCLES, DAMPER, PLANTS, REACHES, SINE, Case, scenes
 from study_app.evidence.stability.velocity import random_path
 from study_app.haptics.model.layout import SAMPLE
-from study_app.store.delivered import late_device_ticks
+from study_app.store.session_progress.delivered import late_device_ticks
 
 SECONDS = 10.0
 RANDOM_HZ = (0.8, 1.2, 1.6, 2.0, 3.0)

@@ -28,13 +28,13 @@ from study_app.errors import StoreError, StudyError
 from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped, source_bytes
 from study_app.session.simulated.rehearsal import open_session, resume_rehearsal
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
-from study_app.store.progress import progress_of
+from study_app.store.session_progress.progress import progress_of
 from study_app.store.sessions import recovery
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 
 FAULTS = ("none", "killed", "torn", "unplugged", "disk full", "two operators", "clock set back", "slept")
 MOST_RESUMED = 20

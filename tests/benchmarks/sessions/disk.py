@@ -23,11 +23,11 @@ from unittest import mock
 from study_app.errors import SessionError, StoreError
 from study_app.session.runner import RETRY_S
 from study_app.session.transitions.state import Phase
-from study_app.store import atomic
+from study_app.store.files import atomic
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.verification.verify_session import Findings
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.benchmarks.sessions.day import state
 from tests.faults.support.worlds import StoredWorld
 from tests.session import small

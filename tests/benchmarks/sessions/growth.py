@@ -24,11 +24,11 @@ from study_app.analysis.report.write_report import report
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import Exclusion, exclude, exclusion_bytes, include
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.sites.merge import merge_sites
 from study_app.store.tables.study_files import participants_of
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.protocol.groups.grouped import GROUPS, STUDY, grouped
 

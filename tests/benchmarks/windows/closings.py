@@ -37,15 +37,15 @@ from study_app.devices.hand import hand_of
 from study_app.devices.rig import Rig
 from study_app.errors import StudyError
 from study_app.gui.application import application_here
-from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.operator.window import OperatorWindow
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.preflight.window import PreflightWindow
+from study_app.gui.startup_window import OpeningWindow
 from study_app.session import start
 from study_app.session.pages import EndPage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage, TroublePage
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.faults.support.watched_program import Person, window
 
 STUDY: Final = Path(__file__).with_suffix(".toml")

@@ -26,7 +26,7 @@ from study_app.designer.header import DesignerHeader
 from study_app.designer.problems import ProblemsCard
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import shipped_file
-from study_app.store.drafts import draft_of
+from study_app.store.versions.drafts import draft_of
 from tests.designer.support.inputs import name_of, wait_until
 from tests.designer.support.made_studies import begin, participant, save
 from tests.designer.support.program import environment, use

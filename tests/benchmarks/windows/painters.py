@@ -39,7 +39,7 @@ from study_app.gui.widgets.cards import MaskedPanel
 from study_app.protocol.source.problems import Fault
 from study_app.session.pages import TroublePage
 from study_app.session.watch import read_watched
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from tests.benchmarks.windows.closings import (
     PAUSE,
     PHASES,

@@ -18,7 +18,8 @@ from study_app.designer.document.toml_edits import Insert, Set
 from study_app.errors import ProtocolError, StoreError, StudyError
 from study_app.protocol.load import load, parse
 from study_app.protocol.source.files import protocol_hash, shipped
-from study_app.store.drafts import (
+from study_app.store.receipt import without_conditions
+from study_app.store.versions.drafts import (
     REST_S,
     Draft,
     Keeper,
@@ -28,9 +29,14 @@ from study_app.store.drafts import (
     unsaved_files,
     write_draft,
 )
-from study_app.store.receipt import without_conditions
-from study_app.store.study_runs import Run, keep_run_content, runs_of_study
-from study_app.store.study_versions import ChangedOutsideError, content_hash, kept_content, kept_versions, save_study
+from study_app.store.versions.study_runs import Run, keep_run_content, runs_of_study
+from study_app.store.versions.study_versions import (
+    ChangedOutsideError,
+    content_hash,
+    kept_content,
+    kept_versions,
+    save_study,
+)
 from study_app.user_folder import data_folder
 from tests.designer.document.grown import PROTOCOLS
 from tests.platforms import needs_links
@@ -313,7 +319,7 @@ def test_lines_of_the_list_that_cannot_be_read_are_left_out(tmp_path: Path) -> N
 SAVING = """
 import sys
 from pathlib import Path
-from study_app.store.study_versions import ChangedOutsideError, content_hash, save_study
+from study_app.store.versions.study_versions import ChangedOutsideError, content_hash, save_study
 from study_app.errors import StoreError
 file, name, saved = Path(sys.argv[1]), sys.argv[2], 0
 while saved < 20:

@@ -23,8 +23,8 @@ from study_app.protocol.warnings.expected_precision import threshold_plan
 from study_app.protocol.warnings.study_warnings import level_warnings
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.folders import StudyFolder
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.files.folders import StudyFolder
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 
 

@@ -24,7 +24,7 @@ from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.widgets.controls import CompactStop
 from study_app.session.pages import ChoicePage, FeedbackPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.transitions.page_builder import preview
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.app.lab.worlds import PATIENCE
 from tests.app.people import window
 from tests.compiled import needs_servo

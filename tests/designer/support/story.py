@@ -13,7 +13,7 @@ from study_app.designer.header import problems_chip
 from study_app.designer.problems import problem_rows
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.protocol.source.document import Path, value_at
-from study_app.store.drafts import draft_of
+from study_app.store.versions.drafts import draft_of
 from tests.designer.support.designer import DEMO
 from tests.designer.support.inputs import name_of
 from tests.gui.transcript import comes_and_goes, spoken

@@ -12,8 +12,8 @@ from study_app.gui.home.dialogs import NewSessionDialog, RehearsalDialog
 from study_app.gui.widgets.background import wait_for_jobs
 from study_app.gui.widgets.controls import ActionButton
 from study_app.protocol.source.files import source_bytes
-from study_app.store.drafts import Draft, delete_draft, write_draft
-from study_app.store.study_settings import keep_original
+from study_app.store.versions.drafts import Draft, delete_draft, write_draft
+from study_app.store.versions.study_settings import keep_original
 from tests.golden import masked
 from tests.gui.home.home_window import hold, open_home
 from tests.gui.transcript import compare, story

@@ -33,11 +33,11 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import PageStep, build_schedule
 from study_app.protocol.source.files import source_bytes
 from study_app.session.resume import REHEARSED_SCREENS
-from study_app.store.drafts import Draft, draft_files, write_draft
 from study_app.store.exclusions import exclude
-from study_app.store.folder_lock import lock_folder
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.journals import journal_events
-from study_app.store.study_settings import keep_original
+from study_app.store.versions.drafts import Draft, draft_files, write_draft
+from study_app.store.versions.study_settings import keep_original
 from tests import studies
 from tests.golden import check_kept
 from tests.golden_values import value_lines

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from study_app.gui.operator.operator_view import OperatorView, Session, operator_view, stages
+from study_app.gui.operator.operator_view import OperatorView, Session, stages, view_session
 from study_app.gui.operator.servo_health import ServoHealth
 from study_app.haptics.model.layout import SAMPLE, records
 from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.schedule import Schedule, Trial, build_schedule
-from study_app.store.progress import Progress
+from study_app.store.session_progress.progress import Progress
 from tests.journal_lines import event_of
 
 
@@ -55,7 +55,7 @@ class Told:
 
     def view(self, health: ServoHealth | None = None, *, force_on: bool = True, **said: Any) -> OperatorView:
         vitals = (health or ServoHealth(1000.0)).vitals()
-        return operator_view(self.session, self.progress, vitals, now_s=self.now_s, force_on=force_on, **said)
+        return view_session(self.session, self.progress, vitals, now_s=self.now_s, force_on=force_on, **said)
 
 
 def new_session() -> Told:

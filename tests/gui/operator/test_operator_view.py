@@ -13,10 +13,10 @@ from study_app.number_text import duration, duration_range, duration_words, grou
 from study_app.protocol.load import load
 from study_app.protocol.model import Limits
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.store.columns import TRIALS
-from study_app.store.csv_files import header
-from study_app.store.delivered import beyond_limits
-from study_app.store.missing_trials import MISSING_PERCENT, REASONS
+from study_app.store.files.columns import TRIALS
+from study_app.store.files.csv_files import header
+from study_app.store.session_progress.delivered import beyond_limits
+from study_app.store.session_progress.missing_trials import MISSING_PERCENT, REASONS
 from tests.golden import check_kept, compare, each_once, what_comes
 from tests.golden_values import changed, value_lines
 from tests.gui.operator.session import ticks

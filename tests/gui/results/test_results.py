@@ -25,7 +25,7 @@ from study_app.gui.widgets.main_view import Place
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.blinding import reveals
 from study_app.store.exclusions import exclusions
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.workers.server import Crashed, Refused
 from tests.protocol.groups.grouped import GROUPS, STUDY
 from tests.studies import begun, made_up, rehearsed

@@ -20,10 +20,10 @@ from study_app.gui.theme.theme import LIGHT
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal_events import UNDELIVERED
-from study_app.store.missing_trials import MissingTrials
+from study_app.store.session_progress.missing_trials import MissingTrials
 from study_app.store.unblinding import unblind
 from tests.golden import compare, each_once, what_comes
 from tests.golden_values import changed

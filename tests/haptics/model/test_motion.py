@@ -9,7 +9,7 @@ from hypothesis.extra.numpy import arrays
 
 from study_app.errors import ProtocolError, StudyError
 from study_app.haptics.model.motion import Motion, read_motion
-from study_app.store.csv_files import write_columns
+from study_app.store.files.csv_files import write_columns
 from tests.haptics.scenes import examples
 
 HEADER = "t_s,x_m,y_m,z_m"

@@ -3,7 +3,7 @@ import pytest
 
 from study_app.haptics.model.motion import Motion, circle
 from study_app.haptics.runtime.offline import simulate
-from study_app.store.csv_files import write_columns
+from study_app.store.files.csv_files import write_columns
 from tests.haptics.scenes import WATER, scene
 
 # The settings of the thesis' figures 3 to 8.

@@ -18,8 +18,8 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.without_force import SENTENCES, without_force
 from study_app.protocol.wording import languages
 from study_app.protocol.wording.languages import LANGUAGES, words
-from study_app.store.study_runs import recorded_contents
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
+from study_app.store.versions.study_runs import recorded_contents
 
 
 def slots(text: str) -> set[str]:

@@ -9,7 +9,7 @@ from typing import Any
 
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.verification.reproduction import reproduce_session
 from tests.faults.support import short
 from tests.protocol import edited_studies

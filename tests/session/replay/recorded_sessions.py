@@ -27,7 +27,7 @@ from study_app.session.transitions.events import (
     RepeatRequested,
     ResumeRequested,
 )
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal import SessionClock
 from study_app.store.sessions.open_session import SessionStore
 from tests import studies

@@ -23,7 +23,7 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.session.transitions.events import Begin, Continue, EndRequested, PauseRequested, ResumeRequested
 from study_app.store import recordings
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import reopen_store
 from tests.compiled import needs_servo

@@ -15,7 +15,7 @@ from study_app.session import replay as replay_module
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
 from tests.compiled import needs_servo

@@ -15,7 +15,7 @@ from study_app.store.receipt import read
 from study_app.store.unblinding import unblind
 from study_app.store.verification.leaks import certain_telltales, find_leaks, recorded_numbers
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import event_from, raw
 from tests.protocol.trials.matching import ALONE, DELAY, text_of

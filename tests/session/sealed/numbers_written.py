@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.stats import binomtest
 
-from study_app.store.folders import SessionFolder
+from study_app.store.files.folders import SessionFolder
 
 ABOUT_ANSWERS = frozenset({"item_shown", "choice", "responses"})
 TIMES_OF_ACTIONS = frozenset({"t_s", "t_task_s", "trial_started_s", "interval_started_s", "gap_s"})

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import pytest
 
-from study_app.gui.operator.operator_view import Session, operator_view, stages
+from study_app.gui.operator.operator_view import Session, stages, view_session
 from study_app.gui.operator.servo_health import Vitals
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule
@@ -18,11 +18,11 @@ from study_app.protocol.simulated import NO_FEATURES, Comparison
 from study_app.session.simulated.rehearsal import RehearsedSession, rehearse
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
-from study_app.store.columns import SEALED
-from study_app.store.folders import StudyFolder
+from study_app.store.files.columns import SEALED
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import IntervalEnded, Recorded
-from study_app.store.progress import Progress
+from study_app.store.session_progress.progress import Progress
 from study_app.store.unblinding import unblind
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
@@ -161,7 +161,7 @@ def operator_views(folder: Path, protocol: Path) -> list[Any]:
         if isinstance(line, Recorded):  # whenever the recorder is done
             continue
         progress.process_line(line)
-        views.append(operator_view(session, progress, Vitals(), now_s=line.t_s, force_on=True))
+        views.append(view_session(session, progress, Vitals(), now_s=line.t_s, force_on=True))
     return views
 
 

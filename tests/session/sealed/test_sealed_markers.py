@@ -9,7 +9,7 @@ import pytest
 from study_app.protocol.load import load
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.leaks import telltales
 from tests.compiled import needs_servo

@@ -9,7 +9,7 @@ from study_app.protocol.load import load
 from study_app.protocol.source.files import shipped
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import TrialStarted
 from tests.compiled import needs_servo

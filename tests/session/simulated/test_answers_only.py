@@ -13,9 +13,9 @@ from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.session.simulated.rehearsal import condition_features, rehearse
 from study_app.store import receipt
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.protocol.edited_studies import text_of
 from tests.store.forging import cover_up

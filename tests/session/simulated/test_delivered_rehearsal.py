@@ -7,7 +7,7 @@ import pytest
 from study_app.session.replay import replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.compiled import needs_servo
 from tests.journal_lines import raw

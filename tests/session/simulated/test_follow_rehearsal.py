@@ -9,7 +9,7 @@ from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.protocol.load import load
 from study_app.protocol.trials.tasks import Follow
 from study_app.session.simulated.rehearsal import rehearse
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.recordings import read_samples
 from tests.compiled import needs_servo
 from tests.protocol.edited_studies import text_of

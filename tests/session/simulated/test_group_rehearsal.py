@@ -8,10 +8,10 @@ import pytest
 
 from study_app.session.simulated.rehearsal import rehearse, resume_rehearsal
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import SessionFolder, StudyFolder
+from study_app.store.files.folders import SessionFolder, StudyFolder
 from study_app.store.journals import journal
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.journal_lines import raw
 from tests.protocol.groups.grouped import GROUPS, STUDY

@@ -19,9 +19,9 @@ from study_app.session.simulated import predicted_delivery as predicted_delivery
 from study_app.session.simulated.predicted_delivery import predicted_delivery
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.exclusions import MISSING_RULE, exclusions, include
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.workers.server import Stopped
 from tests.compiled import needs_servo
 

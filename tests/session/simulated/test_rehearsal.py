@@ -27,11 +27,11 @@ from study_app.session.simulated.participant import AdjustingObserver
 from study_app.session.simulated.rehearsal import RehearsedSession, condition_features, finish_session
 from study_app.session.simulated.rehearsal_worker import RehearsalOrder, carry_out
 from study_app.session.tasks import TankView, TaskView
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal import Journal
 from study_app.store.journals.journal_events import Responses, SessionResumed
-from study_app.store.missing_trials import MissingTrial, MissingTrials
+from study_app.store.session_progress.missing_trials import MissingTrial, MissingTrials
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.tables.study_files import write_description
 from study_app.store.withdrawals import withdraw

@@ -16,7 +16,7 @@ from study_app.session.resume import Start, resume_at
 from study_app.session.simulated.answers_only import begin_session_at_step
 from study_app.session.transitions.page_builder import preview
 from study_app.store.blinded.blinding import read_key
-from study_app.store.folders import locate_session
+from study_app.store.files.folders import locate_session
 from study_app.store.journals import journal
 from study_app.store.sessions.begin import SessionStart
 

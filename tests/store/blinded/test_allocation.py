@@ -22,14 +22,14 @@ from study_app.session.simulated.rehearsal import ConditionFeatures
 from study_app.store.blinded import allocation
 from study_app.store.blinded.allocation import allocate, allocation_of, claims, session_protocol
 from study_app.store.blinded.blinding import open_or_draw_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen_store
 from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests import studies
 from tests.faults.support.killer import die, forked
 from tests.faults.support.racers import race

@@ -14,7 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.store.blinded import blinding
 from study_app.store.blinded.blinding import check_conditions, open_or_draw_key, reveals, unreadable_reveals
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from tests.protocol.trials.level_studies import study
 from tests.store.conftest import Tables
 

@@ -12,12 +12,12 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.store.exclusions import exclusions, include
-from study_app.store.folder_lock import lock_folder
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.journals.journal_events import TrialStarted
 from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.protocol.trials.level_studies import SHORT, text_of
 
 pytestmark = [pytest.mark.nightly, pytest.mark.slow]

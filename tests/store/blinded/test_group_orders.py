@@ -16,11 +16,11 @@ from study_app.session.resume import begun_schedule
 from study_app.session.start import resumed_choices
 from study_app.store.blinded.allocation import allocate, claims
 from study_app.store.blinded.blinding import participant_group, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal_events import start_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests import studies
 from tests.protocol.groups.grouped import STUDY

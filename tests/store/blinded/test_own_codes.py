@@ -10,12 +10,12 @@ from study_app.analysis.evaluate import evaluate
 from study_app.protocol.source.files import source_bytes
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.blinded.blinding import open_events, read_key
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import TrialStarted
 from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.studies import made_up
 
 PEOPLE = 8

@@ -13,7 +13,7 @@ from study_app.errors import StoreError
 from study_app.store.blinded.blinding import read_key, reveal
 from study_app.store.recordings import read_frames, read_samples
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.journal_lines import event_of
 from tests.platforms import needs_fork

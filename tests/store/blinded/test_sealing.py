@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from study_app.errors import StoreError
 from study_app.store.blinded.blinding import Key, open_events, seal_event
 from study_app.store.blinded.sealing import MARK, open_file, recording_bytes, samples_bytes, seal_file
-from study_app.store.columns import SEALED, TRIALS
+from study_app.store.files.columns import SEALED, TRIALS
 from tests.journal_lines import event_of
 
 START = event_of("session_started", n=1, participant="P007", session=1, measures_sealed=True)

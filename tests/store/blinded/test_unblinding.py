@@ -10,15 +10,15 @@ import pytest
 from study_app.protocol.model import Protocol, StudyHead
 from study_app.store import unblinding as module
 from study_app.store.blinded.blinding import open_events, open_or_draw_key, reveal
-from study_app.store.columns import SEALED, TRIALS
-from study_app.store.csv_files import header, unsealed_columns
-from study_app.store.folders import REBUILT, StudyFolder
+from study_app.store.files.columns import SEALED, TRIALS
+from study_app.store.files.csv_files import header, unsealed_columns
+from study_app.store.files.folders import REBUILT, StudyFolder
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import rebuild_session, reopen_store
 from study_app.store.tables.study_files import description_bytes
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import event_of, raw
 from tests.store.conftest import SOURCE, Attend, Start, ticking_clock
 from tests.store.forging import Lines, cover_up, forge

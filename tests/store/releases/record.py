@@ -16,7 +16,7 @@ from pathlib import Path
 
 from study_app import __version__
 from study_app.protocol.source.files import source_bytes
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from tests.session.replay.recorded_sessions import STRESSED, stressed
 

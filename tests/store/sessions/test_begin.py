@@ -13,8 +13,8 @@ from study_app.errors import StoreError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.atomic import sync_folder
-from study_app.store.folders import StudyFolder
+from study_app.store.files.atomic import sync_folder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.journals.journal_events import SessionStarted
 from study_app.store.sessions.begin import UsedIds, used_ids

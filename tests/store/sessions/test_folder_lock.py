@@ -14,8 +14,8 @@ import psutil
 import pytest
 
 from study_app.errors import StoreError
-from study_app.store.folder_lock import is_open, lock_folder, markers, process_start_s
-from study_app.store.folders import StudyFolder, locate_session, study_folder
+from study_app.store.files.folders import StudyFolder, locate_session, study_folder
+from study_app.store.integrity.folder_lock import is_open, lock_folder, markers, process_start_s
 from study_app.store.sessions.begin import used_ids
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork, needs_links, needs_posix

@@ -16,7 +16,7 @@ from study_app.store import receipt
 from study_app.store.journals import journal, journal_events
 from study_app.store.recordings import read_facts
 from study_app.store.sessions.open_session import SessionStore
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import event_of
 from tests.store.conftest import Make, Start
 

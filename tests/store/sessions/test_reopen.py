@@ -14,7 +14,7 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule
 from study_app.store import receipt
 from study_app.store.blinded.blinding import open_events
-from study_app.store.folder_lock import is_open
+from study_app.store.integrity.folder_lock import is_open
 from study_app.store.journals import journal, journal_events
 from study_app.store.recorder import recording_files
 from study_app.store.recordings import read_samples, write_frames

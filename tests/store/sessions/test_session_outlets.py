@@ -12,7 +12,7 @@ from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
 from study_app.store.journals import journal, journal_events
-from study_app.store.progress import progress_of
+from study_app.store.session_progress.progress import progress_of
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.sessions.recovery import reopen_store
 from tests.outlets.collector import Collector

@@ -11,13 +11,13 @@ import pytest
 
 from study_app import app
 from study_app.errors import StoreError
-from study_app.store.folder_lock import is_abandoned, is_never_begun, lock_folder, markers
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.folder_lock import is_abandoned, is_never_begun, lock_folder, markers
 from study_app.store.journals import journal, journal_events
 from study_app.store.sessions import begin, open_session
 from study_app.store.sessions.begin import used_ids
 from study_app.store.sessions.recovery import reopen_store
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork
 from tests.store.conftest import SOURCE, Start

@@ -16,14 +16,14 @@ from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store.exclusions import reversals
-from study_app.store.folder_lock import lock_folder
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.merged import all_exclusions, read_merged
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.sites import merge as merging
 from study_app.store.sites.merge import merge_sites
 from study_app.store.verification.proofs import proof_text
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork

@@ -9,11 +9,11 @@ import pytest
 from study_app.errors import StoreError
 from study_app.protocol.model import Protocol
 from study_app.protocol.questions import KINDS
-from study_app.store.atomic import cannot_write
 from study_app.store.blinded.blinding import open_or_draw_key, reveal
-from study_app.store.columns import PARTICIPANTS, RESPONSES, TRIALS_MISSING, every_column
-from study_app.store.csv_files import Row
-from study_app.store.folders import StudyFolder
+from study_app.store.files.atomic import cannot_write
+from study_app.store.files.columns import PARTICIPANTS, RESPONSES, TRIALS_MISSING, every_column
+from study_app.store.files.csv_files import Row
+from study_app.store.files.folders import StudyFolder
 from study_app.store.tables import study_files
 from study_app.store.tables.column_dictionary import dictionary_markdown
 from study_app.store.tables.study_files import check_study, columns_of, description_bytes, write_description

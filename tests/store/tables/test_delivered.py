@@ -13,7 +13,7 @@ from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.presented.presentation import Presentation
 from study_app.protocol.trials.stimuli import Stimulated
-from study_app.store.delivered import (
+from study_app.store.session_progress.delivered import (
     beyond_limits,
     broken_interval_limits,
     broken_trial_limits,

@@ -10,7 +10,7 @@ from study_app.store.blinded.blinding import reveal
 from study_app.store.journals import journal_events
 from study_app.store.sessions.open_session import SessionStore, table_files
 from study_app.store.sessions.recovery import check_resumable, rebuild_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import event_of
 from tests.platforms import files_up_to
 from tests.store.conftest import SOURCE, Start

@@ -9,11 +9,11 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.gui.sessions.session_facts import sessions
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.tables import study_files
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import raw
 from tests.platforms import needs_links
 from tests.store.conftest import Start

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from study_app.errors import StoreError
-from study_app.store.columns import TRIALS
-from study_app.store.csv_files import (
+from study_app.store.files.columns import TRIALS
+from study_app.store.files.csv_files import (
     MISSING,
     Column,
     csv_bytes,
@@ -21,7 +21,7 @@ from study_app.store.csv_files import (
     read_table,
     table_problems,
 )
-from study_app.store.folders import SessionFolder
+from study_app.store.files.folders import SessionFolder
 from study_app.store.tables.session_tables import _MEASURED, SessionRows, latest_attempts
 from study_app.store.tables.study_files import row_of
 from tests.store.tables.test_transcripts import Lines

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from study_app.store.journals.journal_events import Event
-from study_app.store.progress import progress_of
+from study_app.store.session_progress.progress import progress_of
 from study_app.store.tables.session_tables import SessionRows, participant_row
 from tests.golden import compare
 from tests.journal_lines import event_of

@@ -15,15 +15,15 @@ from study_app.protocol.orders.schedule import build_schedule
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import exclude, exclusions
-from study_app.store.folder_lock import lock_folder
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.journals import journal_events
 from study_app.store.sessions.recovery import check_resumable, rebuild_session, reopen_store
 from study_app.store.tables.study_files import write_participants
 from study_app.store.unblinding import unblind
 from study_app.store.verification.proofs import proof_text
 from study_app.store.verification.verify_session import Findings
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import Tombstone, add_tombstone, describe_session, withdraw
 from tests.golden import CHANGING
 from tests.journal_lines import event_of

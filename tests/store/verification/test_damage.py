@@ -21,7 +21,7 @@ from study_app.store.journals.journal import scan
 from study_app.store.sessions.recovery import check_resumable, rebuild_session
 from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.damage import with_a_bit_flipped, with_an_odd_value, with_deep_nesting
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Attend, Make, Start

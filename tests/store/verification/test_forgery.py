@@ -16,10 +16,10 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.simulated import TrialFeatures
 from study_app.session.simulated.answers_only import rehearse_answers
 from study_app.store import receipt
-from study_app.store.checksums import read_list
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.checksums import read_list
 from study_app.store.journals import journal_events as events
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.protocol.forms.mixed import mixed_file
 from tests.store.conftest import Start, Tables
 from tests.store.forging import Lines, cover_up, forge

@@ -13,7 +13,7 @@ from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
 from study_app.store.verification.reproduction import reproduce_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import raw
 from tests.protocol.trials.level_studies import BLOCK, HEAD
 from tests.session.pairs import short_text

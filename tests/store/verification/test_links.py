@@ -14,16 +14,16 @@ from study_app.cli import commands
 from study_app.errors import AnalysisError, StoreError, StudyError
 from study_app.store import receipt
 from study_app.store.blinded import blinding
-from study_app.store.checksums import write_checksums
 from study_app.store.exclusions import exclude
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.files.output_files import write_files
+from study_app.store.integrity.checksums import write_checksums
 from study_app.store.journals import journal
-from study_app.store.output_files import write_files
 from study_app.store.sessions.open_session import Place, SessionStore
 from study_app.store.sessions.recovery import rebuild_session
 from study_app.store.unblinding import unblind
 from study_app.store.verification.verify_session import session_discrepancies
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import withdraw
 from tests.faults.support.killer import forked
 from tests.platforms import needs_fork, needs_links
@@ -168,7 +168,7 @@ def test_of_the_listed_files_only_the_one_that_cannot_be_read_is_an_error(
             raise StoreError(f"{path} cannot be read")
         return hashlib.sha256(path.read_bytes()).hexdigest()
 
-    monkeypatch.setattr("study_app.store.checksums.sha256", refused)
+    monkeypatch.setattr("study_app.store.integrity.checksums.sha256", refused)
     errors = [(Path(error.place).name, error.message) for error in verify_study(study).errors]
     assert [error for error in errors if error[0] != "ses-01"] == [
         ("notes.txt", "cannot be read"),

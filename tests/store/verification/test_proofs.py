@@ -16,10 +16,10 @@ from click.testing import CliRunner
 from study_app.cli import commands
 from study_app.errors import StoreError
 from study_app.store import workstation
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.verification import time_stamps
 from study_app.store.verification.proofs import proof_text, read_proof, write_proof
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.store.verification.played_studies import proved
 from tests.strangers import ends_with_each
 from tests.studies import once

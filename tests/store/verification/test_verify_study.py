@@ -15,7 +15,7 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.journals import journal_events
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.faults.support import short
 from tests.platforms import needs_fork
 from tests.store.conftest import Start

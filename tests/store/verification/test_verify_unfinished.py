@@ -7,11 +7,11 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.store import receipt
-from study_app.store.folder_lock import is_open
+from study_app.store.integrity.folder_lock import is_open
 from study_app.store.journals import journal_events
 from study_app.store.sessions import recovery
 from study_app.store.verification import verify_session
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from tests.journal_lines import event_of
 from tests.store.conftest import SOURCE, Start
 from tests.store.verification.played_studies import NAMES, P007, told, warned

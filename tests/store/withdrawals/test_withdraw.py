@@ -16,14 +16,14 @@ from study_app.analysis.export_study import export
 from study_app.analysis.report.write_report import report
 from study_app.cli import commands
 from study_app.errors import StoreError
-from study_app.store.checksums import checked_line
 from study_app.store.exclusions import exclude, include
-from study_app.store.folder_lock import lock_folder
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.checksums import checked_line
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.sessions.begin import used_ids
 from study_app.store.sites.merge import merge_sites
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.withdrawals import Withdrawn, proof_of_withdrawal, tombstones, withdraw
 from tests.faults.support.killer import die, forked
 from tests.platforms import needs_fork

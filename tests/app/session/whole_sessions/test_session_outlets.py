@@ -8,7 +8,7 @@ import pytest
 from study_app.gui.operator.window import OperatorWindow
 from study_app.outlets.markers import CODES
 from study_app.store import workstation
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.workstation import MachineSettings
 from tests.app.people import Person, attended, events, receipt_of, window
 from tests.compiled import needs_servo

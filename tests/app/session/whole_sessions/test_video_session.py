@@ -22,7 +22,7 @@ from study_app.store.blinded.blinding import read_key
 from study_app.store.journals.journal_events import CAUSE_WITHHELD
 from study_app.store.recordings import read_frames
 from study_app.store.unblinding import unblind
-from study_app.store.verification.verify_study import verify_study
+from study_app.store.verification.whole_study import verify_study
 from study_app.store.workstation import MachineSettings
 from study_app.video import sources
 from tests.app.people import Person, attended, events, receipt_of, rows, window

@@ -17,12 +17,12 @@ from study_app.app import failures
 from study_app.app.session import live_session
 from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import DeviceNotFound, DisplayError, SessionError, StoreError, StudyError
-from study_app.gui.home.startup_window import OpeningWindow
 from study_app.gui.operator.window import OperatorWindow
+from study_app.gui.startup_window import OpeningWindow
 from study_app.gui.theme.theme import PARTICIPANT
 from study_app.store import workstation
 from study_app.store.recordings import read_frames
-from study_app.store.study_versions import kept_content
+from study_app.store.versions.study_versions import kept_content
 from study_app.store.workstation import MachineSettings
 from tests.app.people import Person, attended, can_go_on, events, rows, window
 from tests.compiled import needs_servo

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from study_app.errors import StoreError
-from study_app.store.atomic import parse_json
-from study_app.store.study_versions import file_key, write_whole
+from study_app.store.files.atomic import parse_json
+from study_app.store.versions.study_versions import file_key, write_whole
 from study_app.user_folder import data_folder
 
 

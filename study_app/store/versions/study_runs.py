@@ -12,9 +12,9 @@ from study_app.errors import StoreError
 from study_app.protocol.descriptions import differences
 from study_app.protocol.source import with_liquid_files
 from study_app.store import receipt
-from study_app.store.folders import StudyFolder
+from study_app.store.files.folders import StudyFolder
 from study_app.store.merged import folders_of
-from study_app.store.study_versions import content_hash, keep_content, kept_content
+from study_app.store.versions.study_versions import content_hash, keep_content, kept_content
 
 _HIDDEN_CHANGE: Final = "only comments, liquids or conditions have changed; the receipts do not contain these"
 _NAME: Final = re.compile(r"[a-z][a-z0-9]*")

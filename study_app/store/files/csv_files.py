@@ -18,7 +18,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from study_app.errors import StudyError
-from study_app.store.atomic import write_file
+from study_app.store.files.atomic import write_file
 
 COMPUTED: Final = "= + - @"
 _FORMULA = re.compile("'*[=+\\-@\t\r＝＋－＠]")

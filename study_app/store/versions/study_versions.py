@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import (
+from study_app.store.files.atomic import (
     append_line,
     make_folder,
     parse_json,
@@ -18,7 +18,7 @@ from study_app.store.atomic import (
     remove_old_temporary_files,
     write_file,
 )
-from study_app.store.folder_lock import lock_folder
+from study_app.store.integrity.folder_lock import lock_folder
 from study_app.store.workstation import load_or_default
 from study_app.user_folder import data_folder
 

@@ -16,7 +16,7 @@ from typing import TypeAlias
 
 import study_app
 from study_app.errors import StoreError
-from study_app.store.atomic import (
+from study_app.store.files.atomic import (
     append_line,
     cannot_read,
     open_regular,
@@ -26,7 +26,7 @@ from study_app.store.atomic import (
     study_root,
     write_file,
 )
-from study_app.store.folders import REBUILT, SessionFolder, StudyFolder
+from study_app.store.files.folders import REBUILT, SessionFolder, StudyFolder
 from study_app.store.journals.journal_events import Event, Recorded
 
 _LINE = re.compile(r"([0-9a-f]{64})  (.+)")

@@ -21,20 +21,20 @@ from study_app.discovery import registry
 from study_app.errors import StoreError
 from study_app.protocol.model import StudyHead
 from study_app.protocol.source import without_byte_order_mark
-from study_app.store import csv_files, exclusions, receipt
-from study_app.store.atomic import is_there, read_own, read_regular, temporary_files
+from study_app.store import exclusions, receipt
 from study_app.store.blinded import blinding
 from study_app.store.blinded.allocation import Claim, claims, entries_begun, is_unchanged
 from study_app.store.blinded.blinding import Key, complete_protocol, open_events, sealed_hash
-from study_app.store.checksums import Proofs, checked_line, place_of, read_list, unreadable_lines
-from study_app.store.columns import EXCLUSIONS
-from study_app.store.folder_lock import is_open
-from study_app.store.folders import StudyFolder
+from study_app.store.files import csv_files
+from study_app.store.files.atomic import is_there, read_own, read_regular, temporary_files
+from study_app.store.files.columns import EXCLUSIONS
+from study_app.store.files.folders import StudyFolder
+from study_app.store.integrity.checksums import Proofs, checked_line, place_of, read_list, unreadable_lines
+from study_app.store.integrity.folder_lock import is_open
 from study_app.store.journals import journal
 from study_app.store.merged import Merged, Site, read_merged
 from study_app.store.sessions.open_session import Place
 from study_app.store.sites.merge import stray_entries
-from study_app.store.study_runs import run_of
 from study_app.store.tables.study_files import (
     columns_of,
     described_study,
@@ -54,6 +54,7 @@ from study_app.store.verification.verify_session import (
     check_session,
     check_table,
 )
+from study_app.store.versions.study_runs import run_of
 from study_app.store.withdrawals import Tombstone, describe_session, proof_of_withdrawal, tombstones, unerased_files
 
 _IN_FILES: Final = ("question", "task", "method")

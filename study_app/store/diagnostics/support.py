@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Final
 
 from study_app.store import receipt, workstation
-from study_app.store.atomic import write_file
-from study_app.store.program_log import last_error, read_log, source_place
+from study_app.store.diagnostics.program_log import last_error, read_log, source_place
+from study_app.store.files.atomic import write_file
 from study_app.workspace import workspace
 
 NAME: Final = "liquid-study-support.zip"

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from study_app.errors import AnalysisError, StoreError
-from study_app.store.atomic import (
+from study_app.store.files.atomic import (
     append_line,
     cannot_write,
     flush_file,

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Final, TypeAlias
 
 from study_app.errors import StoreError
-from study_app.store.atomic import parse_json
-from study_app.store.study_versions import file_key, keep_version, write_whole
+from study_app.store.files.atomic import parse_json
+from study_app.store.versions.study_versions import file_key, keep_version, write_whole
 from study_app.user_folder import data_folder
 
 REST_S: Final = 0.25

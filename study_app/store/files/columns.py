@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from study_app.haptics.model.layout import LIMITERS
 from study_app.protocol.questions import KINDS
-from study_app.store.csv_files import Column, optional
+from study_app.store.files.csv_files import Column, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
 _PARTICIPANT = Column("participant", "text", "The participant's ID: letters and digits, not a name.")

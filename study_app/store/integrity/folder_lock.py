@@ -24,7 +24,7 @@ from typing import Any, Self
 
 from study_app.errors import StoreError
 from study_app.store import receipt
-from study_app.store.atomic import (
+from study_app.store.files.atomic import (
     cannot_read,
     cannot_write,
     create_folder,
@@ -35,7 +35,7 @@ from study_app.store.atomic import (
     temporary_files,
     write_file,
 )
-from study_app.store.checksums import is_system_file
+from study_app.store.integrity.checksums import is_system_file
 from study_app.store.journals import journal
 
 _MARKER = re.compile(r"\.open-[0-9a-f]{8}\.json")

@@ -11,9 +11,9 @@ from study_app.protocol.model import Protocol
 from study_app.protocol.orders import design_of
 from study_app.protocol.presented import arrangement_of, trial_result
 from study_app.protocol.trials import TrialResult
-from study_app.store.delivered import Broken, beyond_limits, late_device_text
 from study_app.store.journals import journal_events as events
-from study_app.store.missing_trials import MissingTrial, MissingTrials
+from study_app.store.session_progress.delivered import Broken, beyond_limits, late_device_text
+from study_app.store.session_progress.missing_trials import MissingTrial, MissingTrials
 
 
 @dataclass(frozen=True, slots=True)
