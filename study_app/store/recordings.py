@@ -26,38 +26,13 @@ from numpy.typing import NDArray
 from pyarrow import parquet
 
 from study_app.errors import StoreError
-from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, SampleField, records
+from study_app.haptics.model.layout import SAMPLE, SAMPLE_FIELDS, records
 from study_app.store.blinded.sealing import MARK, frames_bytes, open_file, samples_bytes, seal_file
 from study_app.store.files.atomic import cannot_read, parse_json, read_regular, write_file
-from study_app.store.files.csv_files import Column, Kind
+from study_app.store.files.columns import FRAMES, SAMPLES
+from study_app.store.files.csv_files import Column
 from study_app.store.journals.journal_events import plain_json
 
-FRAMES: tuple[Column, ...] = (
-    Column("painted_ns", "integer", "Time at which the frame was shown, on the servo's clock.", unit="ns"),
-    Column("sample_ns", "integer", "Time at which the displayed hand position was measured.", unit="ns"),
-    Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", unit="ns"),
-    Column(
-        "video_frame",
-        "integer",
-        "Number of the video frame shown, counting from 0; -1 if there is no video.",
-        minimum=-1,
-    ),
-    Column(
-        "video_ns",
-        "integer",
-        "Time at which the video frame would have been due without a delay, on the servo's clock (when the camera's "
-        "frame was ready, or the time in the file); 0 if there is no video.",
-        unit="ns",
-    ),
-    Column(
-        "video_age_ns",
-        "integer",
-        "Age of the camera's frame when it was ready, according to the source's time stamps: it was taken at video_ns "
-        "- video_age_ns; -1 if the age is unknown or there is no video.",
-        unit="ns",
-        minimum=-1,
-    ),
-)
 _FORMAT = 4
 _RECORDED = tuple(field for field in SAMPLE_FIELDS if field.meaning)
 ROUNDED_TO = {field.name: field.step for field in _RECORDED if field.step}
@@ -70,19 +45,6 @@ _VIDEO_SINCE = 4
 """First format of recordings whose frames have numbers and times of a video."""
 _GROUP_SECONDS = 30  # seconds of rows that are compressed together
 _COMPRESSION = ("zstd", 9)
-
-
-def _columns(field: SampleField) -> list[Column]:
-    """Return the columns of a recording that store a field of ``layout.SAMPLE``."""
-    kind: Kind = "flag" if field.stored is np.bool_ else "integer" if issubclass(field.stored, np.integer) else "number"
-    meanings = [field.meaning.replace("{component}", meaning) for meaning in field.parts.values()] or [field.meaning]
-    return [
-        Column(name, kind, meaning, unit=field.unit, levels=field.levels, minimum=field.minimum, maximum=field.maximum)
-        for name, meaning in zip(field.named(), meanings, strict=True)
-    ]
-
-
-SAMPLES = tuple(column for field in _RECORDED for column in _columns(field))
 _STORED = {
     **{name: pa.from_numpy_dtype(field.stored) for field in _RECORDED for name in field.named()},
     **{column.name: pa.int64() for column in FRAMES},

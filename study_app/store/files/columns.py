@@ -7,9 +7,11 @@ name mean the same in every table.
 from dataclasses import replace
 from typing import Any, Literal
 
-from study_app.haptics.model.layout import LIMITERS
+import numpy as np
+
+from study_app.haptics.model.layout import LIMITERS, SAMPLE_FIELDS, SampleField
 from study_app.protocol.questions import KINDS
-from study_app.store.files.csv_files import Column, optional
+from study_app.store.files.csv_files import Column, Kind, optional
 
 STUDY = Column("study", "text", "Short name of the study, from its protocol.")
 _PARTICIPANT = Column("participant", "text", "The participant's ID: letters and digits, not a name.")
@@ -374,3 +376,44 @@ def every_column(*, intervals: bool = False) -> tuple[Column, ...]:
         for column in columns if name != "intervals" or intervals else ():
             by_name.setdefault(column.name, column)
     return tuple(by_name.values())
+
+
+FRAMES: tuple[Column, ...] = (
+    Column("painted_ns", "integer", "Time at which the frame was shown, on the servo's clock.", unit="ns"),
+    Column("sample_ns", "integer", "Time at which the displayed hand position was measured.", unit="ns"),
+    Column("age_ns", "integer", "Achieved visual delay: painted_ns - sample_ns.", unit="ns"),
+    Column(
+        "video_frame",
+        "integer",
+        "Number of the video frame shown, counting from 0; -1 if there is no video.",
+        minimum=-1,
+    ),
+    Column(
+        "video_ns",
+        "integer",
+        "Time at which the video frame would have been due without a delay, on the servo's clock (when the camera's "
+        "frame was ready, or the time in the file); 0 if there is no video.",
+        unit="ns",
+    ),
+    Column(
+        "video_age_ns",
+        "integer",
+        "Age of the camera's frame when it was ready, according to the source's time stamps: it was taken at video_ns "
+        "- video_age_ns; -1 if the age is unknown or there is no video.",
+        unit="ns",
+        minimum=-1,
+    ),
+)
+
+
+def _sample_columns(field: SampleField) -> list[Column]:
+    """Return the columns of a recording that hold a field of ``layout.SAMPLE``."""
+    kind: Kind = "flag" if field.stored is np.bool_ else "integer" if issubclass(field.stored, np.integer) else "number"
+    meanings = [field.meaning.replace("{component}", meaning) for meaning in field.parts.values()] or [field.meaning]
+    return [
+        Column(name, kind, meaning, unit=field.unit, levels=field.levels, minimum=field.minimum, maximum=field.maximum)
+        for name, meaning in zip(field.named(), meanings, strict=True)
+    ]
+
+
+SAMPLES = tuple(column for field in SAMPLE_FIELDS if field.meaning for column in _sample_columns(field))

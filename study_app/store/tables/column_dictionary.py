@@ -4,16 +4,17 @@ from collections.abc import Sequence
 
 from study_app.store.files.columns import (
     EXCLUSIONS,
+    FRAMES,
     GROUP,
     INTERVALS,
     PARTICIPANTS,
     RESPONSES,
+    SAMPLES,
     TRIALS,
     with_missing_trials,
 )
 from study_app.store.files.csv_files import Column
 from study_app.store.journals.journal_events import EVENTS
-from study_app.store.recordings import FRAMES, SAMPLES
 
 _SECTIONS: tuple[tuple[str, str, str, Sequence[Column]], ...] = (
     ("Responses", "subject-…_description-responses_data.csv", "one row per response", RESPONSES),
