@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, Self, TypeAlias, TypeVar
 from pydantic import BeforeValidator, ConfigDict, Field, model_validator
 
 from study_app.haptics.model.effects import Effect as EffectDescriptor
+from study_app.haptics.model.overrides import override_value, value_of
 from study_app.haptics.model.ranges import DensityKgM3, DiameterM, DragCoefficient, FadeS, Metres, Vector, later, within
 from study_app.haptics.model.scene import (
     FADE_S,
@@ -28,7 +29,16 @@ from study_app.haptics.model.scene import (
 )
 from study_app.ids import file_name_fault
 from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
-from study_app.protocol.participants.groups import Group, GroupAssignment, Sequences, Steps, every_step
+from study_app.protocol.participants.groups import (
+    Group,
+    GroupAssignment,
+    Sequences,
+    Steps,
+    every_step,
+    parts_by_block,
+    sessions_differ,
+    steps_of,
+)
 from study_app.protocol.participants.raters import SimulatedParticipants
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
@@ -44,9 +54,9 @@ from study_app.protocol.source.table import (
     invalid,
     text_in,
 )
-from study_app.protocol.trials.designs import AnyDesign, default_design, question_of
-from study_app.protocol.trials.methods import AnyMethod
-from study_app.protocol.trials.stimuli import Condition, Stimulus
+from study_app.protocol.trials.designs import AnyDesign, Design, default_design, question_of
+from study_app.protocol.trials.methods import Adjusting, Adjustment, AnyMethod, Method, default_method
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Condition, Stimulated, Stimulus
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach, Seconds
 
 __all__ = [
@@ -772,12 +782,59 @@ class Protocol(Table):
     @cached_property
     def design_questions(self) -> dict[str, Questionnaire]:
         """The questions of each block with a design, by the block's id."""
-        designs = {
-            block.id: self.designs.get(block.design) or default_design(block.design)
-            for block in self.blocks.values()
-            if block.design is not None
+        blocks = (block for block in self.blocks.values() if block.design is not None)
+        return {block.id: question_of(self.design_of(block), self.study.languages) for block in blocks}
+
+    def for_session(self, group: str | None, session: int) -> Self:
+        """Return the protocol of one session of a participant in ``group``, with one sequence and no groups.
+
+        Parts are numbered in the order of this session. A study whose sessions do not differ is returned unchanged.
+        StudyError is raised if the participant has fewer sessions.
+        """
+        if not sessions_differ(self):
+            return self
+        steps = steps_of(self, group, session)
+        parts = parts_by_block(steps, {name: block.part for name, block in self.blocks.items()})
+        blocks = {
+            name: block.model_copy(update={"part": parts[name]}) if name in parts else block
+            for name, block in self.blocks.items()
         }
-        return {name: question_of(design, self.study.languages) for name, design in designs.items()}
+        return self.model_copy(update={"sequence": steps, "sequences": (), "groups": {}, "blocks": blocks})
+
+    def design_of(self, block: Block) -> Design:
+        """Return a block's design: a table of the file, or a kind with its defaults."""
+        return self.designs.get(str(block.design)) or default_design(str(block.design))
+
+    def method_of(self, block: Block) -> Method:
+        """Return a block's method: a table of the file, or a kind with its defaults."""
+        return self.methods.get(str(block.method)) or default_method(str(block.method))
+
+    def adjusting(self, block: Block, standard: float | None, start: float) -> Adjusting | None:
+        """Return the adjustment that starts at a level; None if participants do not set levels."""
+        method = None if block.stimulus is None else self.method_of(block)
+        return method.adjusting(self.stimulus_of(block), standard, start) if isinstance(method, Adjustment) else None
+
+    def stimulus_of(self, block: Block) -> Stimulus:
+        """Return the stimulus of a block."""
+        return self.stimuli[str(block.stimulus)]
+
+    def condition_of(self, stimulus: Stimulus) -> str:
+        """Return the condition whose number varies."""
+        return stimulus.condition or next(iter(self.conditions))
+
+    def standards_of(self, block: Block) -> tuple[float | None, ...]:
+        """Return the standards of a block; a single None if the level is the value of the only interval."""
+        stimulus = self.stimulus_of(block)
+        if stimulus.level_kind == "value" and self.design_of(block).intervals == 1:
+            return (None,)
+        return block.standards or stimulus.standards or (self.present_value(stimulus),)
+
+    def present_value(self, stimulus: Stimulus) -> float:
+        """Return the varied number's value in the protocol (StudyError if the condition has none)."""
+        name = self.condition_of(stimulus)
+        if stimulus.vary in OF_CONDITION:
+            return float(getattr(self.conditions[name], stimulus.vary))
+        return value_of(self.scene_for(name), stimulus.vary)
 
     def compared_in(self, block_id: str) -> Compared | None:
         """Return the quantity that a main block compares, as stated or inferred; None for other blocks."""
@@ -791,7 +848,7 @@ class Protocol(Table):
         block = self.blocks[block_id]
         if block.stimulus is None:
             return block.conditions
-        return (self.stimuli[block.stimulus].condition or next(iter(self.conditions)),)
+        return (self.condition_of(self.stimulus_of(block)),)
 
     def scene_for(self, condition_id: str) -> Scene:
         """Return the scene of a condition."""
@@ -804,3 +861,28 @@ class Protocol(Table):
     def delay_s(self, condition_id: str) -> float:
         """Return the visual delay of a condition [s]."""
         return self.conditions[condition_id].delay_ms / 1000
+
+    @property
+    def has_imperfect_link(self) -> bool:
+        """Whether any force of the study is sent with delay, jitter or loss."""
+        varied = any(stimulus.vary in OF_LINK for stimulus in self.stimuli.values())
+        return varied or any(condition.link().acts for condition in self.conditions.values())
+
+    def presented_scene(self, presented: Stimulated, link_seed: int = 0) -> Scene:
+        """Return the scene of a presented condition; ``link_seed`` is the seed of the force's jitter and loss."""
+        scene = self.scene_for(presented.condition)
+        link = self.presented_condition(presented).link(link_seed)
+        if link.acts:
+            scene = Scene.model_validate(scene.model_copy(update={"link": link}))
+        if presented.vary is None or presented.vary in OF_CONDITION:
+            return scene
+        return override_value(scene, presented.vary, presented.value)
+
+    def presented_condition(self, presented: Stimulated) -> Condition:
+        """Return the presented condition, with the varied number if it belongs to the force link."""
+        varied = {presented.vary: presented.value} if presented.vary in OF_LINK else {}
+        return self.conditions[presented.condition].model_copy(update=varied)
+
+    def presented_delay_s(self, presented: Stimulated) -> float:
+        """Return the visual delay of the tank [s]."""
+        return presented.value / 1000 if presented.vary == DELAY else self.delay_s(presented.condition)

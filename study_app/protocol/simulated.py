@@ -29,9 +29,8 @@ from numpy.random import Generator
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
-from study_app.protocol.orders.tracks import design_of, stimulus_of
 from study_app.protocol.participants.raters import REHEARSED, SimulatedParticipants
-from study_app.protocol.presented.presentation import arrangement_text, next_level, trial_result
+from study_app.protocol.presented.presentation import next_level, trial_result
 from study_app.protocol.questions import POINTS
 from study_app.protocol.randomization.streams import Draw, Key, draw_secret, stream
 from study_app.protocol.trials.designs import Design, ForcedChoice, Rated
@@ -289,7 +288,7 @@ class Comparison:
     def of(cls, protocol: Protocol, block: Block, observer: Observer) -> Comparison:
         """Return the comparison that a block's question requires."""
         if block.stimulus is not None:
-            stimulus = stimulus_of(protocol, block)
+            stimulus = protocol.stimulus_of(block)
             return cls(stimulus.vary in DELAYS, stimulus.direction == "down", observer, stimulus.vary)
         delays = {protocol.conditions[name].delay_ms for name in block.conditions}
         return cls(len(delays) > 1, smallest=False, observer=observer)
@@ -449,7 +448,7 @@ def simulate_study(
             answered, before = heard.setdefault(block.id, []), sensed_in.setdefault(block.id, [])
             if (due := next_level(protocol, key, schedule, trial, answered)) is None:
                 continue
-            design, sensed = design_of(protocol, block), [sense(interval) for interval in due.intervals]
+            design, sensed = protocol.design_of(block), [sense(interval) for interval in due.intervals]
             draw = stream(int.from_bytes(key.secret[:4], "big"), f"observer/{person}/{trial.number}").random
             course = Course(courses[trial.number], said.get(block.id))
             given = Comparison.of(protocol, block, observer).answer(protocol, design, sensed, before, draw, course)
@@ -464,7 +463,7 @@ def simulate_study(
                 track=key.codes[block.id][trial.code],
                 trial=trial.number,
                 catch=due.catch,
-                arrangement=arrangement_text(design, due.arrangement),
+                arrangement=design.arrangement_text(due.arrangement),
                 standard=due.standard,
                 level=due.level,
                 answer=given,

@@ -31,8 +31,7 @@ from study_app.haptics.model.scene import FADE_S, Scene
 from study_app.haptics.runtime.offline import law_along, recompute_scenes
 from study_app.haptics.runtime.pack import adjust_into, pack
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import adjusting_of, design_of
-from study_app.protocol.presented import link_seed, recorded_presentation, scene_of
+from study_app.protocol.presented import link_seed, recorded_presentation
 from study_app.protocol.trials import Stimulated
 from study_app.store import receipt, recordings
 from study_app.store.blinded import Key, complete_protocol, open_events, protocol_errors, read_key, recorded_protocol
@@ -52,9 +51,9 @@ def _scene_presented(
     ``link_seed`` seeds the jitter and loss of the force.
     """
     if interval is None:
-        return scene_of(protocol, Stimulated(key.condition(started.block, started.code)), link_seed)
+        return protocol.presented_scene(Stimulated(key.condition(started.block, started.code)), link_seed)
     due = recorded_presentation(protocol, key.codes, started.fields())
-    return scene_of(protocol, due.intervals[interval - 1], link_seed)
+    return protocol.presented_scene(due.intervals[interval - 1], link_seed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,14 +76,16 @@ def _steps_of(
         return ()
     presented = recorded_presentation(protocol, key.codes, started.fields()).intervals[interval - 1]
     made = [line for line in lines if isinstance(line, events.Stepped) and line.which == started.which]
-    setting = adjusting_of(protocol, protocol.blocks[started.block], started.standard, started.level)
+    setting = protocol.adjusting(protocol.blocks[started.block], started.standard, started.level)
     if setting is None:
         return ()
     place, steps = 0, []
     for line in made:
         place = setting.moved(place, line.steps)
         if line.scene is not None:
-            steps.append(Step(line.scene, scene_of(protocol, replace(presented, value=setting.comparison(place)))))
+            steps.append(
+                Step(line.scene, protocol.presented_scene(replace(presented, value=setting.comparison(place))))
+            )
     return tuple(steps)
 
 
@@ -127,7 +128,7 @@ def _recompute_delivered(
     ``started`` is the opened line on the beginning of the trial, ``measured`` the measures on the interval's end.
     """
     block = protocol.blocks[started.block]
-    adjusted = design_of(protocol, block).adjusts and interval == len(started.arrangement or "")
+    adjusted = protocol.design_of(block).adjusts and interval == len(started.arrangement or "")
     own = judged_fields(_interval_samples(samples, measured["duration_s"]))
     return delivered_values(protocol, presented, protocol.tasks[block.task], own, adjusted=adjusted)
 

@@ -24,7 +24,7 @@ import numpy as np
 from study_app.errors import SessionError, StoreError, StudyError
 from study_app.protocol.model import Protocol as Study
 from study_app.protocol.orders import Schedule
-from study_app.protocol.presented import link_seed, scene_of
+from study_app.protocol.presented import link_seed
 from study_app.protocol.trials import DELAY
 from study_app.session.device_buttons import DeviceButtons
 from study_app.session.ports import Ports
@@ -271,7 +271,7 @@ class Runner:
             case events.StartTrial():
                 self._running = self._prepare_trial(command)
             case events.Adjust(presented, delay_s, stepped):
-                other = None if presented.vary == DELAY else scene_of(self._protocol, presented)
+                other = None if presented.vary == DELAY else self._protocol.presented_scene(presented)
                 scene = None if self._running is None else self._running.adjust(other, delay_s)
                 journal.append(replace(stepped, scene=scene), t_s=at_s, waits=False)
             case events.ShowPage(page):
@@ -286,7 +286,7 @@ class Runner:
         seed = link_seed(schedule.seed, schedule.participant, command.trial, command.attempt, command.interval)
         return RunningTrial(
             command,
-            scene_of(self._protocol, command.presented, seed),
+            self._protocol.presented_scene(command.presented, seed),
             late_s=self._protocol.limits.delay_error_ms / 1000,
             servo=self._ports.servo,
             reader=self._reader,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from study_app.devices.registry import DEVICES
 from study_app.errors import StoreError
 from study_app.haptics.model.layout import LIMITER_GLITCH
-from study_app.protocol.orders import Trial, design_of, own_protocol
+from study_app.protocol.orders import Trial
 from study_app.protocol.trials import Task
 from study_app.session.pages import Interval, TaskPage
 from study_app.session.tasks import TankView, Tracker, new_tracker
@@ -251,7 +251,7 @@ def _page(
     start, key = events.start_of(lines), read_key(study.path)
     group = participant_group(start, key)
     with protocol_errors(path):
-        protocol = own_protocol(complete_protocol(receipt.read(path)["protocol"], key), group, start.session)
+        protocol = complete_protocol(receipt.read(path)["protocol"], key).for_session(group, start.session)
     body = protocol.scene.body
     if opened_key(study) is not None:
         named = key.condition(started.block, started.code) if interval is None else None
@@ -261,7 +261,7 @@ def _page(
     page = task_page(protocol, progress_of(lines).language, trial, body)
     if interval is None:
         return page
-    of = design_of(protocol, protocol.blocks[started.block]).intervals
+    of = protocol.design_of(protocol.blocks[started.block]).intervals
     return replace(page, interval=Interval(interval, of, resting=False, announced=""))
 
 

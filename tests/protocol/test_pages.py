@@ -6,7 +6,6 @@ from pathlib import Path
 from study_app.protocol.load import parse
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import variants
-from study_app.protocol.orders.tracks import design_of
 from tests.protocol.groups.grouped import grouped
 
 TRIALS, ADJUSTMENT, DELAYS, QUESTIONS, GROUPS = (
@@ -22,7 +21,7 @@ def examples(page: str) -> list[str]:
 def test_the_example_of_delays_has_two_blocks_in_balanced_order() -> None:
     (example,) = examples(DELAYS)
     study = parse(example.encode(), "example")
-    assert [design_of(study, study.blocks[name]).kind for name in study.sequence] == ["2ifc", "yesno"]
+    assert [study.design_of(study.blocks[name]).kind for name in study.sequence] == ["2ifc", "yesno"]
     assert orders_of(study).block_order == "balanced"
 
 
@@ -32,10 +31,10 @@ def test_examples_of_trials_are_studies_and_replace_parts_of_the_first() -> None
     start, method, end = (example.index(table) for table in ("[stimuli", "[methods", "[blocks"))
     study = parse((example[:start] + example[method:end] + estimation).encode(), "example")
     assert orders_of(study).answers == 140
-    assert design_of(study, study.blocks["thickness"]).reply == "number"
+    assert study.design_of(study.blocks["thickness"]).reply == "number"
     study = parse((example[:start] + adjustment).encode(), "example")
     assert orders_of(study).answers == 10
-    assert design_of(study, study.blocks["matching"]).adjusts
+    assert study.design_of(study.blocks["matching"]).adjusts
 
 
 def test_example_of_questions_is_a_study() -> None:

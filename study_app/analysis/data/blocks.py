@@ -12,31 +12,12 @@ from study_app.analysis.wording import significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase, block_titles, display_language
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
-from study_app.protocol.orders import (
-    design_of,
-    every_step_of,
-    follows_in,
-    has_correct_answer,
-    method_of,
-    stimulus_of,
-    success_name,
-)
+from study_app.protocol.orders import every_step_of, follows_in
 from study_app.protocol.presented import link_descriptions
 from study_app.protocol.questionnaires import Score, instruments, published_name, score_range
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.source import text_in
-from study_app.protocol.trials import (
-    DELAY,
-    DESIGN_KINDS,
-    OF_LINK,
-    Assumed,
-    Design,
-    Method,
-    Stimulus,
-    assumed_for,
-    default_design,
-    rises,
-)
+from study_app.protocol.trials import DELAY, DESIGN_KINDS, OF_LINK, Assumed, Design, Method, Stimulus, default_design
 from study_app.store.blinded import Key, complete_protocol
 
 Kind: TypeAlias = Compared
@@ -308,12 +289,12 @@ class LevelBlock:
     @property
     def has_correct_answer(self) -> bool:
         """Whether an answer can be correct."""
-        return has_correct_answer(self.design, self.stimulus)
+        return self.design.can_be_correct(self.stimulus)
 
     @property
     def counts(self) -> str:
         """The name of the answers that are counted at a level, for example "correct"."""
-        return success_name(self.design, self.stimulus)
+        return self.design.success_of(self.stimulus)
 
     @property
     def standards_rove(self) -> bool:
@@ -324,10 +305,10 @@ class LevelBlock:
     @property
     def assumed(self) -> Assumed | None:
         """The assumptions about its psychometric function; None if there is none, or the key is sealed."""
-        if self.stimulus is None or not rises(self.stimulus, self.design):
+        if self.stimulus is None or not self.stimulus.rises(self.design):
             return None
         if self.method is None:
-            return assumed_for(self.stimulus, self.design)
+            return self.stimulus.assumed(self.design)
         return self.method.assumed(self.stimulus, self.design)
 
 
@@ -351,9 +332,9 @@ def _level_block(protocol: Mapping[str, Any], step: str, key: Key | None, whole:
     reference: Setting | None = None
     if whole is not None and key is not None:
         block = whole.blocks[step]
-        design = design_of(whole, block)
+        design = whole.design_of(block)
         if block.stimulus is not None:
-            stimulus, method = stimulus_of(whole, block), method_of(whole, block)
+            stimulus, method = whole.stimulus_of(block), whole.method_of(block)
         if block.standard is not None:
             reference = _of_condition(key.tables["conditions"][block.standard], block.standard, block.standard)
         if whole.analysis is not None:

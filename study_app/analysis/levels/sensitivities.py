@@ -27,7 +27,6 @@ from study_app.analysis.levels.thresholds import Thresholds
 from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import listed, number
-from study_app.protocol.presented import arrangement_of
 from study_app.protocol.trials import Design
 from study_app.psychophysics.detection import Model, Sensitivity, d_prime_at, rating
 from study_app.psychophysics.grid import Z_95
@@ -146,7 +145,7 @@ def _of_choices(
 ) -> SensitivityEstimate:
     design = block.design
     pairs = zip(rows["arrangement"].astype(str), rows["response"].astype(str), strict=True)
-    counts = Counter((arrangement_of(design, letters), answer) for letters, answer in pairs)
+    counts = Counter((design.arrangement_of(letters), answer) for letters, answer in pairs)
     given = Counter(rows["response"].astype(str))
     sensitivity = design.sensitivity(counts, roving=block.standards_rove) if block.has_correct_answer else None
     shares = {answer: given[answer] / len(rows) for answer in design.answers}

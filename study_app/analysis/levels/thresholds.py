@@ -32,7 +32,7 @@ from study_app.analysis.results import LevelsResult
 from study_app.analysis.statistics.outcome import Array
 from study_app.analysis.statistics.thresholds import FEWEST, SETS, WORST, GroupMean, drift, group_mean, p_of_fit
 from study_app.analysis.wording import counted, listed
-from study_app.protocol.trials import ANALYSIS_LAPSES, SESSION_SD, Assumed, Design, Stimulus, analysis_grid
+from study_app.protocol.trials import ANALYSIS_LAPSES, SESSION_SD, Assumed, Design, Stimulus
 from study_app.psychophysics.families import level_at
 from study_app.psychophysics.grid import ALIKE, MANY_LAPSES, MEAN_LAPSE, NEAR_MODE, GroupPriors, Posterior, group_priors
 from study_app.psychophysics.person_fit import (
@@ -267,7 +267,7 @@ def _flat_fits(block: LevelBlock, rows: pd.DataFrame) -> dict[Any, PersonFit]:
     two = block.design.kind == "2ifc" and block.has_correct_answer
     fits = {}
     for person, own in rows.groupby("participant"):
-        grid = analysis_grid(stimulus, block.design, assumed, SESSION_SD / math.sqrt(own["session"].nunique()))
+        grid = stimulus.analysis_grid(block.design, assumed, own["session"].nunique())
         fits[person] = given_by(stimulus, own).fit(grid, two_intervals=two)
     return fits
 

@@ -12,7 +12,6 @@ from scipy.special import bdtr
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.data.study_tables import Study
 from study_app.protocol.model import BELOW_CHANCE_P
-from study_app.protocol.presented import arrangement_of
 from study_app.protocol.trials import DELAY, FORCE_DELAY, Answer, Stimulus, TrackSetting
 
 TRACK: Final = ["participant", "session", "block", "code"]
@@ -148,7 +147,7 @@ def _track_row(block: LevelBlock, row: Mapping[Any, Any]) -> dict[str, Any]:
         found["comparison"] = block.stimulus.comparison(standard, float(row["level"]))
         found["level_delivered"] = _level_delivered(block.stimulus, standard, found["comparison"], row)
     if not pd.isna(row["response"]):
-        arrangement, answer = arrangement_of(block.design, letters), str(row["response"])
+        arrangement, answer = block.design.arrangement_of(letters), str(row["response"])
         correct, success = block.design.is_correct(arrangement, answer), block.design.success(arrangement, answer)
         if block.has_correct_answer and correct is not None:
             found["right"] = correct

@@ -27,17 +27,9 @@ from study_app.protocol.blocks import Block, block_titles, display_language
 from study_app.protocol.descriptions import describe, limit_rows
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Analysis, Contrast, Protocol
-from study_app.protocol.orders import (
-    block_orders_by_group,
-    condition_of,
-    design_of,
-    method_of,
-    standards_of,
-    stimulus_of,
-)
+from study_app.protocol.orders import block_orders_by_group
 from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.source import text_in
-from study_app.protocol.trials import assumed_for
 from study_app.protocol.warnings import PRECISION, expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
 from study_app.store.exclusions import MISSING_RULE, describe_exclusion
@@ -136,10 +128,10 @@ def _measure_words(protocol: Protocol, contrast: Contrast, language: str) -> str
 def hypotheses(protocol: Protocol, language: str) -> Iterator[str]:
     """Yield the contrasts and the questions of each main block; predictions are marked as hypotheses."""
     for contrast in () if protocol.analysis is None else protocol.analysis.contrasts:
-        stimuli = {block.id: stimulus_of(protocol, block) for block in protocol.main_blocks if block.stimulus}
+        stimuli = {block.id: protocol.stimulus_of(block) for block in protocol.main_blocks if block.stimulus}
         titled = contrast.model_copy(update={"blocks": tuple(_title(protocol, block) for block in contrast.blocks)})
         words = titled.words(
-            {_title(protocol, block): condition_of(protocol, stimulus) for block, stimulus in stimuli.items()}
+            {_title(protocol, block): protocol.condition_of(stimulus) for block, stimulus in stimuli.items()}
         )
         described = titled.described(words, measure=_measure_words(protocol, contrast, language))
         ratio = contrast.measure in RATIOS and all(stimuli[block].spacing == "log" for block in contrast.blocks)
@@ -180,14 +172,14 @@ def _equality_of(protocol: Protocol, contrast: Contrast) -> str:
 
 
 def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
-    design, title = design_of(protocol, block), _title(protocol, block.id)
+    design, title = protocol.design_of(block), _title(protocol, block.id)
     if block.stimulus is None:
         others = [name for name in block.conditions if name != block.standard]
         yield f"Block {title}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
         return
-    stimulus = stimulus_of(protocol, block)
+    stimulus = protocol.stimulus_of(block)
     what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit
-    standards = [one for one in standards_of(protocol, block) if one is not None]
+    standards = [one for one in protocol.standards_of(block) if one is not None]
     if threshold_plan(protocol, block) is None:
         asked = {"number": "What is the exponent of the power law for", "rating": "How do ratings change with"}
         yield f"Block {title}: {asked.get(design.reply, 'How do answers change with')} {what}?"
@@ -241,8 +233,8 @@ def analyses(protocol: Protocol) -> Iterator[str]:
     for block in protocol.main_blocks:
         plan, title = threshold_plan(protocol, block), _title(protocol, block.id)
         if plan is not None:
-            stimulus, design = stimulus_of(protocol, block), design_of(protocol, block)
-            method, family = method_of(protocol, block), FAMILIES[assumed_for(stimulus, design).family]
+            stimulus, design = protocol.stimulus_of(block), protocol.design_of(block)
+            method, family = protocol.method_of(block), FAMILIES[stimulus.assumed(design).family]
             yield (
                 f"Block {title} ({design.paper_name}, {method.paper_name}): for each participant and standard, we "
                 f"estimate the threshold as the posterior median ({family} function) with its equal-tailed 95 % "
@@ -266,7 +258,7 @@ def analyses(protocol: Protocol) -> Iterator[str]:
                 "with a 95 % confidence interval (Student's t). If participants estimate numbers, we use the "
                 "logarithms of the answers, and the exponent is their slope on the logarithm of the level."
             )
-            if design_of(protocol, block).reply == "rating":
+            if protocol.design_of(block).reply == "rating":
                 yield (
                     f"Block {title}: we report d_a for each level relative to the lowest level, calculated from "
                     "the area under the ROC curve."

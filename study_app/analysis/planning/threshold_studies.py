@@ -30,7 +30,7 @@ from study_app.analysis.statistics.thresholds import FEWEST, group_mean
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import block_titles, display_language
 from study_app.protocol.model import Contrast, Protocol
-from study_app.protocol.orders import stimulus_of, tracks_of
+from study_app.protocol.orders import tracks_of
 from study_app.protocol.source import text_in
 from study_app.protocol.warnings import (
     PRECISION,
@@ -435,7 +435,7 @@ def _titles(protocol: Protocol) -> dict[str, str]:
 
 def _log_bound(protocol: Protocol, contrast: Contrast) -> float | None:
     """Return the logarithm of the equivalence bound; None if there is none, or if thresholds are not ratios."""
-    stimuli = [stimulus_of(protocol, protocol.blocks[block]) for block in contrast.blocks]
+    stimuli = [protocol.stimulus_of(protocol.blocks[block]) for block in contrast.blocks]
     if contrast.bound is None or any(stimulus.spacing != "log" for stimulus in stimuli):
         return None
     return abs(math.log(contrast.bound))

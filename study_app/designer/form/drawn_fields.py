@@ -28,7 +28,7 @@ from study_app.designer.measures.levels import (
 from study_app.gui.theme import Themed, draw_icon, font
 from study_app.gui.widgets import Range, smooth_painter
 from study_app.number_text import capitalised, duration, exact_duration
-from study_app.protocol.orders import ANSWER_S, CHOICE_S, design_of, method_of
+from study_app.protocol.orders import ANSWER_S, CHOICE_S
 from study_app.protocol.presented import level_limits, levels
 from study_app.protocol.source import Path, value_at
 from study_app.protocol.trials import ORDINALS, Adjustment, AnyTask, Stimulus
@@ -257,7 +257,7 @@ def _trial_strip(study: Study, row: Row) -> _TrialStrip | None:
     block = None if protocol is None else protocol.blocks.get(str(row.path[1]))
     if protocol is None or block is None or block.design is None:
         return None
-    design, task = design_of(protocol, block), protocol.tasks[block.task]
+    design, task = protocol.design_of(block), protocol.tasks[block.task]
     phases: list[_Phase] = []
     free = task.expected_s != task.limit_s
 
@@ -271,7 +271,7 @@ def _trial_strip(study: Study, row: Row) -> _TrialStrip | None:
         phases.append(
             _Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _duration_key(task)), free)
         )
-    method = method_of(protocol, block) if block.stimulus is not None else None
+    method = protocol.method_of(block) if block.stimulus is not None else None
     if isinstance(method, Adjustment):
         field = ("methods", str(block.method), "most_s") if block.method in protocol.methods else ()
         phases.append(_Phase("question", "Setting", "", method.most_s / 2, field, about=True))

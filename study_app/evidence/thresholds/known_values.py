@@ -34,7 +34,6 @@ from study_app.haptics.model.overrides import override_value
 from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.orders import condition_of, design_of, method_of, standards_of, stimulus_of
 from study_app.protocol.randomization import Draw, stream
 from study_app.protocol.simulated import OBSERVER, Observer, as_requested, simulate_study
 from study_app.protocol.trials import DELAYS, SESSION_SD
@@ -254,7 +253,7 @@ class KnownThreshold(_KnownValue):
 
     @property
     def _of_delay(self) -> bool:
-        return stimulus_of(self.protocol, self.block).vary in DELAYS
+        return self.protocol.stimulus_of(self.block).vary in DELAYS
 
     def error(self, values: Sequence[float]) -> float:
         """Return the mean of ln(value/threshold)."""
@@ -285,10 +284,10 @@ class KnownThreshold(_KnownValue):
             id=block.id,
             title=block.id,
             phase=block.phase,
-            design=design_of(protocol, block),
-            stimulus=stimulus_of(protocol, block),
+            design=protocol.design_of(block),
+            stimulus=protocol.stimulus_of(block),
             settings=(),
-            method=method_of(protocol, block),
+            method=protocol.method_of(block),
         )
         truths = {f"P{at:03d}": threshold for at, (_, threshold) in enumerate(people, start=1)}
         found: dict[str | None, list[Estimated]] = {}
@@ -321,10 +320,10 @@ class KnownThreshold(_KnownValue):
             limit="at least 95 %",
             written=percent,
         )
-        standards = np.array([one for one in standards_of(self.protocol, self.block) if one is not None])
+        standards = np.array([one for one in self.protocol.standards_of(self.block) if one is not None])
         if len(standards) < 2:
             return
-        unit = standards if stimulus_of(self.protocol, self.block).level_kind == "weber" else 1.0
+        unit = standards if self.protocol.stimulus_of(self.block).level_kind == "weber" else 1.0
         slopes = [
             [jnd_slope(standards, np.array([estimate.value for estimate in person]) * unit) for person in study.own]
             for study in studies
@@ -404,7 +403,7 @@ class KnownExponent(_KnownValue):
         of_studies = [study.group[0].value for study in studies]
         yield Measure(
             study=self.name,
-            what=f"exponent against {stimulus_of(self.protocol, self.block).vary}",
+            what=f"exponent against {self.protocol.stimulus_of(self.block).vary}",
             value=float(np.mean(of_studies)),
             interval=mean_interval(of_studies),
             least=EXPONENT - _EXPONENT_ERROR_MOST,
@@ -452,15 +451,15 @@ def known_value(name: str, protocol: Protocol) -> Known:
         if main_block.stimulus is not None and main_block.design is not None
     ]
     for block in blocks:
-        stimulus, task = stimulus_of(protocol, block), protocol.tasks[block.task]
-        if design_of(protocol, block).reply == "number" and stimulus.vary not in DELAYS and isinstance(task, Follow):
-            scene = protocol.scene_for(condition_of(protocol, stimulus))
+        stimulus, task = protocol.stimulus_of(block), protocol.tasks[block.task]
+        if protocol.design_of(block).reply == "number" and stimulus.vary not in DELAYS and isinstance(task, Follow):
+            scene = protocol.scene_for(protocol.condition_of(stimulus))
             fastest_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
             of_levels = [override_value(scene, stimulus.vary, level) for level in _levels(protocol, block)]
             return KnownExponent(name, protocol, block, tuple(_resistance(it, fastest_mps) for it in of_levels))
     for block in blocks:
-        standards = standards_of(protocol, block)
-        if stimulus_of(protocol, block).level_kind != "value" and not all(standard is None for standard in standards):
+        standards = protocol.standards_of(block)
+        if protocol.stimulus_of(block).level_kind != "value" and not all(standard is None for standard in standards):
             return KnownThreshold(name, protocol, block, _SHIPPED.get(name, OBSERVER))
     raise ValueError(
         f"{name} does not have a main block with levels above a standard, or with magnitude estimation of a liquid at "
@@ -470,7 +469,7 @@ def known_value(name: str, protocol: Protocol) -> Known:
 
 def _levels(protocol: Protocol, block: Block) -> list[float]:
     """Return the levels of a block in ascending order, in the unit of the varied number."""
-    return sorted(method_of(protocol, block).levels_of(stimulus_of(protocol, block)))
+    return sorted(protocol.method_of(block).levels_of(protocol.stimulus_of(block)))
 
 
 def _resistance(scene: Any, fastest_mps: float) -> float:

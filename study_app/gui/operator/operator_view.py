@@ -15,7 +15,7 @@ from study_app.gui.operator.servo_health import ForceFigures, Tile, Vitals, forc
 from study_app.gui.sessions.session_facts import broken_limit_text, operator_language, step_title
 from study_app.number_text import grouped, minutes
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import FormStep, Schedule, Step, Trial, design_of
+from study_app.protocol.orders import FormStep, Schedule, Step, Trial
 from study_app.protocol.wording import words
 from study_app.store.files import SEALED
 from study_app.store.journals.journal_events import Note
@@ -244,7 +244,7 @@ def _track_lines(session: Session, progress: Progress) -> tuple[str, ...]:
     trial = next((planned for planned in session.schedule.trials if planned.number == progress.of_intervals), None)
     if trial is None or progress.ended:
         return ()
-    design = design_of(session.protocol, session.protocol.blocks[trial.block])
+    design = session.protocol.design_of(session.protocol.blocks[trial.block])
     names = words(session.language).design_answers
     lines = track_lines(progress, session.schedule, trial, {answer: names[answer] for answer in design.answers})
     own = session.protocol.study.codes == "participant"

@@ -14,26 +14,15 @@ from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.orders.tracks import (
-    condition_of,
-    design_of,
-    has_correct_answer,
-    measures_of,
-    method_of,
-    present_value,
-    standards_of,
-    stimulus_of,
-    tracks_of,
-)
+from study_app.protocol.orders.tracks import measures_of, tracks_of
 from study_app.protocol.participants.groups import follows
-from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, unknown_name
 from study_app.protocol.source.table import Table
 from study_app.protocol.trials.designs import DESIGN_KINDS
 from study_app.protocol.trials.methods import METHOD_KINDS
-from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus, rises
+from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated, Stimulus
 
 _LEAST_MS: Final = 1e-3
 """The least difference between two times that is presented [ms]: a thousandth of a tick. [choice]"""
@@ -90,15 +79,15 @@ def missing_for_rule(protocol: Protocol, rule: str) -> str | None:
         return None if any(block.stimulus is not None for block in blocks) else "no main block has levels"
     stimuli = {block.id: None if block.stimulus is None else protocol.stimuli[block.stimulus] for block in blocks}
     if rule == "below_chance" and not any(
-        has_correct_answer(design_of(protocol, block), stimuli[block.id]) for block in blocks
+        protocol.design_of(block).can_be_correct(stimuli[block.id]) for block in blocks
     ):
         return "no main block has questions with a correct answer"
     return None
 
 
 def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
-    design, place = design_of(protocol, block), ("blocks", block.id)
-    correct = has_correct_answer(design, None if block.stimulus is None else protocol.stimuli[block.stimulus])
+    design, place = protocol.design_of(block), ("blocks", block.id)
+    correct = design.can_be_correct(None if block.stimulus is None else protocol.stimuli[block.stimulus])
     for key in ("until", "catch"):
         if not correct and getattr(block, key) is not None:
             forced = design.has_correct_answer
@@ -125,14 +114,14 @@ def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:
                 'specify stimulus = "…" instead of conditions',
             )
         return
-    if design.has_standard and standards_of(protocol, block) == (None,):
+    if design.has_standard and protocol.standards_of(block) == (None,):
         message = f'"{block.design}" needs a standard for noise trials, but level = "value" does not define one'
         yield Fault((*place, "design"), message, 'level = "weber" or "difference"')
         return
-    if not design.adaptive and method_of(protocol, block).adaptive:
+    if not design.adaptive and protocol.method_of(block).adaptive:
         message = f'is adaptive, but cannot choose levels from answers to "{block.design}"'
         yield Fault((*place, "method"), message, 'method = "constant"')
-    elif method_of(protocol, block).adaptive and not rises(protocol.stimuli[block.stimulus], design):
+    elif protocol.method_of(block).adaptive and not protocol.stimuli[block.stimulus].rises(design):
         message = (
             f'"{block.design}" with level = "value" has correct answers both above and below the standard, so '
             "there is no threshold"
@@ -168,7 +157,7 @@ def _check_published(protocol: Protocol, published: Published, place: Path) -> I
             yield Fault(place, message, kind="surplus")
         return
     standards = [
-        standard for standard in standards_of(protocol, protocol.blocks[published.block]) if standard is not None
+        standard for standard in protocol.standards_of(protocol.blocks[published.block]) if standard is not None
     ]
     if published.standard is not None and published.standard not in standards:
         listed = ", ".join(f"{standard:g}" for standard in standards)
@@ -232,7 +221,7 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
         listed = f"known: {', '.join(protocol.conditions)}"
         yield Fault((*place, "condition"), "is missing, but the study has several conditions", listed)
         return
-    condition = condition_of(protocol, stimulus)
+    condition = protocol.condition_of(stimulus)
     liquids = protocol.conditions[condition].liquid_ids
     if stimulus.vary in OF_CONDITION:
         return
@@ -244,7 +233,7 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
         yield Fault((*place, "vary"), message, 'list them: effects = ["drag"]')
     else:
         try:
-            present_value(protocol, stimulus)
+            protocol.present_value(stimulus)
         except StudyError:
             known = {*OF_CONDITION, *filter(can_vary, number_names(protocol.scene_for(condition)))}
             message = f'there is no parameter "{stimulus.vary}" in condition "{condition}"'
@@ -259,7 +248,7 @@ def _check_varied_number(protocol: Protocol, name: str, stimulus: Stimulus) -> I
 def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Check that a block can present every level with each of its standards."""
     stimulus = protocol.stimuli[str(block.stimulus)]
-    method = method_of(protocol, block)
+    method = protocol.method_of(block)
     place = ("methods", str(block.method))
     faults = [Fault((*place, key), message, hint) for key, message, hint in method.faults(stimulus)]
     if faults:
@@ -272,7 +261,7 @@ def _check_levels(protocol: Protocol, block: Block) -> Iterator[Fault]:
         message = f"{beyond:g} is outside the stimulus's levels"
         yield Fault(("methods", str(block.method), "levels"), message, f"choose levels from {least:g} to {most:g}")
         return
-    for standard in standards_of(protocol, block):
+    for standard in protocol.standards_of(block):
         if standard is not None and (fault := _standard_fault(protocol, block, stimulus, standard, least)) is not None:
             yield fault
             return
@@ -328,7 +317,7 @@ def _presentation_problem(protocol: Protocol, stimulus: Stimulus, value: float) 
     if stimulus.vary in OF_CONDITION:
         return None
     try:
-        override_value(protocol.scene_for(condition_of(protocol, stimulus)), stimulus.vary, value)
+        override_value(protocol.scene_for(protocol.condition_of(stimulus)), stimulus.vary, value)
     except StudyError as error:
         return str(error)
     return None
@@ -336,26 +325,26 @@ def _presentation_problem(protocol: Protocol, stimulus: Stimulus, value: float) 
 
 def _check_design_and_method(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Yield faults for a design without a method or a method without a design."""
-    design, place = design_of(protocol, block), ("blocks", block.id)
+    design, place = protocol.design_of(block), ("blocks", block.id)
     if block.stimulus is None:
         if design.adjusts:
             message = "lets participants adjust a parameter, but the block does not vary one"
             yield Fault((*place, "design"), message, 'specify stimulus = "…" instead of conditions')
-    elif design.adjusts and not method_of(protocol, block).adjusts:
+    elif design.adjusts and not protocol.method_of(block).adjusts:
         yield Fault(
             (*place, "method"), f'with "{block.design}" the participant sets the levels', 'method = "adjustment"'
         )
-    elif method_of(protocol, block).adjusts and not design.adjusts:
+    elif protocol.method_of(block).adjusts and not design.adjusts:
         message = f'"{block.method}" is only for designs in which participants set the level, not for "{block.design}"'
         yield Fault((*place, "method"), message, 'design = "adjustment", or method = "constant"')
 
 
 def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
     """Yield the reasons why a number cannot be adjusted during presentation, or a standard cannot be matched."""
-    design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
+    design, stimulus = protocol.design_of(block), protocol.stimulus_of(block)
     if not design.adjusts:
         return
-    for standard in standards_of(protocol, block):
+    for standard in protocol.standards_of(block):
         values = sorted(stimulus.comparison(standard, level) for level in stimulus.levels)
         if standard is not None and design.intervals > 1 and not values[0] < standard < values[1]:
             yield Fault(
@@ -364,9 +353,7 @@ def _check_adjustment(protocol: Protocol, block: Block) -> Iterator[Fault]:
                 'level = "value", with levels below and above the standard',
             )
             return
-        if stimulus.vary != DELAY and not _can_change(
-            protocol, condition_of(protocol, stimulus), stimulus.vary, values
-        ):
+        if stimulus.vary != DELAY and not _can_change(protocol, protocol.condition_of(stimulus), stimulus.vary, values):
             yield Fault(
                 ("methods", str(block.method), "step_size"),
                 f'"{stimulus.vary}" cannot be changed during a presentation',
@@ -384,5 +371,5 @@ def _can_change(protocol: Protocol, condition: str, vary: str, values: list[floa
 
     if vary in OF_LINK:
         return False
-    scenes = [scene_of(protocol, Stimulated(condition, vary, value)) for value in values]
+    scenes = [protocol.presented_scene(Stimulated(condition, vary, value)) for value in values]
     return all(is_built_alike(scene, other) for scene, other in pairwise(scenes))

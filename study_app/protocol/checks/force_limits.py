@@ -22,8 +22,6 @@ from study_app.haptics.model.slope_limits import slope_limit, steady_force
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol, Reach
-from study_app.protocol.orders.tracks import condition_of, standards_of, stimulus_of
-from study_app.protocol.presented.presentation import scene_of
 from study_app.protocol.presented.presented_levels import (
     FASTER,
     UNPACED_MPS,
@@ -100,7 +98,7 @@ def blocks_by_stimulus(protocol: Protocol) -> list[list[Block]]:
 
 def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: int) -> Fault | None:
     """Return a fault if dampings of one stimulus exceed the slope limit for a delay [ticks], else None."""
-    stimulus = stimulus_of(protocol, blocks[0])
+    stimulus = protocol.stimulus_of(blocks[0])
     extremes = [extreme for block in blocks for extreme in extreme_levels(protocol, block)]
     if not extremes:
         return None
@@ -109,7 +107,7 @@ def slope_limit_fault(protocol: Protocol, blocks: Sequence[Block], delay_ticks: 
     if highest_nspm <= limit_nspm:
         return None
     if stimulus.vary in OF_LINK:
-        subject = f'"{condition_of(protocol, stimulus)}" produces'
+        subject = f'"{protocol.condition_of(stimulus)}" produces'
         hint = f"damping_nspm = {_rounded_down(limit_nspm, 1):g}"
     else:
         every = list(_levels_at_strongest_force(protocol, blocks))
@@ -128,14 +126,14 @@ def _check_clipping(protocol: Protocol, blocks: Sequence[Block], delay_ticks: in
     beyond = slope_limit_fault(protocol, blocks, delay_ticks)
     if beyond is not None:
         yield beyond
-    place, stimulus = ("stimuli", str(blocks[0].stimulus), "levels"), stimulus_of(protocol, blocks[0])
+    place, stimulus = ("stimuli", str(blocks[0].stimulus), "levels"), protocol.stimulus_of(blocks[0])
     blocks = [block for block in blocks if isinstance(protocol.tasks[block.task], Follow)]
     felt = [
         (block, scene) for block in blocks for *_, scene in extreme_levels(protocol, block) if len(scene.liquids) == 1
     ]
     if all(steady_force(scene, hand_mps_of(protocol, block)).limit is None for block, scene in felt):
         return
-    condition = condition_of(protocol, stimulus)
+    condition = protocol.condition_of(stimulus)
     if stimulus.vary in OF_LINK:
         block, scene = max(felt, key=lambda pair: hand_mps_of(protocol, pair[0]))
         yield from _check_clipping_at_pace(protocol, block, scene, f'"{condition}" produces', place)
@@ -244,7 +242,7 @@ def _remedy(stimulus: Stimulus, standard: float | None, level: float, limit_nspm
 
 def _highest_unclipped_level(protocol: Protocol, block: Block, standard: float | None) -> str:
     """Return the highest level of a standard that no limit clips; "" if all are clipped."""
-    stimulus, limits = stimulus_of(protocol, block), level_limits(protocol, block)
+    stimulus, limits = protocol.stimulus_of(block), level_limits(protocol, block)
     if limits is None or not limits.lowest:
         return ""
     highest = stimulus.level_between(standard, limits.lowest)
@@ -310,13 +308,13 @@ def check_returned_energy(protocol: Protocol) -> Iterator[Fault]:
 
 def _returned_energy_fault(protocol: Protocol, block: Block, stroke: Stroke) -> Fault | None:
     """Return a fault if a block's force returns more energy than the limit, with the level that returns most."""
-    stimulus = stimulus_of(protocol, block)
-    condition = condition_of(protocol, stimulus)
+    stimulus = protocol.stimulus_of(block)
+    condition = protocol.condition_of(stimulus)
     if len(protocol.conditions[condition].liquid_ids) > 1:
         return None
     presented: list[tuple[float, float, float]] = []
-    for standard, level in product(standards_of(protocol, block), stimulus.levels):
-        scene = scene_of(protocol, Stimulated(condition, stimulus.vary, stimulus.comparison(standard, level)))
+    for standard, level in product(protocol.standards_of(block), stimulus.levels):
+        scene = protocol.presented_scene(Stimulated(condition, stimulus.vary, stimulus.comparison(standard, level)))
         damping, delay_s = damping_nspm(scene, stroke), scene.link.mean_delay_s(scene.rate_hz)
         presented.append((returned_j(damping, stroke, delay_s), damping, delay_s))
     most_j, damping, delay_s = max(presented)

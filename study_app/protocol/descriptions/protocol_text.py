@@ -16,16 +16,7 @@ from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.balance import block_order_words, planned_participants
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
-from study_app.protocol.orders.tracks import (
-    condition_of,
-    design_of,
-    has_correct_answer,
-    method_of,
-    standards_of,
-    stimulus_of,
-    success_name,
-    tracks_of,
-)
+from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.participants.groups import sessions_differ
 from study_app.protocol.presented.presentation import link_descriptions
 from study_app.protocol.presented.presented_levels import FASTER, highest_damping
@@ -197,23 +188,23 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
 
 def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator[tuple[str, str]]:
     """Yield the rows about a block's design, levels and comparisons."""
-    design = design_of(protocol, block)
+    design = protocol.design_of(block)
     kind = design.kind.upper()
     intervals = "1 interval" if design.intervals == 1 else f"{design.intervals} intervals, {design.pause_s:g} s apart"
     if block.stimulus is None:
         yield "Design", f"{kind} against {block.standard}: {intervals}"
         yield from precision_rows(protocol, block)
         return
-    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
-    standards = [standard for standard in standards_of(protocol, block) if standard is not None]
+    stimulus, method = protocol.stimulus_of(block), protocol.method_of(block)
+    standards = [standard for standard in protocol.standards_of(block) if standard is not None]
     levels = sorted(method.levels_of(stimulus))
     against = f", standard {', '.join(f'{standard:g}' for standard in standards)}" if standards else ""
     yield "Design", f"{kind} of {stimulus.vary}{against}: {intervals}"
     name = _LEVELS[stimulus.level_kind]
     of_each = " per standard" if standards else ""
     slots = [track.slots for track in tracks_of(protocol, block)]
-    guess = design.guess_rate if has_correct_answer(design, stimulus) else 0.0
-    target = method.target(guess, success_name(design, stimulus))
+    guess = design.guess_rate if design.can_be_correct(stimulus) else 0.0
+    target = method.target(guess, design.success_of(stimulus))
     aimed = "" if target is None else f": {target}"
     trials = slots[0] * method.tracks
     tracks = "" if method.tracks == 1 else f" in {method.tracks} tracks"
@@ -226,14 +217,14 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         steps = round((high - low) / method.step(stimulus))
         longest = f"at most {method.most_s:g} s per setting"
         yield "Settings", f"{steps} steps from one end to the other, starting near either end, {longest}"
-    pairs = product(standards_of(protocol, block), levels)
+    pairs = product(protocol.standards_of(block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
     unit = quantity(stimulus.vary).unit
     yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {unit}".rstrip()
     task = protocol.tasks[block.task]
     if isinstance(task, Follow) and stimulus.vary != DELAY:
         pace_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
-        scene = protocol.scene_for(condition_of(protocol, stimulus))
+        scene = protocol.scene_for(protocol.condition_of(stimulus))
         values = (*standards, *compared)
         scenes = (
             [scene] if stimulus.vary in OF_LINK else [override_value(scene, stimulus.vary, value) for value in values]
@@ -246,7 +237,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
             f"{FASTER:g} times that speed",
         )
     if (highest_nspm := highest_damping(protocol, block)) > 0:
-        scene = protocol.scene_for(condition_of(protocol, stimulus))
+        scene = protocol.scene_for(protocol.condition_of(stimulus))
         limit_nspm = slope_limit(1 / scene.rate_hz, delay_ticks, scene.velocity)
         yield "Damping", f"at most {highest_nspm:.4g} N·s/m at the hand; the slope limit is {limit_nspm:.4g}"
     yield from precision_rows(protocol, block)
@@ -357,7 +348,7 @@ def limit_rows(protocol: Protocol) -> list[tuple[str, str]]:
     """Return the limits of a valid trial that the study's blocks can exceed: each value with its meaning."""
     units, rows = {"ms": " ms", "percent": " %"}, []
     with_intervals = [block for block in protocol.blocks_in_order if block.design is not None]
-    varied = {stimulus_of(protocol, block).vary for block in with_intervals if block.stimulus is not None}
+    varied = {protocol.stimulus_of(block).vary for block in with_intervals if block.stimulus is not None}
     applies = {
         "level_error_percent": bool(varied - {*OF_CONDITION}),
         "level_error_ms": bool(varied & {*DELAYS}),

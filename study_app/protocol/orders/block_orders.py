@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict
 
 from study_app.protocol.blocks import Block, Order, OrderOfBlocks, Phase
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.orders.tracks import method_of, tracks_of
+from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.participants.groups import Group, every_step, follows, session_steps
 from study_app.protocol.trials.methods import TrackOrder
 
@@ -104,7 +104,7 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
     order: CodeOrder = block.order
     slots: tuple[int, ...] = ()
     if block.design is not None:
-        order = "interleaved" if block.stimulus is None else method_of(protocol, block).order
+        order = "interleaved" if block.stimulus is None else protocol.method_of(block).order
         slots = tuple(track.slots for track in tracks_of(protocol, block))
     keys = ("phase", "part", "max_repeats", "min_distance", "repetitions", "break_every", "break_page")
     same = {key: getattr(block, key) for key in keys}

@@ -7,27 +7,9 @@ from dataclasses import dataclass
 
 from study_app.protocol.model import Block, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.orders.tracks import design_of, method_of
-from study_app.protocol.participants.groups import parts_by_block, session_count, sessions_differ, steps_of
+from study_app.protocol.participants.groups import session_count
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.tasks import AnyTask
-
-
-def own_protocol(protocol: Protocol, group: str | None, session: int) -> Protocol:
-    """Return the protocol of one session of a participant in ``group``, with one sequence and no groups.
-
-    Parts are numbered in the order of this session. A study whose sessions do not differ is returned unchanged.
-    StudyError is raised if the participant has fewer sessions.
-    """
-    if not sessions_differ(protocol):
-        return protocol
-    steps = steps_of(protocol, group, session)
-    parts = parts_by_block(steps, {name: block.part for name, block in protocol.blocks.items()})
-    blocks = {
-        name: block.model_copy(update={"part": parts[name]}) if name in parts else block
-        for name, block in protocol.blocks.items()
-    }
-    return protocol.model_copy(update={"sequence": steps, "sequences": (), "groups": {}, "blocks": blocks})
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +32,7 @@ def variants(protocol: Protocol) -> Iterator[Variant]:
     for group in protocol.groups or (None,):
         count = session_count(protocol, group)
         for session in range(1, (count or 1) + 1):
-            own = own_protocol(protocol, group, session)
+            own = protocol.for_session(group, session)
             yield Variant(group, session if count is not None else None, own)
 
 
@@ -95,8 +77,8 @@ def step_duration_s(
 def recordings_of(protocol: Protocol) -> Iterator[tuple[int, float]]:
     """Yield the number of a block's recordings in a session and the expected duration of each [s]."""
     for block in (protocol.blocks[step] for step in protocol.steps if step in protocol.blocks):
-        method = method_of(protocol, block) if block.stimulus is not None else None
-        intervals = 1 if block.design is None else design_of(protocol, block).intervals
+        method = protocol.method_of(block) if block.stimulus is not None else None
+        intervals = 1 if block.design is None else protocol.design_of(block).intervals
         longer_s = method.most_s / 2 if isinstance(method, Adjustment) else 0.0
         yield order_of(protocol, block).trials * intervals, protocol.tasks[block.task].expected_s + longer_s
 
@@ -122,10 +104,10 @@ def block_duration_s(
     task = protocol.tasks[block.task]
     task_s = task.expected_s if of_task is None else of_task(task)
     if block.design is not None:
-        design = design_of(protocol, block)
+        design = protocol.design_of(block)
         answer_s = CHOICE_S if design.reply == "choice" else ANSWER_S
         answering = answer_s + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
         task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
-        if isinstance(method := method_of(protocol, block) if block.stimulus else None, Adjustment):
+        if isinstance(method := protocol.method_of(block) if block.stimulus else None, Adjustment):
             task_s, answering = task_s + method.most_s / 2, design.between_s
     return order.trials * (task_s + answering) + resting

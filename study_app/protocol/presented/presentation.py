@@ -6,43 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from study_app.haptics.model.overrides import override_value
-from study_app.haptics.model.scene import Scene
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import Condition, Protocol
+from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, Trial
-from study_app.protocol.orders.tracks import (
-    Track,
-    condition_of,
-    design_of,
-    has_correct_answer,
-    method_of,
-    standards_of,
-    stimulus_of,
-    track_of,
-)
+from study_app.protocol.orders.tracks import Track, track_of
 from study_app.protocol.randomization.streams import Draw, Key, secret_stream, shuffle, stream
 from study_app.protocol.trials.designs import Design
 from study_app.protocol.trials.methods import TrackSetting, TrialResult
-from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulated
-
-
-def scene_of(protocol: Protocol, presented: Stimulated, link_seed: int = 0) -> Scene:
-    """Return the scene of a presented condition; ``link_seed`` is the seed of the force's jitter and loss."""
-    scene = protocol.scene_for(presented.condition)
-    link = presented_condition(protocol, presented).link(link_seed)
-    if link.acts:
-        scene = Scene.model_validate(scene.model_copy(update={"link": link}))
-    if presented.vary is None or presented.vary in OF_CONDITION:
-        return scene
-    return override_value(scene, presented.vary, presented.value)
-
-
-def presented_condition(protocol: Protocol, presented: Stimulated) -> Condition:
-    """Return the presented condition, with the varied number if it belongs to the force link."""
-    condition = protocol.conditions[presented.condition]
-    varied = {presented.vary: presented.value} if presented.vary in OF_LINK else {}
-    return condition.model_copy(update=varied)
+from study_app.protocol.trials.stimuli import DELAY, Stimulated
 
 
 def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float = 0.0) -> Iterator[str]:
@@ -55,40 +26,19 @@ def link_descriptions(delay_ms: float = 0.0, jitter_ms: float = 0.0, loss: float
         yield f"{100 * loss:g} % of force updates lost"
 
 
-def has_imperfect_link(protocol: Protocol) -> bool:
-    """Return whether any force of a study is sent with delay, jitter or loss."""
-    varied = any(stimulus.vary in OF_LINK for stimulus in protocol.stimuli.values())
-    return varied or any(condition.link().acts for condition in protocol.conditions.values())
-
-
 def link_seed(schedule_seed: int, participant: str, trial: int, attempt: int, interval: int | None) -> int:
     """Return the seed of the force's jitter and loss in an attempt at a trial, or in one of its intervals."""
     draw = stream(schedule_seed, f"force link/{participant}/{trial}/{attempt}/{interval or 1}")
     return int(draw.random() * 2**32)
 
 
-def delay_s_of(protocol: Protocol, presented: Stimulated) -> float:
-    """Return the visual delay of the tank [s]."""
-    return presented.value / 1000 if presented.vary == DELAY else protocol.delay_s(presented.condition)
-
-
 def longest_delay_s(protocol: Protocol, block: Block) -> float:
     """Return the longest delay that a block can present [s]; it is equal in all its trials, so that it reveals none."""
-    if block.stimulus is not None and (stimulus := stimulus_of(protocol, block)).vary == DELAY:
-        standards = standards_of(protocol, block)
+    if block.stimulus is not None and (stimulus := protocol.stimulus_of(block)).vary == DELAY:
+        standards = protocol.standards_of(block)
         compared = [stimulus.comparison(standard, level) for standard in standards for level in stimulus.levels]
         return max(*compared, *(standard for standard in standards if standard is not None)) / 1000
     return max(protocol.delay_s(name) for name in protocol.conditions_in(block.id))
-
-
-def arrangement_text(design: Design, arrangement: int) -> str:
-    """Return an arrangement for the journal: S for the standard, C for the comparison, such as "SC"."""
-    return "".join("C" if holds else "S" for holds in design.arrangements[arrangement])
-
-
-def arrangement_of(design: Design, text: str) -> int:
-    """Return the arrangement with this text in the journal (ValueError if the design has none)."""
-    return design.arrangements.index(tuple(letter == "C" for letter in text))
 
 
 _STANDARD_ALONE: Final = 1
@@ -126,14 +76,14 @@ def next_level(
     numbers = {other.number for other in schedule.trials if (other.block, other.code) == (trial.block, trial.code)}
     slot = sum(number < trial.number for number in numbers)
     draws = _Draws(key.secret, f"{schedule.participant}/{schedule.seed}/{block.id}/{trial.code}")
-    design = design_of(protocol, block)
+    design = protocol.design_of(block)
     if design.first is not None:
         if trial.index == 1:
             return _presentation_of(protocol, block, track, 0, design.first.level)
         slot -= 1
     if track.comparison is not None:  # conditions are compared
         return _presentation_of(protocol, block, track, draws.arrangement(design, slot), None)
-    method, stimulus = method_of(protocol, block), stimulus_of(protocol, block)
+    method, stimulus = protocol.method_of(block), protocol.stimulus_of(block)
     setting = TrackSetting(stimulus, design, track.number)
     answered = sorted(
         (result for result in earlier if result.trial in numbers and not result.catch), key=lambda result: result.trial
@@ -198,7 +148,7 @@ def _presentation_of(
     protocol: Protocol, block: Block, track: Track, arrangement: int, level: float | None, *, catch: bool = False
 ) -> Presentation:
     """Return a track's presentation at a level (None: conditions are compared) in an arrangement."""
-    presented = design_of(protocol, block).arrangements[arrangement]
+    presented = protocol.design_of(block).arrangements[arrangement]
     intervals = tuple(_interval(protocol, block, track, level if holds else None, holds) for holds in presented)
     return Presentation(level, track.standard, arrangement, intervals, catch)
 
@@ -206,8 +156,8 @@ def _presentation_of(
 def _interval(protocol: Protocol, block: Block, track: Track, level: float | None, comparison: bool) -> Stimulated:
     if track.comparison is not None:
         return Stimulated(track.comparison if comparison else str(block.standard))
-    stimulus = stimulus_of(protocol, block)
-    condition = condition_of(protocol, stimulus)
+    stimulus = protocol.stimulus_of(block)
+    condition = protocol.condition_of(stimulus)
     if not comparison or level is None:
         return Stimulated(condition, stimulus.vary, float(track.standard or 0.0))
     return Stimulated(condition, stimulus.vary, stimulus.comparison(track.standard, level))
@@ -223,7 +173,7 @@ def recorded_presentation(
     """
     block = protocol.blocks[started["block"]]
     track = track_of(protocol, block, codes[block.id][started["code"]])
-    arrangement = arrangement_of(design_of(protocol, block), started["arrangement"])
+    arrangement = protocol.design_of(block).arrangement_of(started["arrangement"])
     return _presentation_of(protocol, block, track, arrangement, started["level"], catch=started.get("catch", False))
 
 
@@ -239,9 +189,9 @@ def trial_result(
     catch: bool = False,
 ) -> TrialResult:
     """Return the answer to a trial of a block with a design at a level (None: conditions are compared)."""
-    design = design_of(protocol, block)
-    stimulus = None if block.stimulus is None else stimulus_of(protocol, block)
-    correct = design.is_correct(arrangement, answer) if has_correct_answer(design, stimulus) else None
+    design = protocol.design_of(block)
+    stimulus = None if block.stimulus is None else protocol.stimulus_of(block)
+    correct = design.is_correct(arrangement, answer) if design.can_be_correct(stimulus) else None
     success, noise = design.success(arrangement, answer), not any(design.arrangements[arrangement])
     return TrialResult(
         trial=trial, code=code, level=level or 0.0, success=success, correct=correct, catch=catch, noise=noise

@@ -17,7 +17,6 @@ from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.orders.tracks import condition_of, method_of, standards_of, stimulus_of
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK, Stimulus
 from study_app.psychophysics.families import Floats
 
@@ -107,12 +106,12 @@ def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
     block = protocol.blocks[block_id]
     if block.stimulus is None:
         return ()
-    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+    stimulus, method = protocol.stimulus_of(block), protocol.method_of(block)
     asked = sorted({*(stimulus.grid if method.adaptive else ()), *method.levels_of(stimulus)})
-    scene, hand_mps = protocol.scene_for(condition_of(protocol, stimulus)), hand_mps_of(protocol, block)
+    scene, hand_mps = protocol.scene_for(protocol.condition_of(stimulus)), hand_mps_of(protocol, block)
     return tuple(
         _level(stimulus, scene, hand_mps, standard, level)
-        for standard in standards_of(protocol, block)
+        for standard in protocol.standards_of(block)
         for level in asked
     )
 
@@ -120,8 +119,8 @@ def levels(protocol: Protocol, block_id: str) -> tuple[Level, ...]:
 def standard_level(protocol: Protocol, block_id: str, standard: float) -> Level:
     """Return a standard of a block as a level of 0."""
     block = protocol.blocks[block_id]
-    stimulus = stimulus_of(protocol, block)
-    scene = protocol.scene_for(condition_of(protocol, stimulus))
+    stimulus = protocol.stimulus_of(block)
+    scene = protocol.scene_for(protocol.condition_of(stimulus))
     level = _level(stimulus, scene, hand_mps_of(protocol, block), None, standard)
     return replace(level, standard=standard, level=0.0, comparison=standard)
 
@@ -147,8 +146,8 @@ def level_limits(protocol: Protocol, block: Block) -> LevelLimits | None:
     """Return the limits of a block's varied number; None if it does not vary the force of one liquid."""
     if block.stimulus is None:
         return None
-    stimulus, standards = stimulus_of(protocol, block), standards_of(protocol, block)
-    scene, asked = protocol.scene_for(condition_of(protocol, stimulus)), method_of(protocol, block).levels_of(stimulus)
+    stimulus, standards = protocol.stimulus_of(block), protocol.standards_of(block)
+    scene, asked = protocol.scene_for(protocol.condition_of(stimulus)), protocol.method_of(block).levels_of(stimulus)
     most = max(stimulus.comparison(standard, level) for standard, level in product(standards, (0.0, *asked)))
     if stimulus.vary in OF_CONDITION or len(scene.liquids) != 1 or most <= 0:
         return None
@@ -198,7 +197,7 @@ def clipping(protocol: Protocol, block: Block, limits: LevelLimits | None = None
     limits = limits or level_limits(protocol, block)
     if limits is None or not limits.lowest:
         return None
-    *others, standard = sorted(value for value in standards_of(protocol, block) if value is not None) or (None,)
+    *others, standard = sorted(value for value in protocol.standards_of(block) if value is not None) or (None,)
     return Clipping(standard, limits.lowest, isinstance(protocol.tasks[block.task], Follow), tuple(others))
 
 
@@ -210,12 +209,12 @@ def hand_mps_of(protocol: Protocol, block: Block) -> float:
 
 def extreme_levels(protocol: Protocol, block: Block) -> Iterator[tuple[float | None, float, Scene]]:
     """Yield standard, level and scene at the strongest and the weakest level of each standard, except for delays."""
-    stimulus = stimulus_of(protocol, block)
+    stimulus = protocol.stimulus_of(block)
     if stimulus.vary == DELAY:
         return
-    asked = method_of(protocol, block).levels_of(stimulus)
-    scene = protocol.scene_for(condition_of(protocol, stimulus))
-    for standard, level in product(standards_of(protocol, block), (max(asked), min(asked))):
+    asked = protocol.method_of(block).levels_of(stimulus)
+    scene = protocol.scene_for(protocol.condition_of(stimulus))
+    for standard, level in product(protocol.standards_of(block), (max(asked), min(asked))):
         varied = scene
         if stimulus.vary not in OF_LINK:
             varied = override_value(scene, stimulus.vary, stimulus.comparison(standard, level))

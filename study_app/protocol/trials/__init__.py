@@ -25,9 +25,6 @@ from study_app.protocol.trials.stimuli import (
     Assumed,
     Stimulated,
     Stimulus,
-    analysis_grid,
-    assumed_for,
-    rises,
 )
 from study_app.protocol.trials.tasks import TASK_KINDS, AnyTask, Explore, Follow, Point, Reach, Stroke, Task
 
@@ -66,8 +63,5 @@ __all__ = [
     "TrackSetting",
     "TrialResult",
     "UpDown",
-    "analysis_grid",
-    "assumed_for",
     "default_design",
-    "rises",
 ]

@@ -42,6 +42,14 @@ class Attention(Protocol):
         """Return whether a difference between two values around ``about`` is noticed."""
 
 
+class Varied(Protocol):
+    """The stimulus of a block with a design."""
+
+    @property
+    def level_kind(self) -> str:
+        """The meaning of its levels; "value" if a level may be above or below the standard."""
+
+
 class Modulus(Table):
     """The level of a block's first trial and the number assigned to it; this trial is not analysed."""
 
@@ -128,6 +136,28 @@ class Design(Table):
         """Return whether an answer to an arrangement is correct; None if no answer can be."""
         correct = self.correct(arrangement)
         return None if correct is None else answer == correct
+
+    def can_be_correct(self, stimulus: Varied | None) -> bool:
+        """Return whether answers about a stimulus (None: about conditions) can be correct.
+
+        A level that is a value may be above or below the standard: then an interval can still differ from the others,
+        or be the same as another, but a forced choice between more and less has no correct answer.
+        """
+        by_value = stimulus is not None and stimulus.level_kind == "value"
+        return self.has_correct_answer and not (by_value and self.asks_for_more)
+
+    def success_of(self, stimulus: Varied | None) -> str:
+        """Return the name of a success: "correct", "yes", or "comparison chosen" if no answer is correct."""
+        unlike_others = self.has_correct_answer and not self.can_be_correct(stimulus)
+        return "comparison chosen" if unlike_others else self.success_name
+
+    def arrangement_text(self, arrangement: int) -> str:
+        """Return an arrangement for the journal: S for the standard, C for the comparison, such as "SC"."""
+        return "".join("C" if holds else "S" for holds in self.arrangements[arrangement])
+
+    def arrangement_of(self, text: str) -> int:
+        """Return the arrangement with this text in the journal (ValueError if there is none)."""
+        return self.arrangements.index(tuple(letter == "C" for letter in text))
 
     def correct_of(self, answers: _AnswerCounts) -> tuple[int, int]:
         """Return the number of correct answers, and of all answers."""

@@ -28,16 +28,7 @@ from study_app.number_text import counted
 from study_app.protocol.randomization.streams import Draw, shuffle
 from study_app.protocol.source.table import OfKinds, Table
 from study_app.protocol.trials.designs import Design
-from study_app.protocol.trials.stimuli import (
-    CONSTANT_LEVELS,
-    LAPSES,
-    LEVELS_MOST,
-    Assumed,
-    Stimulus,
-    assumed_for,
-    ratio_in_u,
-    running_grid,
-)
+from study_app.protocol.trials.stimuli import CONSTANT_LEVELS, LAPSES, LEVELS_MOST, Assumed, Stimulus
 from study_app.psychophysics.adaptive import (
     RATIOS,
     Answers,
@@ -132,7 +123,7 @@ class Method(Table):
 
     def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
         """Return the assumed psychometric function of its answers."""
-        return assumed_for(stimulus, design)
+        return stimulus.assumed(design)
 
     def ended(self, track: TrackSetting, heard: Sequence[TrialResult]) -> bool:
         """Return whether a track ends with these answers, before its last trial."""
@@ -434,7 +425,7 @@ class QuestPlus(_Adaptive):
             return False
         search = self._search(track)
         interval = fit(search.levels, *_counts(track.stimulus, search.levels, heard), search.grid).interval
-        return ratio_in_u(track.stimulus, *interval) <= self.stop.ratio
+        return track.stimulus.ratio(*interval) <= self.stop.ratio
 
     def after(self, track: TrackSetting, heard: Sequence[TrialResult]) -> float:
         """Return the level that follows these answers, whose order does not matter."""
@@ -454,14 +445,14 @@ class QuestPlus(_Adaptive):
 
     def assumed(self, stimulus: Stimulus, design: Design) -> Assumed:
         """Return the family and the prior on the width in its keys, else the defaults."""
-        default = assumed_for(stimulus, design)
+        default = stimulus.assumed(design)
         return Assumed(
             self.family or default.family, self.widths or default.widths, self.width_prior or default.width_prior
         )
 
     def _search(self, track: TrackSetting) -> Search:
         stimulus, design = track.stimulus, track.design
-        grid = running_grid(stimulus, design, self.assumed(stimulus, design), self.lapses)
+        grid = stimulus.running_grid(design, self.assumed(stimulus, design), self.lapses)
         return Search(grid, _coordinates(track), self.learn, design.has_noise)
 
 

@@ -113,6 +113,64 @@ def _spaced(low: float, high: float, log: bool, count: int) -> tuple[float, ...]
     return (low, *inner, high)
 
 
+LEVEL_RULES: Final = 2
+"""Version of the rules by which levels are chosen; receipts state it. In 2 all widths are equally likely."""
+_RUNNING_THRESHOLDS: Final = 41
+_RUNNING_WIDTHS: Final = 9
+_WIDTHS: Final = (0.5, 4.0)
+"""The smallest and the largest width, in decades."""
+_ANALYSIS_WIDTHS: Final = (0.15, 5.6)
+"""Those of the analysis; people's functions are 0.2 to 2 decades wide."""
+LINEAR_WIDTH: Final = 1.4
+"""Width of an observer whose d′ is proportional to the level [decades]."""
+WIDTH_PRIOR: Final = (0.5, 2.0)
+"""Median and factor of people's widths [decades]. The median is the slope of 3.5 that QUEST assumes.
+
+(Watson & Pelli 1983, Percept. Psychophys. 33, 113–120.) Of three medians it is the best on the published answers of
+discrimination; confirmed on plaid and checkerboard (``tests/benchmarks/analysis/people.py``).
+"""
+LAPSES: Final = (0.0, 0.02, 0.04)
+_LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
+ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16)
+SESSION_SD: Final = 0.049
+"""Standard deviation of a person's threshold from one session to the next [decades], with [0.034, 0.077].
+
+Of six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
+(``tests/benchmarks/analysis/people.py --spread``).
+"""
+_BEYOND_DECADES: Final = 0.4
+_BEYOND_SPANS: Final = 0.25
+"""How far beyond the ends of the levels a threshold is looked for, on log and on linear spacing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """The assumptions about the psychometric function of a block.
+
+    ``widths`` are the smallest and the largest width while levels are chosen, ``width_prior`` median and factor of the
+    log-normal prior in the analysis, in u.
+    """
+
+    family: Family
+    widths: tuple[float, float]
+    width_prior: tuple[float, float]
+
+
+@lru_cache(maxsize=64)
+def _running_grid(
+    family: Family, domain: tuple[float, float], widths: tuple[float, float], lapses: Values, guesses: Values | None
+) -> Grid:
+    return Grid(
+        family=family,
+        thresholds=evenly(*domain, _RUNNING_THRESHOLDS),
+        widths=geometric(*widths, _RUNNING_WIDTHS),
+        width_prior=None,
+        lapses=lapses,
+        lapse_prior=_LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
+        guesses=guesses,
+    )
+
+
 class Stimulus(Table):
     """A parameter to vary, its standards, and the range of its levels L.
 
@@ -185,6 +243,72 @@ class Stimulus(Table):
     def grid(self) -> tuple[float, ...]:
         return self.spaced(self.steps)
 
+    def ratio(self, low: float, high: float) -> float:
+        """Return the ratio of two levels given in u; infinite if the lower is not above zero."""
+        least = self.level_of(low)
+        return self.level_of(high) / least if least > 0 else math.inf
+
+    @property
+    def _is_distance(self) -> bool:
+        """Whether a level is a distance from a standard."""
+        return self.level_kind != "value"
+
+    def rises(self, design: Design) -> bool:
+        """Return whether the share of successes increases with the level, so that there is a threshold.
+
+        It does not if a level is a value and the odd or the repeated interval is asked for, since differences are
+        noticed above and below the standard.
+        """
+        return design.adaptive and (self._is_distance or not design.has_standard or design.asks_for_more)
+
+    def assumed(self, design: Design) -> Assumed:
+        """Return the default assumptions about the psychometric function."""
+        low, high = self.domain
+        log, span = self.spacing == "log", high - low
+        # Weibull, since a distance of zero must give chance performance
+        by_chance = self._is_distance and log and design.guess_rate is not None
+        return Assumed(
+            family="weibull" if by_chance else "normal",
+            widths=_WIDTHS if log else (span / 8, 2 * span),
+            width_prior=WIDTH_PRIOR if log and self._is_distance else (span / 2, 2.0),
+        )
+
+    def guesses(self, design: Design) -> tuple[float, ...] | None:
+        """Return the guess rates of a design; None if no answer is correct, so that it equals the lapse rate."""
+        if design.has_standard and not self._is_distance:
+            return None
+        return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
+
+    def running_grid(self, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
+        """Return the grid for choosing levels during a session.
+
+        All widths are equally likely, so that levels stay at the threshold for any width of a person's function; with
+        levels above it the threshold would depend on the prior.
+        """
+        return _running_grid(assumed.family, self.domain, assumed.widths, lapses, self.guesses(design))
+
+    def analysis_grid(self, design: Design, assumed: Assumed, sessions: float = 1) -> Grid:
+        """Return the grid for estimating thresholds: finer, and extended beyond both ends of the levels.
+
+        The estimate is of a person's threshold, about which that of each of the ``sessions`` varies by `SESSION_SD`.
+        """
+        low, high = self.domain
+        log, session_sd = self.spacing == "log", SESSION_SD / math.sqrt(sessions)
+        beyond = _BEYOND_DECADES if log else _BEYOND_SPANS * (high - low)
+        least, most = assumed.widths
+        widest = _ANALYSIS_WIDTHS if log else (0.3 * least, 1.4 * most)
+        return Grid(
+            family=assumed.family,
+            thresholds=evenly(low - beyond, high + beyond, 97),
+            widths=geometric(min(widest[0], 0.7 * least), max(widest[1], 1.4 * most), 17),
+            width_prior=assumed.width_prior,
+            lapses=ANALYSIS_LAPSES,
+            lapse_prior=lapse_prior(ANALYSIS_LAPSES),
+            guesses=self.guesses(design),
+            session_sd=(session_sd, 0.0) if log else (0.0, session_sd * math.log(10)),
+            log=log,
+        )
+
     @model_validator(mode="after")
     def _levels_ascend(self) -> Self:
         low, high = self.levels
@@ -219,133 +343,3 @@ class Stimulated:
     condition: str
     vary: str | None = None
     value: float = 0.0
-
-
-LEVEL_RULES: Final = 2
-"""Version of the rules by which levels are chosen; receipts state it. In 2 all widths are equally likely."""
-_RUNNING_THRESHOLDS: Final = 41
-_RUNNING_WIDTHS: Final = 9
-_WIDTHS: Final = (0.5, 4.0)
-"""The smallest and the largest width, in decades."""
-_ANALYSIS_WIDTHS: Final = (0.15, 5.6)
-"""Those of the analysis; people's functions are 0.2 to 2 decades wide."""
-LINEAR_WIDTH: Final = 1.4
-"""Width of an observer whose d′ is proportional to the level [decades]."""
-WIDTH_PRIOR: Final = (0.5, 2.0)
-"""Median and factor of people's widths [decades]. The median is the slope of 3.5 that QUEST assumes.
-
-(Watson & Pelli 1983, Percept. Psychophys. 33, 113–120.) Of three medians it is the best on the published answers of
-discrimination; confirmed on plaid and checkerboard (``tests/benchmarks/analysis/people.py``).
-"""
-LAPSES: Final = (0.0, 0.02, 0.04)
-_LAPSE_PRIOR: Final = (0.4, 0.4, 0.2)
-ANALYSIS_LAPSES: Final = (0.0, 0.01, 0.02, 0.03, 0.045, 0.065, 0.09, 0.12, 0.16)
-SESSION_SD: Final = 0.049
-"""Standard deviation of a person's threshold from one session to the next [decades], with [0.034, 0.077].
-
-Of six observers of Jäkel & Wichmann 2006 (J. Vision 6:13) between series of 400 trials
-(``tests/benchmarks/analysis/people.py --spread``).
-"""
-_BEYOND_DECADES: Final = 0.4
-_BEYOND_SPANS: Final = 0.25
-"""How far beyond the ends of the levels a threshold is looked for, on log and on linear spacing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Assumed:
-    """The assumptions about the psychometric function of a block.
-
-    ``widths`` are the smallest and the largest width while levels are chosen, ``width_prior`` median and factor of the
-    log-normal prior in the analysis, in u.
-    """
-
-    family: Family
-    widths: tuple[float, float]
-    width_prior: tuple[float, float]
-
-
-def assumed_for(stimulus: Stimulus, design: Design) -> Assumed:
-    """Return the default assumptions about the psychometric function."""
-    low, high = stimulus.domain
-    log, span = stimulus.spacing == "log", high - low
-    # Weibull, since a distance of zero must give chance performance
-    by_chance = _is_distance(stimulus) and log and design.guess_rate is not None
-    return Assumed(
-        family="weibull" if by_chance else "normal",
-        widths=_WIDTHS if log else (span / 8, 2 * span),
-        width_prior=WIDTH_PRIOR if log and _is_distance(stimulus) else (span / 2, 2.0),
-    )
-
-
-def _is_distance(stimulus: Stimulus) -> bool:
-    """Return whether a level is a distance from a standard."""
-    return stimulus.level_kind != "value"
-
-
-def rises(stimulus: Stimulus, design: Design) -> bool:
-    """Return whether the share of successes increases with the level, so that there is a threshold.
-
-    It does not if a level is a value and the odd or the repeated interval is asked for, since differences are noticed
-    above and below the standard.
-    """
-    return design.adaptive and (_is_distance(stimulus) or not design.has_standard or design.asks_for_more)
-
-
-def guesses_of(stimulus: Stimulus, design: Design) -> tuple[float, ...] | None:
-    """Return the guess rates of a design; None if no answer is correct, so that it equals the lapse rate."""
-    if design.has_standard and not _is_distance(stimulus):
-        return None
-    return FREE_GUESSES if design.guess_rate is None else (design.guess_rate,)
-
-
-def running_grid(stimulus: Stimulus, design: Design, assumed: Assumed, lapses: tuple[float, ...]) -> Grid:
-    """Return the grid for choosing levels during a session.
-
-    All widths are equally likely, so that levels stay at the threshold for any width of a person's function; with
-    levels above it the threshold would depend on the prior.
-    """
-    return _running_grid(assumed.family, stimulus.domain, assumed.widths, lapses, guesses_of(stimulus, design))
-
-
-@lru_cache(maxsize=64)
-def _running_grid(
-    family: Family, domain: tuple[float, float], widths: tuple[float, float], lapses: Values, guesses: Values | None
-) -> Grid:
-    return Grid(
-        family=family,
-        thresholds=evenly(*domain, _RUNNING_THRESHOLDS),
-        widths=geometric(*widths, _RUNNING_WIDTHS),
-        width_prior=None,
-        lapses=lapses,
-        lapse_prior=_LAPSE_PRIOR if lapses == LAPSES else (1.0 / len(lapses),) * len(lapses),
-        guesses=guesses,
-    )
-
-
-def analysis_grid(stimulus: Stimulus, design: Design, assumed: Assumed, session_sd: float = SESSION_SD) -> Grid:
-    """Return the grid for estimating thresholds: finer, and extended beyond both ends of the levels.
-
-    ``session_sd`` is the standard deviation of a person's threshold about that of the session [decades].
-    """
-    low, high = stimulus.domain
-    log = stimulus.spacing == "log"
-    beyond = _BEYOND_DECADES if log else _BEYOND_SPANS * (high - low)
-    least, most = assumed.widths
-    widest = _ANALYSIS_WIDTHS if log else (0.3 * least, 1.4 * most)
-    return Grid(
-        family=assumed.family,
-        thresholds=evenly(low - beyond, high + beyond, 97),
-        widths=geometric(min(widest[0], 0.7 * least), max(widest[1], 1.4 * most), 17),
-        width_prior=assumed.width_prior,
-        lapses=ANALYSIS_LAPSES,
-        lapse_prior=lapse_prior(ANALYSIS_LAPSES),
-        guesses=guesses_of(stimulus, design),
-        session_sd=(session_sd, 0.0) if log else (0.0, session_sd * math.log(10)),
-        log=log,
-    )
-
-
-def ratio_in_u(stimulus: Stimulus, low: float, high: float) -> float:
-    """Return the ratio of two levels given in u; infinite if the lower is not above zero."""
-    least = stimulus.level_of(low)
-    return stimulus.level_of(high) / least if least > 0 else math.inf

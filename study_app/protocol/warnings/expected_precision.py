@@ -19,19 +19,12 @@ from numpy.typing import NDArray
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.tracks import (
-    design_of,
-    has_correct_answer,
-    method_of,
-    standards_of,
-    stimulus_of,
-    tracks_of,
-)
+from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.presented.presented_levels import Clipping, clipping
 from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.designs import Design, Rated
 from study_app.protocol.trials.methods import Method, TrackSetting
-from study_app.protocol.trials.stimuli import LINEAR_WIDTH, WIDTH_PRIOR, Stimulus, analysis_grid, guesses_of, rises
+from study_app.protocol.trials.stimuli import LINEAR_WIDTH, WIDTH_PRIOR, Stimulus
 from study_app.psychophysics.adaptive import Answers, Observers
 from study_app.psychophysics.detection import NORMAL, rating
 from study_app.psychophysics.families import Floats
@@ -155,12 +148,12 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
     """Return the plan for the precision of a block's d′, d_a or exponents; None if it has none of them."""
     if block.design is None or block.phase != "main":
         return None
-    design = design_of(protocol, block).model_copy(update={"question": None})  # a dictionary has no hash
+    design = protocol.design_of(block).model_copy(update={"question": None})  # a dictionary has no hash
     slots = tracks_of(protocol, block)[0].slots
     if block.stimulus is None:
         choice = design.reply == "choice" and not design.has_noise
         return SensitivityPlan(design, slots, roving=False, of_each="comparison") if choice else None
-    stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+    stimulus, method = protocol.stimulus_of(block), protocol.method_of(block)
     if design.reply == "number":
         levels = tuple(sorted({one for one in method.levels_of(stimulus) if one > 0}))
         repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
@@ -169,11 +162,11 @@ def mean_plan(protocol: Protocol, block: Block) -> MeanPlan | None:
             published.value for published in decided if (published.block, published.measure) == (block.id, "exponent")
         )
         return EstimationPlan(levels, repetitions, next(exponents, _EXPONENT)) if len(levels) > 1 else None
-    if isinstance(design, Rated) and len(method.levels_of(stimulus)) > 1 and len(standards_of(protocol, block)) == 1:
+    if isinstance(design, Rated) and len(method.levels_of(stimulus)) > 1 and len(protocol.standards_of(block)) == 1:
         repetitions = method.tracks * method.presentations(stimulus) // len(method.levels_of(stimulus))
         return RatingPlan(protocol.scales[design.scale].points, repetitions)
-    if design.reply == "choice" and has_correct_answer(design, stimulus) and not rises(stimulus, design):
-        roving = len(standards_of(protocol, block)) > 1 and method.order == "interleaved"
+    if design.reply == "choice" and design.can_be_correct(stimulus) and not stimulus.rises(design):
+        roving = len(protocol.standards_of(block)) > 1 and method.order == "interleaved"
         return SensitivityPlan(design, slots * method.tracks, roving, of_each="standard")
     return None
 
@@ -254,7 +247,7 @@ class ThresholdPlan:
     @property
     def two_intervals(self) -> bool:
         """Whether one of two intervals is correct, so that people may have a preference."""
-        return self.design.kind == "2ifc" and has_correct_answer(self.design, self.stimulus)
+        return self.design.kind == "2ifc" and self.design.can_be_correct(self.stimulus)
 
     @property
     def kinds(self) -> Mapping[str, Person]:
@@ -301,7 +294,7 @@ class ThresholdPlan:
         columns = np.array([(it.wrong(answers), it.width, it.change, it.criterion, it.repeats) for it in people]).T
         lapse, width, change, criterion, repeats = columns if len(people) > 1 else columns[:, 0]
         if guess is None:
-            guess = lapse if guesses_of(stimulus, design) is None else _FALSE_ALARMS
+            guess = lapse if stimulus.guesses(design) is None else _FALSE_ALARMS
         presented = None if self.clipping is None else self.presented
         moves = np.log10(change) if stimulus.spacing == "log" else thresholds * np.log(change)
         observers = Observers(
@@ -346,7 +339,7 @@ class ThresholdPlan:
         presented = np.unique(answers.levels[~np.isnan(answers.levels)])
         if len(presented) > _OBSERVERS:
             presented = np.append(presented[presented < low], np.linspace(low, high, _OBSERVERS))
-        grid = analysis_grid(self.stimulus, self.design, self.method.assumed(self.stimulus, self.design))
+        grid = self.stimulus.analysis_grid(self.design, self.method.assumed(self.stimulus, self.design))
         return [it.fit(grid, two_intervals=self.two_intervals).flat for it in answers.given(presented)]
 
     def estimates(self, answered: ObserverAnswers, most: int | None = None, together: int = PEOPLE) -> Estimates:
@@ -377,14 +370,14 @@ def threshold_plan(protocol: Protocol, block: Block) -> ThresholdPlan | None:
     """Return the plan for the precision of a block's thresholds; None if it has none."""
     if block.stimulus is None or block.design is None or block.phase != "main":
         return None
-    stimulus = stimulus_of(protocol, block)
-    design = design_of(protocol, block).model_copy(update={"question": None})  # a dictionary has no hash
-    if not rises(stimulus, design):
+    stimulus = protocol.stimulus_of(block)
+    design = protocol.design_of(block).model_copy(update={"question": None})  # a dictionary has no hash
+    if not stimulus.rises(design):
         return None
-    catch, standards = len(tracks_of(protocol, block)[0].catch), len(standards_of(protocol, block))
+    catch, standards = len(tracks_of(protocol, block)[0].catch), len(protocol.standards_of(block))
     limits = clipping(protocol, block)
     presented = limits if limits is not None and limits.paced else None
-    return ThresholdPlan(stimulus, design, method_of(protocol, block), catch, standards, presented)
+    return ThresholdPlan(stimulus, design, protocol.method_of(block), catch, standards, presented)
 
 
 @lru_cache(maxsize=32)
@@ -477,7 +470,7 @@ def imprecise(protocol: Protocol, block: Block) -> Iterator[str]:
         return
     if (reached := found.of_group(people)) <= precision:
         return
-    adaptive = block.stimulus is not None and method_of(protocol, block).adaptive
+    adaptive = block.stimulus is not None and protocol.method_of(block).adaptive
     key = "trials" if adaptive else "repetitions"
     place = f"blocks.{block.id}" if block.stimulus is None else f"methods.{block.method}"
     trials, wanted = found.trials_for(precision, people), found.participants_for(precision)

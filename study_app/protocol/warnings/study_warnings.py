@@ -17,7 +17,7 @@ from study_app.protocol.checks.consistency import LEAST_N, force_n
 from study_app.protocol.checks.force_limits import PACED, fastest_hz, unpaced_clipping_warning
 from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.orders.durations import variants
-from study_app.protocol.orders.tracks import design_of, has_correct_answer, method_of, stimulus_of, tracks_of
+from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.presented.presented_levels import highest_damping
 from study_app.protocol.questionnaires import instrument
 from study_app.protocol.questions import POINTS
@@ -168,14 +168,14 @@ def level_warnings(protocol: Protocol, *, simulates: bool = True) -> Iterator[st
 
 
 def _design_warnings(protocol: Protocol, block: Block, simulates: bool) -> Iterator[str]:
-    design, track = design_of(protocol, block), tracks_of(protocol, block)[0]
+    design, track = protocol.design_of(block), tracks_of(protocol, block)[0]
     count, trials = len(design.arrangements), track.slots - len(track.catch)
     if not design.has_noise and trials % count:  # not every arrangement comes equally often
         place = f"blocks.{block.id}.repetitions" if block.stimulus is None else f"methods.{block.method}"
         wanted = "an even number" if count == 2 else f"a multiple of {count}"
         yield f"{place}: {count} arrangements cannot be balanced over {counted(trials, 'trial')}; choose {wanted}"
     if block.stimulus is not None:
-        for key, sentence in method_of(protocol, block).warnings():
+        for key, sentence in protocol.method_of(block).warnings():
             yield f"methods.{block.method}.{key}: {sentence}"
     if block.catch is not None and not track.catch:
         share = math.ceil(100 / track.slots) / 100
@@ -363,13 +363,13 @@ def _forced_choice_warnings(protocol: Protocol, block: Block) -> Iterator[str]:
     """Yield missing parts of a forced-choice block of levels."""
     if block.stimulus is None or block.design is None or block.method is None:
         return
-    design, stimulus = design_of(protocol, block), stimulus_of(protocol, block)
-    if block.catch is None and has_correct_answer(design, stimulus):
+    design, stimulus = protocol.design_of(block), protocol.stimulus_of(block)
+    if block.catch is None and design.can_be_correct(stimulus):
         yield (
             f"blocks.{block.id}.catch: catch trials are missing, so participants who merely guess cannot be told "
             "apart from participants with a high threshold"
         )
-    factor = method_of(protocol, block).assumed(stimulus, design).width_prior[1]
+    factor = protocol.method_of(block).assumed(stimulus, design).width_prior[1]
     if factor < _NARROW:
         yield (
             f"methods.{block.method}.width_prior: a factor of {factor:g} is so narrow that the prior determines the "
@@ -382,7 +382,7 @@ def _unbracketed_value(protocol: Protocol, number: int, published: Published) ->
     block = protocol.blocks[published.block]
     if published.measure == "exponent" or block.stimulus is None or block.method is None:
         return
-    levels = method_of(protocol, block).levels_of(stimulus_of(protocol, block))
+    levels = protocol.method_of(block).levels_of(protocol.stimulus_of(block))
     if not min(levels) <= published.value <= max(levels):
         yield (
             f"analysis.published.{number}.value: {published.value:g} is outside the levels of block {block.id} "

@@ -13,7 +13,6 @@ from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.runtime.offline import samples_along
 from study_app.protocol.model import Follow, Protocol
-from study_app.protocol.orders import condition_of, stimulus_of
 from study_app.protocol.presented import extreme_levels
 from study_app.protocol.trials import OF_CONDITION, Stimulated
 from study_app.store.session_progress import broken_interval_limits, delivered_values, judged_fields
@@ -27,7 +26,7 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
         task, where = protocol.tasks[block.task], f"stimuli.{block.stimulus}.levels"
         if block.stimulus is None or not isinstance(task, Follow):
             continue
-        stimulus = stimulus_of(protocol, block)
+        stimulus = protocol.stimulus_of(block)
         if stimulus.vary in OF_CONDITION:
             continue
         t_s = np.arange(round(task.limit_s * protocol.device.rate_hz)) / protocol.device.rate_hz
@@ -35,9 +34,7 @@ def undelivered_levels(protocol: Protocol) -> Iterator[str]:
         for standard, level, scene in extreme_levels(protocol, block):
             if not any(_INERTIAL & set(liquid.effects) for liquid in resolve(scene).liquids):
                 continue
-            presented = Stimulated(
-                condition_of(protocol, stimulus), stimulus.vary, stimulus.comparison(standard, level)
-            )
+            presented = Stimulated(protocol.condition_of(stimulus), stimulus.vary, stimulus.comparison(standard, level))
             samples = judged_fields(samples_along(scene, Motion(t_s, scene.origin_m + scene.scale * hand_m)))
             samples["time_ns"], samples["position_m"] = np.rint(1e9 * t_s), hand_m
             delivery = delivered_values(protocol, presented, task, samples)

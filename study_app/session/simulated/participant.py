@@ -11,7 +11,7 @@ from typing import Final
 
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import Schedule, design_of
+from study_app.protocol.orders import Schedule
 from study_app.protocol.participants import REHEARSED
 from study_app.protocol.questions import Value, plain_number
 from study_app.protocol.randomization import stream
@@ -115,7 +115,7 @@ class SimulatedParticipant(ABC):
         """Return the reference of a setting: the interval before, else the mean of earlier settings, else itself."""
         block = self._study.blocks[self._trials[trial].block]
         known = self._sensed_magnitudes(block)
-        if design_of(self._study, block).intervals > 1:
+        if self._study.design_of(block).intervals > 1:
             return known[trial][0]
         earlier = [magnitude for number in sorted(known) if number < trial for magnitude in known[number]]
         return sum(earlier) / len(earlier) if earlier else sensed
@@ -151,7 +151,7 @@ class SimulatedParticipant(ABC):
 
     def _design_answer(self, block: Block, trial: int, draw: Draw) -> str | int | float:
         """Return the answer to a trial with a design; a resumed session repeats its earlier answers."""
-        sensed, design = self._sensed_magnitudes(block), design_of(self._study, block)
+        sensed, design = self._sensed_magnitudes(block), self._study.design_of(block)
         before: list[float] = []
         last: str | int | float | None = None
         for number in sorted(known for known in sensed if known <= trial):

@@ -18,7 +18,7 @@ from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import design_of, orders_of, variants
+from study_app.protocol.orders import orders_of, variants
 from study_app.protocol.presented import extreme_levels
 from study_app.protocol.randomization import stream
 from study_app.protocol.trials import AnyTask
@@ -137,7 +137,7 @@ def _lost_share(protocol: Protocol, block: Block, scenes: _FailingScenes) -> flo
 
     if block.design is None:
         return mean(failing(protocol.scene_for(name)) for name in block.conditions)
-    design, attempts = design_of(protocol, block), protocol.limits.attempts or 1
+    design, attempts = protocol.design_of(block), protocol.limits.attempts or 1
 
     def missing(standard: float, comparison: float) -> float:
         delivered = [

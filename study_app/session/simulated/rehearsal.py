@@ -35,7 +35,7 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import Schedule, Trial, build_schedule, draw_key
-from study_app.protocol.presented import has_imperfect_link, next_level
+from study_app.protocol.presented import next_level
 from study_app.protocol.questions import Value, shown_questions
 from study_app.protocol.randomization import Key as LevelKey
 from study_app.protocol.randomization import stream
@@ -246,7 +246,7 @@ class RehearsedSession(SimulatedParticipant):
         self._features_of: dict[int, tuple[TrialFeatures, ...]] = {}
         self._touch = rig.servo.telemetry.reader()
         self._next_frame_ns = 0
-        self._period_s = 1 / study.device.rate_hz if has_imperfect_link(study) else None
+        self._period_s = 1 / study.device.rate_hz if study.has_imperfect_link else None
         self._paint: Draw = self._stream("screen")
         ports = Ports(rig.servo, store, self._present, self._now_s, store.recorder)
         self._runner = Runner(study, schedule, store.key.codes, ports, study.study.languages[0], start, store.key.nonce)

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 from study_app.errors import SessionError
 from study_app.protocol.orders import Trial
-from study_app.protocol.presented import delay_s_of
 from study_app.session.resume import FIRST
 from study_app.session.transitions.events import (
     Adjust,
@@ -110,7 +109,7 @@ def adjust_level(state: SessionState, event: Stepped) -> Result:
         return state, ()
     place = setting.moved(state.place, event.steps)
     presented = replace(due.intervals[state.interval - 1], value=setting.comparison(place))
-    delay_s = delay_s_of(state.plan.protocol, presented)
+    delay_s = state.plan.protocol.presented_delay_s(presented)
     moved = replace(state, steps=state.steps + event.steps, place=place)
     return moved, (Adjust(presented, delay_s, journal.Stepped(**attempt_fields(state), steps=event.steps, scene=None)),)
 

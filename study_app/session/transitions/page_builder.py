@@ -11,16 +11,7 @@ from typing import Final, Literal, TypeAlias
 
 from study_app.haptics.model.scene import Body
 from study_app.protocol.model import PageText, Protocol, Questionnaire
-from study_app.protocol.orders import (
-    FormStep,
-    PageStep,
-    Schedule,
-    Trial,
-    build_schedule,
-    design_of,
-    draw_key,
-    own_protocol,
-)
+from study_app.protocol.orders import FormStep, PageStep, Schedule, Trial, build_schedule, draw_key
 from study_app.protocol.questions import ChoiceView, Context, NumberView, Question, Value
 from study_app.protocol.randomization import draw_secret, group_of, stream
 from study_app.protocol.trials import ORDINALS
@@ -104,7 +95,7 @@ def task_page(protocol: Protocol, language: str, trial: Trial, body: Body) -> pa
     """Return the tank page of a trial in a session's own protocol, before anything is presented."""
     block = protocol.blocks[trial.block]
     task, questionnaire = protocol.tasks[block.task], protocol.questionnaire_of(block.id)
-    set_by_hand = block.design is not None and design_of(protocol, block).adjusts
+    set_by_hand = block.design is not None and protocol.design_of(block).adjusts
     follows = words(language).follow_target
     return pages.TaskPage(
         trial=trial.number,
@@ -258,7 +249,7 @@ def preview(study: Protocol, seed: int = SEED, participant: str = PARTICIPANT) -
     secret = draw_secret(draw)
     codes = draw_key(study, draw)
     group = group_of(study.shares, secret, 1) if study.randomises else next(iter(study.groups), None)
-    own = own_protocol(study, group, 1)
+    own = study.for_session(group, 1)
     return Preview(own, build_schedule(own, participant, seed), codes, secret)
 
 

@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 
 from study_app.errors import SessionError
 from study_app.protocol.model import Protocol, Questionnaire
-from study_app.protocol.orders import FormStep, PageStep, Schedule, Step, Trial, adjusting_of, design_of, method_of
+from study_app.protocol.orders import FormStep, PageStep, Schedule, Step, Trial
 from study_app.protocol.presented import Presentation, next_level
 from study_app.protocol.questions import Context, Question, shown_questions
 from study_app.protocol.randomization import Key
@@ -160,7 +160,7 @@ class SessionState:
         """The task of the current trial; while its level is set, with the duration of a setting."""
         block = self.plan.protocol.blocks[self.trial.block]
         task = self.plan.protocol.tasks[block.task]
-        method = method_of(self.plan.protocol, block) if self.adjusts else None
+        method = self.plan.protocol.method_of(block) if self.adjusts else None
         return task.lasting(method.most_s) if isinstance(method, Adjustment) else task
 
     @property
@@ -175,7 +175,7 @@ class SessionState:
         if not self.adjusts or self.due is None or self.due.level is None:
             return None
         block = self.plan.protocol.blocks[self.trial.block]
-        return adjusting_of(self.plan.protocol, block, self.due.standard, self.due.level)
+        return self.plan.protocol.adjusting(block, self.due.standard, self.due.level)
 
     @property
     def asks(self) -> bool:
@@ -186,7 +186,7 @@ class SessionState:
     def design(self) -> Design | None:
         """The design of the current trial; None if it is a single task."""
         block = self.plan.protocol.blocks[self.trial.block]
-        return None if block.design is None else design_of(self.plan.protocol, block)
+        return None if block.design is None else self.plan.protocol.design_of(block)
 
     @property
     def items(self) -> tuple[str, ...]:

@@ -6,14 +6,7 @@ from typing import Any, Final, TypeAlias
 from study_app.errors import SessionError
 from study_app.protocol.blocks import Block
 from study_app.protocol.orders import FormStep, PageStep, Step, Trial
-from study_app.protocol.presented import (
-    Presentation,
-    arrangement_text,
-    delay_s_of,
-    is_criterion_met,
-    longest_delay_s,
-    trial_result,
-)
+from study_app.protocol.presented import Presentation, is_criterion_met, longest_delay_s, trial_result
 from study_app.protocol.questions import answer_problem
 from study_app.protocol.trials import Stimulated
 from study_app.session.transitions import page_builder
@@ -111,7 +104,7 @@ def start_trial(state: SessionState, done: Commands, at_s: float, *, rest_until_
     fields: dict[str, Any] = {name: getattr(trial, name) for name in ("block", "phase", "part", "index", "of", "code")}
     if state.due is not None and state.design is not None:
         fields |= {name: getattr(state.due, name) for name in ("level", "standard", "catch")}
-        fields["arrangement"] = arrangement_text(state.design, state.due.arrangement)
+        fields["arrangement"] = state.design.arrangement_text(state.due.arrangement)
     begun = (*done, Write(journal.TrialStarted(**attempt_fields(state), **fields)), WriteTables())
     return (
         start_interval(state, begun, at_s) if rest_until_s is None else rest_before_interval(state, begun, rest_until_s)
@@ -146,7 +139,7 @@ def start_interval(state: SessionState, done: Commands, at_s: float) -> Result:
         attempt=state.attempt,
         task=state.task,
         presented=presented,
-        delay_s=delay_s_of(protocol, presented),
+        delay_s=protocol.presented_delay_s(presented),
         linger_s=longest_delay_s(protocol, block) + _END_SHOWN_S,
         interval=None if state.due is None else state.interval,
         adjusts=state.adjusts,

@@ -25,7 +25,6 @@ from typing import Any, Final, NamedTuple
 
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import own_protocol
 from study_app.protocol.participants import check_session_number, next_group
 from study_app.protocol.randomization import enrolment_number, group_of
 from study_app.store.blinded.blinding import Key, read_key
@@ -217,7 +216,7 @@ def check_session(
         known = allocation_of(study, read_key(study.path), participant)
         group = group if known is None else known.group
     if group is not None:
-        own_protocol(protocol, group, session)
+        protocol.for_session(group, session)
 
 
 def check_choice(
@@ -304,13 +303,13 @@ def session_protocol(study: StudyFolder, protocol: Protocol, participant: str, s
         The participant has no entry, or fewer sessions; or the study's key cannot be read.
     """
     if not protocol.groups:
-        return own_protocol(protocol, None, session)
+        return protocol.for_session(None, session)
     allocation = allocation_of(study, read_key(study.path), participant)
     if allocation is None:
         raise StoreError(
             f"participant {participant} does not have an entry in {study.allocated}: restore it from a backup"
         )
-    return own_protocol(protocol, allocation.group, session)
+    return protocol.for_session(allocation.group, session)
 
 
 def claims(study: StudyFolder) -> list[Claim]:

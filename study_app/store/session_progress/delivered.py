@@ -21,7 +21,7 @@ from study_app.haptics.model.layout import (
 )
 from study_app.number_text import counted
 from study_app.protocol.model import Limits, Protocol
-from study_app.protocol.presented import Presentation, presented_condition
+from study_app.protocol.presented import Presentation
 from study_app.protocol.trials import DELAY, DELAYS, FORCE_DELAY, OF_CONDITION, AnyTask, Follow, Stimulated
 from study_app.psychophysics.delivery import (
     Times,
@@ -125,7 +125,7 @@ def delivered_values(
     samples = _plausible_samples(samples)
     times_s = (samples["time_ns"] - samples["time_ns"][:1]) * 1e-9
     fade_s = protocol.scene.fade_s
-    period_s, link = 1 / protocol.device.rate_hz, presented_condition(protocol, presented).link()
+    period_s, link = 1 / protocol.device.rate_hz, protocol.presented_condition(presented).link()
     faded_s = fade_s + link.delay_s + link.jitter_s
     from_s = max(task.lead_s, faded_s) if isinstance(task, Follow) else faded_s + _SETTLED_S
     moved = motion(times_s, samples["position_m"], period_s).after(from_s)

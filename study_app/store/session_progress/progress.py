@@ -8,8 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import design_of
-from study_app.protocol.presented import arrangement_of, trial_result
+from study_app.protocol.presented import trial_result
 from study_app.protocol.trials import TrialResult
 from study_app.store.journals import journal_events as events
 from study_app.store.session_progress.delivered import Broken, beyond_limits, late_device_text
@@ -305,7 +304,7 @@ def trial_results(protocol: Protocol, lines: Iterable[events.Event]) -> tuple[Tr
                 continue
             if start.arrangement is None or not line.items:
                 raise KeyError("arrangement and answer")
-            arrangement = arrangement_of(design_of(protocol, block), start.arrangement)
+            arrangement = protocol.design_of(block).arrangement_of(start.arrangement)
             answer: Any = line.items[0].value
             of_trial = line.trial, start.code, start.level, arrangement
             results[line.trial] = trial_result(protocol, block, *of_trial, answer, catch=bool(start.catch))

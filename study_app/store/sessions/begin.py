@@ -13,7 +13,6 @@ from study_app.errors import StoreError
 from study_app.ids import read_as
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import own_protocol
 from study_app.protocol.randomization import stream
 from study_app.protocol.source import unbundle
 from study_app.protocol.trials import LEVEL_RULES
@@ -152,7 +151,7 @@ def begin_session(
         _check_path_length(place)
         allocation = allocate(study_folder, key, start.participant, group=start.group, row_of=start.row_of)
         group = None if allocation is None else allocation.group
-        own_protocol(protocol, group, start.session)  # raises an error if the group does not have this session
+        protocol.for_session(group, start.session)  # raises an error if the group does not have this session
         started, first_receipt = first_records(
             protocol, source, start, key_hash=key.hash, measures_sealed=sealed, clock=clock, allocation=allocation
         )

@@ -16,7 +16,6 @@ from types import TracebackType
 from typing import Any, Self
 
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import own_protocol
 from study_app.protocol.randomization import stream
 from study_app.protocol.source import unbundle
 from study_app.store import receipt
@@ -158,7 +157,7 @@ class SimulatedSession:
         self._hash = hashlib.sha256()
         self._study = study
         allocation = allocate(study.folder, study.key, participant, group=group, waits=False, entries=study.entries)
-        self.protocol = own_protocol(study.protocol, None if allocation is None else allocation.group, 1)
+        self.protocol = study.protocol.for_session(None if allocation is None else allocation.group, 1)
         started_at = clock.at(0)
         at = {"started_at": started_at, "clock": {"origin_ns": clock.origin_ns, "origin_at": started_at}}
         of_group = {} if group is None else {"group": group}

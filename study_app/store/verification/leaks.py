@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import adjusting_of, design_of, method_of, standards_of, stimulus_of
 from study_app.store.files.atomic import cannot_read, parse_json, paths_in
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals.journal_events import Event, Stepped, TrialStarted
@@ -69,12 +68,12 @@ def presented_numbers(protocol: Protocol) -> frozenset[float]:
     for block in protocol.blocks.values():
         if block.design is None or block.stimulus is None:
             continue
-        stimulus, method = stimulus_of(protocol, block), method_of(protocol, block)
+        stimulus, method = protocol.stimulus_of(block), protocol.method_of(block)
         levels = {*method.levels_of(stimulus)}
-        first = design_of(protocol, block).first
+        first = protocol.design_of(block).first
         levels |= {stimulus.levels[1]} if block.catch is not None else set()
         levels |= set() if first is None else {first.level}
-        standards = standards_of(protocol, block)
+        standards = protocol.standards_of(block)
         numbers |= levels | {standard for standard in standards if standard is not None}
         numbers |= {stimulus.comparison(standard, level) for standard in standards for level in levels}
     return frozenset(numbers - {0.0})
@@ -90,8 +89,8 @@ def recorded_numbers(protocol: Protocol, opened: Iterable[Event]) -> frozenset[f
     for line in opened:
         if isinstance(line, TrialStarted) and line.level:
             block, standard = protocol.blocks[line.block], line.standard
-            numbers |= {line.level, stimulus_of(protocol, block).comparison(standard, line.level)}
-            setting, place = adjusting_of(protocol, block, standard, line.level), 0
+            numbers |= {line.level, protocol.stimulus_of(block).comparison(standard, line.level)}
+            setting, place = protocol.adjusting(block, standard, line.level), 0
         elif isinstance(line, Stepped) and setting is not None:
             place = setting.moved(place, line.steps)
             numbers |= {setting.level(place), setting.comparison(place)}

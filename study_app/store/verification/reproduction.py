@@ -12,16 +12,8 @@ from pathlib import Path
 from study_app.errors import StoreError
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import (
-    RecordedTrial,
-    Schedule,
-    adjusting_of,
-    build_schedule,
-    design_of,
-    own_protocol,
-    reproduce,
-)
-from study_app.protocol.presented import arrangement_text, next_level
+from study_app.protocol.orders import RecordedTrial, Schedule, build_schedule, reproduce
+from study_app.protocol.presented import next_level
 from study_app.protocol.randomization import Key
 from study_app.protocol.trials import LEVEL_RULES
 from study_app.store import receipt
@@ -59,7 +51,7 @@ def reproduce_session(session_folder: Path) -> Reproduced:
     complete = ran["status"] in events.REACHED_END
     try:
         start = events.start_of(lines)
-        protocol = own_protocol(complete_protocol(ran["protocol"], key), participant_group(start, key), ran["session"])
+        protocol = complete_protocol(ran["protocol"], key).for_session(participant_group(start, key), ran["session"])
         place = place_number(replace(start, row_of=ran.get("row_of")), key)
         schedule = build_schedule(protocol, participant, seed, place)
         recorded = recorded_trials(open_events(lines, key) if lines and events.start_of(lines).own_codes else lines)
@@ -133,7 +125,7 @@ class _Compared:
         follows = due is not None and presented == (
             due.level,
             due.standard,
-            arrangement_text(design_of(self._protocol, block), due.arrangement),
+            self._protocol.design_of(block).arrangement_text(due.arrangement),
             due.catch,
         )
         if not follows:
@@ -161,7 +153,7 @@ class _Compared:
         block = self._protocol.blocks[started.block]
         if block.stimulus is None or started.level is None:
             return
-        setting = adjusting_of(self._protocol, block, started.standard, started.level)
+        setting = self._protocol.adjusting(block, started.standard, started.level)
         if setting is None:
             return
         steps = [event.steps for event in own if isinstance(event, events.Stepped)]

@@ -13,7 +13,6 @@ from study_app.analysis.data.blocks import LevelBlock, Setting
 from study_app.analysis.levels import thresholds
 from study_app.analysis.levels.answers import Answers
 from study_app.analysis.levels.evaluate import level_results
-from study_app.protocol.presented.presentation import arrangement_text
 from study_app.protocol.trials.designs import Rated
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.analysis.levels.level_studies import ONE, STIMULUS, block
@@ -47,7 +46,7 @@ def rows(block: LevelBlock, seed: int) -> list[dict[str, Any]]:
             arrangement = trial % max(1, len(block.design.arrangements))
             choices = sorted(block.design.answers, key=lambda one: not block.design.is_correct(arrangement, one))
             right = bool(draw.random() < 0.4 + 0.5 * (trial % 3) / 2)
-            letters = arrangement_text(block.design, arrangement) if block.design.arrangements else "C"
+            letters = block.design.arrangement_text(arrangement) if block.design.arrangements else "C"
             found.append(
                 {
                     "participant": person, "session": 1, "trial": trial, "block": block.id, "code": "V1",
@@ -134,10 +133,10 @@ def test_only_pairs_with_a_correct_answer_are_fitted_as_two_intervals(
     monkeypatch: pytest.MonkeyPatch, kind: str, correct: bool, two: bool
 ) -> None:
     fitted = SimpleNamespace(fit=lambda grid, *, two_intervals: (grid, two_intervals))
-    monkeypatch.setattr(thresholds, "analysis_grid", lambda *_, **__: "grid")
     monkeypatch.setattr(thresholds, "given_by", lambda *_: fitted)
+    stimulus = SimpleNamespace(analysis_grid=lambda *_: "grid")
     block: Any = SimpleNamespace(
-        stimulus="s", assumed="a", design=SimpleNamespace(kind=kind), has_correct_answer=correct
+        stimulus=stimulus, assumed="a", design=SimpleNamespace(kind=kind), has_correct_answer=correct
     )
     rows = pd.DataFrame({"participant": ["P1", "P2"], "session": [1, 1]})
     assert thresholds._flat_fits(block, rows) == {"P1": ("grid", two), "P2": ("grid", two)}

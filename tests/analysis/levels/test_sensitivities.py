@@ -12,7 +12,6 @@ from scipy.stats import binomtest, norm
 
 from study_app.analysis.data.blocks import LevelBlock
 from study_app.analysis.levels.sensitivities import Sensitivities, SensitivityEstimate, preferences, sensitivities
-from study_app.protocol.presented.presentation import arrangement_text
 from study_app.protocol.trials.designs import Rated, default_design
 from study_app.protocol.trials.stimuli import Stimulus
 from study_app.psychophysics.detection import different_rate, proportion_correct
@@ -28,7 +27,7 @@ def rows(design: str, chosen: dict[int, float], answers: tuple[str, str], person
     """Return rows in which the first of two answers has a given share at each arrangement."""
     kind, found = default_design(design), []
     for arrangement, share in chosen.items():
-        letters = arrangement_text(kind, arrangement)
+        letters = kind.arrangement_text(arrangement)
         for number in range(TRIALS):
             answer = answers[0] if number < round(share * TRIALS) else answers[1]
             found.append((person, "b", 8.0, "8/1", 0.2, letters, answer, None, True))
@@ -61,7 +60,7 @@ def test_a_preference_for_an_interval_is_named(bias: float, least: float, most: 
         for number in range(100):
             shift = (1.3 if number % 2 == 0 else -1.3) + bias
             first = draw.random() < norm.cdf(shift / math.sqrt(2))
-            letters = arrangement_text(default_design("2ifc"), number % 2)
+            letters = default_design("2ifc").arrangement_text(number % 2)
             found.append((f"P{person}", "b", 8.0, "8/1", 0.2, letters, "first" if first else "second", None, True))
     _, *people = sensitivities(block("2ifc"), pd.DataFrame(found, columns=NAMES))
     biased = preferences(people)
@@ -102,7 +101,7 @@ def test_designs_without_a_criterion_have_d_prime_from_the_share_correct(design:
     for arrangement in range(len(kind.arrangements)):
         right = str(kind.correct(arrangement))
         wrong = next(answer for answer in kind.answers if answer != right)
-        letters = arrangement_text(kind, arrangement)
+        letters = kind.arrangement_text(arrangement)
         for number in range(5000):
             answer = right if number < share * 5000 else wrong
             found.append(("P001", "b", 8.0, "8/1", 0.2, letters, answer, None, True))
@@ -124,7 +123,7 @@ def test_a_d_prime_from_correct_answers_alone_is_called_a_lower_limit() -> None:
             arrangement = number % len(kind.arrangements)
             right = str(kind.correct(arrangement))
             wrong = next(answer for answer in kind.answers if answer != right)
-            letters = arrangement_text(kind, arrangement)
+            letters = kind.arrangement_text(arrangement)
             answer = wrong if number in wrong_trials else right
             found.append((person, "b", 8.0, "8/1", 0.2, letters, answer, None, True))
     _, *people = sensitivities(block("abx", settings=ONE), pd.DataFrame(found, columns=NAMES))

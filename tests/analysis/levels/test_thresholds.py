@@ -15,14 +15,7 @@ from study_app.analysis.statistics.thresholds import group_mean, p_of_fit
 from study_app.protocol.model import Published
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import QuestPlus, TrackSetting, TrialResult, UpDown
-from study_app.protocol.trials.stimuli import (
-    LINEAR_WIDTH,
-    SESSION_SD,
-    WIDTH_PRIOR,
-    Stimulus,
-    analysis_grid,
-    assumed_for,
-)
+from study_app.protocol.trials.stimuli import LINEAR_WIDTH, SESSION_SD, WIDTH_PRIOR, Stimulus
 from study_app.psychophysics.families import Floats, rise, success
 from study_app.psychophysics.grid import evenly, fit, group_priors
 from study_app.psychophysics.person_fit import (
@@ -35,7 +28,7 @@ from study_app.psychophysics.person_fit import (
 )
 from tests.analysis.levels.level_studies import LEVELS, NAMES, STIMULUS, arranged, block, rows
 
-GRID = analysis_grid(STIMULUS, default_design("2ifc"), assumed_for(STIMULUS, default_design("2ifc")))
+GRID = STIMULUS.analysis_grid(default_design("2ifc"), STIMULUS.assumed(default_design("2ifc")))
 
 
 def test_planted_thresholds_are_found_per_participant_and_for_the_group() -> None:

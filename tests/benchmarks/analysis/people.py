@@ -22,7 +22,7 @@ import pandas as pd
 from study_app.analysis.levels.thresholds import given_by
 from study_app.analysis.planning.power_curves import interval
 from study_app.protocol.trials.designs import default_design
-from study_app.protocol.trials.stimuli import SESSION_SD, WIDTH_PRIOR, Stimulus, analysis_grid, assumed_for
+from study_app.protocol.trials.stimuli import SESSION_SD, WIDTH_PRIOR, Stimulus
 from study_app.psychophysics.families import success
 from study_app.psychophysics.grid import Z_95, Grid, Posterior, group_priors
 
@@ -97,7 +97,7 @@ def pairs(trials: pd.DataFrame, size: int, draw: np.random.Generator | None = No
         levels = own["stimulus"].to_numpy(dtype=float)
         correct = (own["target"] == own["response"]).to_numpy()
         stimulus = Stimulus(vary="damping_nspm", levels=(levels.min(), levels.max()), standards=(1.0,))
-        grid = analysis_grid(stimulus, DESIGN, assumed_for(stimulus, DESIGN))
+        grid = stimulus.analysis_grid(DESIGN, stimulus.assumed(DESIGN))
         if draw is not None:
             correct = draw.random(len(levels)) < fitted(own, correct, stimulus, grid).success(np.log10(levels))
         pieces = [slice(first, first + size) for first in range(0, len(levels) - size + 1, size)]

@@ -29,7 +29,7 @@ from study_app.analysis.levels.thresholds import ThresholdEstimate, thresholds
 from study_app.analysis.planning.power_curves import interval
 from study_app.protocol.trials.designs import default_design
 from study_app.protocol.trials.methods import default_method
-from study_app.protocol.trials.stimuli import LAPSES, Stimulus, assumed_for, running_grid
+from study_app.protocol.trials.stimuli import LAPSES, Stimulus
 from study_app.psychophysics.adaptive import Search
 from study_app.psychophysics.people import KINDS, Person
 
@@ -71,7 +71,7 @@ class Case(NamedTuple):
         """Return how QUEST+ chooses levels by default."""
         stimulus = self.stimulus
         coordinates = tuple(stimulus.coordinate(level) for level in stimulus.grid)
-        return Search(running_grid(stimulus, DESIGN, assumed_for(stimulus, DESIGN), LAPSES), coordinates, "threshold")
+        return Search(stimulus.running_grid(DESIGN, stimulus.assumed(DESIGN), LAPSES), coordinates, "threshold")
 
 
 CASES = {

@@ -9,7 +9,7 @@ from study_app.protocol.load import load
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.balance import balances, numbered_participants
 from study_app.protocol.orders.block_orders import orders_of
-from study_app.protocol.orders.durations import expected_duration_s, own_protocol, variants
+from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import build_schedule, draw_key
 from study_app.protocol.participants.groups import check_session_number, every_step, steps_of
 from study_app.protocol.randomization.streams import group_of, stream
@@ -72,7 +72,7 @@ def test_the_key_has_the_blocks_of_all_groups_and_sessions() -> None:
 
 @pytest.mark.parametrize(("group", "session"), [("first_thin", 1), ("first_thick", 2)])
 def test_parts_of_a_session_count_up(group: str, session: int) -> None:
-    trials = build_schedule(own_protocol(grouped(), group, session), "P001", 5).trials
+    trials = build_schedule(grouped().for_session(group, session), "P001", 5).trials
     assert [trial.part for trial in trials] == sorted(trial.part or 0 for trial in trials)
 
 

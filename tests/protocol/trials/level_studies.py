@@ -3,7 +3,6 @@
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Schedule, build_schedule, draw_key
-from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.presented.presentation import Presentation, next_level, trial_result
 from study_app.protocol.randomization.streams import Key, stream
 from study_app.protocol.trials.methods import TrialResult
@@ -94,7 +93,7 @@ def answered(
         due = next_level(protocol, key, schedule, trial, heard)
         if due is None:
             continue
-        design = design_of(protocol, protocol.blocks[trial.block])
+        design = protocol.design_of(protocol.blocks[trial.block])
         given = answer or design.correct(due.arrangement) or ""
         block, level = protocol.blocks[trial.block], due.level
         heard.append(trial_result(protocol, block, trial.number, trial.code, level, due.arrangement, given))

@@ -5,7 +5,6 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.presented.presentation import next_level
 from study_app.protocol.trials.methods import TrialResult
 from tests.protocol.trials.level_studies import key_of, study
@@ -21,7 +20,7 @@ def adaptive(method: str, *edits: tuple[str, str]) -> Protocol:
 def answers_of(protocol: Protocol, threshold: float, seed: int = 1) -> list[TrialResult]:
     """Return the answers of one session of an observer who is right above the threshold, and half of the time below."""
     key, schedule = key_of(protocol), build_schedule(protocol, "P001", seed)
-    design = design_of(protocol, protocol.blocks["viscosity"])
+    design = protocol.design_of(protocol.blocks["viscosity"])
     draw, heard = np.random.default_rng(seed), []
     for trial in schedule.trials:
         due = next_level(protocol, key, schedule, trial, heard)

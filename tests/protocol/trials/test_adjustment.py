@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from study_app.protocol.orders.tracks import method_of
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.stimuli import Stimulus
 from tests.protocol.trials.matching import matching
@@ -45,7 +44,7 @@ def test_a_step_is_a_fortieth_of_the_span_or_a_factor_on_log_spacing() -> None:
 
 def test_a_task_goes_on_for_as_long_as_a_setting_may_take() -> None:
     protocol = matching()
-    method = method_of(protocol, protocol.blocks["matching"])
+    method = protocol.method_of(protocol.blocks["matching"])
     assert isinstance(method, Adjustment)
     followed = protocol.tasks["stir"].lasting(method.most_s)
     assert followed.limit_s == 60.0

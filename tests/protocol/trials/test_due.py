@@ -3,7 +3,6 @@ from collections import Counter
 import pytest
 
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.presented.presentation import longest_delay_s, next_level
 from study_app.protocol.randomization.streams import Key, shuffle, stream
 from tests.protocol.trials.level_studies import SECRET, answered, key_of, run, study
@@ -56,7 +55,7 @@ def test_each_arrangement_comes_exactly_twice_in_every_2_times_arrangements_slot
     protocol = study(('design = "2ifc"', f'design = "{kind}"'), ("repetitions = 8", "repetitions = 16"))
     key = key_of(protocol, secret)
     shown = answered(protocol, key, build_schedule(protocol, "P001", 1))
-    count = len(design_of(protocol, protocol.blocks["viscosity"]).arrangements)
+    count = len(protocol.design_of(protocol.blocks["viscosity"]).arrangements)
     for code in key.codes["viscosity"]:
         arrangements = [due.arrangement for due, heard in shown if heard.code == code]
         assert len(arrangements) == 48

@@ -10,8 +10,8 @@ import pytest
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.orders.tracks import adjusting_of, design_of, tracks_of
-from study_app.protocol.presented.presentation import arrangement_text, next_level, trial_result
+from study_app.protocol.orders.tracks import tracks_of
+from study_app.protocol.presented.presentation import next_level, trial_result
 from study_app.protocol.trials.methods import TrialResult
 from tests.golden import compare
 from tests.golden_values import one_line
@@ -118,20 +118,20 @@ def presented(protocol: Protocol) -> list[str]:
         if due is None:
             continue
         block = protocol.blocks[trial.block]
-        asked = design_of(protocol, block)
+        asked = protocol.design_of(block)
         right = due.level is None or due.level > 0.4 or trial.number % 2 == 0
         answers = sorted(asked.answers, key=lambda one: (one != asked.correct(due.arrangement)) == right)
         heard.append(
             trial_result(protocol, block, trial.number, trial.code, due.level, due.arrangement, (answers or ["0"])[0])
         )
         shown = [f"{one.condition} {one.vary or ''} {one.value if one.vary else ''}".strip() for one in due.intervals]
-        letters = arrangement_text(asked, due.arrangement) if asked.arrangements else ""
+        letters = asked.arrangement_text(due.arrangement) if asked.arrangements else ""
         answered = heard[-1]
         lines.append(
             f"{trial.number} {trial.code} {key.codes[trial.block][trial.code]} {due.level} of {due.standard} {letters}"
             f"{' catch' if due.catch else ''}: {', '.join(shown)} | {answered.correct} {answered.success}"
         )
-        if (setting := adjusting_of(protocol, block, due.standard, due.level)) is not None:
+        if (setting := protocol.adjusting(block, due.standard, due.level)) is not None:
             lines.append(f"    {one_line(setting)}")
     return lines
 

@@ -5,7 +5,6 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.orders.tracks import success_name
 from study_app.protocol.trials.designs import default_design
 
 
@@ -24,5 +23,5 @@ def test_a_level_above_or_below_the_standard_makes_no_forced_choice_correct(
 ) -> None:
     weber: Any = SimpleNamespace(level_kind="weber")
     value: Any = SimpleNamespace(level_kind="value")
-    names = [success_name(default_design(design), stimulus) for stimulus in (None, weber, value)]
+    names = [default_design(design).success_of(stimulus) for stimulus in (None, weber, value)]
     assert names == [of_ratios, of_ratios, of_values]

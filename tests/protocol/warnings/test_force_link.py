@@ -7,7 +7,7 @@ from study_app.protocol.checks.force_limits import longest_delay_ms, returned_j
 from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.presented.presentation import has_imperfect_link, link_seed, scene_of
+from study_app.protocol.presented.presentation import link_seed
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Stroke
 from study_app.protocol.warnings.delayed_force import STIRRED, delay_warnings
@@ -36,16 +36,18 @@ def test_the_returned_energy_is_that_of_a_late_damper() -> None:
 
 def test_an_interval_presents_its_link() -> None:
     one = study()
-    assert has_imperfect_link(one)
-    assert not has_imperfect_link(load("rek2024"))
-    assert scene_of(one, Stimulated("water"), 7).link == ForceLink(delay_s=0.01, seed=7)
-    assert scene_of(one, Stimulated("damper"), 7).link == PROMPT_LINK
-    varied = scene_of(one, Stimulated("damper", "force_delay_ms", 80.0), 7)
+    assert one.has_imperfect_link
+    assert not load("rek2024").has_imperfect_link
+    assert one.presented_scene(Stimulated("water"), 7).link == ForceLink(delay_s=0.01, seed=7)
+    assert one.presented_scene(Stimulated("damper"), 7).link == PROMPT_LINK
+    varied = one.presented_scene(Stimulated("damper", "force_delay_ms", 80.0), 7)
     assert varied.link == ForceLink(delay_s=0.08, seed=7)
     assert varied.liquids == one.scene_for("damper").liquids
     jittered = study(("force_delay_ms = 10", "force_delay_ms = 12\nforce_jitter_ms = 3\nforce_loss = 0.1"))
-    assert scene_of(jittered, Stimulated("water"), 7).link == ForceLink(delay_s=0.012, jitter_s=0.003, loss=0.1, seed=7)
-    damping = scene_of(one, Stimulated("water", "wake.scaling", 2000.0), 7)
+    assert jittered.presented_scene(Stimulated("water"), 7).link == ForceLink(
+        delay_s=0.012, jitter_s=0.003, loss=0.1, seed=7
+    )
+    damping = one.presented_scene(Stimulated("water", "wake.scaling", 2000.0), 7)
     assert damping.link.delay_s == 0.01
     assert damping.liquids[0].wake is not None
     assert damping.liquids[0].wake.scaling == 2000

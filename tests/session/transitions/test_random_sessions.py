@@ -14,7 +14,6 @@ from study_app.errors import SessionError
 from study_app.protocol.load import load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import Trial, build_schedule, draw_key, stream
-from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import FIRST
@@ -258,7 +257,7 @@ def test_a_trial_of_intervals_has_a_page_for_each_its_question_and_its_feedback(
     index, trial = next((at, one) for at, one in enumerate(shown.schedule.steps)
                         if getattr(one, "block", "") and blocks[one.block].design is not None)  # fmt: skip
     found = pages_of_step(shown, index)
-    count = design_of(shown.protocol, blocks[trial.block]).intervals
+    count = shown.protocol.design_of(blocks[trial.block]).intervals
     assert found[: count + 1] == (*(Moment("tank", number) for number in range(1, count + 1)), Moment("questions"))
     pages = [previewed_page(shown, index, moment, "en") for moment in found]
     assert [(page.interval.number, page.interval.of) for page in pages[:count]] == [

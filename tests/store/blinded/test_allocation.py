@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 
 from study_app.errors import StoreError, StudyError
-from study_app.protocol.orders.durations import own_protocol
 from study_app.protocol.orders.schedule import stream
 from study_app.protocol.simulated import NO_FEATURES
 from study_app.session.resume import begun_schedule
@@ -77,7 +76,7 @@ def test_a_participant_keeps_the_group_in_session_2(tmp_path: Path) -> None:
                 assert ("allocated" in events(store)) == (session == 1), "once per participant"
     assert set(groups.values()) == set(GROUP_NAMES)
     own = session_protocol(study, grouped(), "P002", 2)
-    assert own.sequence == own_protocol(grouped(), groups["P002"], 2).sequence
+    assert own.sequence == grouped().for_session(groups["P002"], 2).sequence
     assert len(claims(study)) == 2
 
 
@@ -261,7 +260,7 @@ def test_a_rehearsal_allocates_from_its_seed_and_reproduces(tmp_path: Path) -> N
     for session in study.sessions():
         found = allocation_of(study, key, session.participant)
         assert found is not None
-        own = own_protocol(grouped(), found.group, 1)
+        own = grouped().for_session(found.group, 1)
         lines = journal.read(session.journal)
         trials = [line["code"] for line in raw(lines) if line["event"] == "trial_started"]
         assert trials == [trial.code for trial in begun_schedule(own, start_of(lines), key).trials]

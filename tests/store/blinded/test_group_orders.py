@@ -11,7 +11,6 @@ import pytest
 from study_app.errors import StudyError
 from study_app.protocol.load import parse
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders.durations import own_protocol
 from study_app.session.resume import begun_schedule
 from study_app.session.start import resumed_choices
 from study_app.store.blinded.allocation import allocate, claims
@@ -51,7 +50,7 @@ def begun(folder: Path, source: bytes, participant: str, **given: object) -> Ses
 def order_of(protocol: Protocol, store: SessionStore) -> tuple[str, ...]:
     """Return what a session presents, block and code of each trial: its order, where codes do not depend on chance."""
     start = start_of(store.lines)
-    own = own_protocol(protocol, participant_group(start, store.key), start.session)
+    own = protocol.for_session(participant_group(start, store.key), start.session)
     return tuple(trial.block for trial in begun_schedule(own, start, store.key).trials)
 
 

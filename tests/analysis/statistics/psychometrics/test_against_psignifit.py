@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from study_app.protocol.trials.designs import default_design
-from study_app.protocol.trials.stimuli import Family, Stimulus, analysis_grid, assumed_for
+from study_app.protocol.trials.stimuli import Family, Stimulus
 from study_app.psychophysics.families import success
 from study_app.psychophysics.grid import fit
 
@@ -47,8 +47,8 @@ def test_threshold_and_interval_are_those_of_psignifit(
     n = np.full(levels, each)
     assert n.sum() >= 300
     right = np.random.default_rng(levels).binomial(n, success(family, u, threshold, width, guess, lapse))
-    assumed = replace(assumed_for(stimulus, default_design(design)), family=family)
-    grid = analysis_grid(stimulus, default_design(design), assumed, session_sd=0.0)
+    assumed = replace(stimulus.assumed(default_design(design)), family=family)
+    grid = stimulus.analysis_grid(default_design(design), assumed, sessions=math.inf)
     ours = fit(u, right, n - right, grid)
     median, factor = assumed.width_prior
     theirs = psignifit.psignifit(

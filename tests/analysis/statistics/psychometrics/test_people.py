@@ -1,8 +1,11 @@
 """Thresholds and their intervals hold for people: published answers, and people whose functions differ in width."""
 
+import math
+
 import numpy as np
 import pytest
 
+from study_app.protocol.trials import Stimulus
 from study_app.psychophysics.grid import MANY_LAPSES
 from study_app.psychophysics.people import Person
 from tests.benchmarks.analysis import people, threshold_coverage
@@ -21,7 +24,7 @@ def test_the_interval_of_a_difference_holds_for_people_and_for_stationary_observ
 @pytest.mark.slow
 def test_without_a_spread_between_sessions_it_does_not(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
     monkeypatch.setattr(people, "STUDIES", ("checkerboard",))
-    monkeypatch.setattr(people.analysis_grid, "__defaults__", (0.0,))
+    monkeypatch.setattr(Stimulus.analysis_grid, "__defaults__", (math.inf,))
     assert people.main("1") == 3
 
 
