@@ -13,7 +13,7 @@ from study_app.analysis.data.study_tables import Study, groups_shown
 from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult
 from study_app.analysis.wording import number, with_group
 from study_app.discovery import by_name
-from study_app.protocol.questionnaires import instrument, instruments, score
+from study_app.protocol.questionnaires import instrument, instruments
 
 Numbers: TypeAlias = Mapping[str, Any]
 
@@ -192,7 +192,7 @@ def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
             if not pd.isna(response)
         }
         code = str(answers["code"].iloc[0]) if asked.where.settings else None
-        scores.append({"participant": participant, "code": code, "score": score(asked.score, answered, bounds)})
+        scores.append({"participant": participant, "code": code, "score": asked.score.compute(answered, bounds)})
     return pd.DataFrame(scores, columns=["participant", "code", "score"])
 
 

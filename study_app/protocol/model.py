@@ -29,16 +29,7 @@ from study_app.haptics.model.scene import (
 )
 from study_app.ids import file_name_fault
 from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
-from study_app.protocol.participants.groups import (
-    Group,
-    GroupAssignment,
-    Sequences,
-    Steps,
-    every_step,
-    parts_by_block,
-    sessions_differ,
-    steps_of,
-)
+from study_app.protocol.participants.groups import Group, GroupAssignment, Sequences, Sessions, Steps, parts_by_block
 from study_app.protocol.participants.raters import SimulatedParticipants
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
@@ -688,7 +679,7 @@ def _with_ids(tables: Any) -> Any:
 Named: TypeAlias = Annotated[dict[Id, _T], BeforeValidator(_with_ids)]
 
 
-class Protocol(Table):
+class Protocol(Sessions, Table):
     """The whole file."""
 
     format: Format = Field(description="Version of the file format.")
@@ -727,11 +718,6 @@ class Protocol(Table):
     def paragraphs(self, value: str | dict[str, str], language: str) -> tuple[str, ...]:
         """Return the paragraphs of a localised text."""
         return tuple(text_in(value, language).split("\n\n"))
-
-    @property
-    def steps(self) -> tuple[str, ...]:
-        """The pages, blocks and forms in session order; those of all groups and sessions if these differ."""
-        return every_step(self)
 
     @property
     def main_blocks(self) -> tuple[Block, ...]:
@@ -791,9 +777,9 @@ class Protocol(Table):
         Parts are numbered in the order of this session. A study whose sessions do not differ is returned unchanged.
         StudyError is raised if the participant has fewer sessions.
         """
-        if not sessions_differ(self):
+        if not self.sessions_differ:
             return self
-        steps = steps_of(self, group, session)
+        steps = self.session_steps(group, session)
         parts = parts_by_block(steps, {name: block.part for name, block in self.blocks.items()})
         blocks = {
             name: block.model_copy(update={"part": parts[name]}) if name in parts else block

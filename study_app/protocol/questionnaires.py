@@ -50,54 +50,54 @@ class Score(Table):
                     raise invalid(f'"{name}" is not an item of the score', key)
         return self
 
+    def compute(
+        self, answers: Mapping[str, float | str], bounds: Mapping[str, tuple[float, float] | None]
+    ) -> float | None:
+        """Return a score; None if a required answer is missing.
 
-def score(
-    rule: Score, answers: Mapping[str, float | str], bounds: Mapping[str, tuple[float, float] | None]
-) -> float | None:
-    """Return a score; None if a required answer is missing.
-
-    ``answers`` are by item the number it was answered with, or the option that was chosen; ``bounds`` its smallest and
-    largest answer, for reversed items.
-    """
-    if any(name not in answers for name in (*rule.items, *rule.weights_from)):
-        return None
-    chosen = [answers[name] for name in rule.weights_from]
-    total = weight_sum = 0.0
-    for name in rule.items:
-        value = float(answers[name])
-        if name in rule.reverse:
-            ends = bounds.get(name)
-            value = -value if ends is None else ends[0] + ends[1] - value
-        weight = float(chosen.count(name)) if rule.weights_from else rule.weights.get(name, 1.0)
-        total += weight * value
-        weight_sum += weight
-    if rule.combine == "mean":
-        if weight_sum == 0:
+        ``answers`` are by item the number it was answered with, or the option that was chosen; ``bounds`` its smallest
+        and largest answer, for reversed items.
+        """
+        if any(name not in answers for name in (*self.items, *self.weights_from)):
             return None
-        total /= weight_sum
-    return rule.factor * total + rule.offset
+        chosen = [answers[name] for name in self.weights_from]
+        total = weight_sum = 0.0
+        for name in self.items:
+            value = float(answers[name])
+            if name in self.reverse:
+                ends = bounds.get(name)
+                value = -value if ends is None else ends[0] + ends[1] - value
+            weight = float(chosen.count(name)) if self.weights_from else self.weights.get(name, 1.0)
+            total += weight * value
+            weight_sum += weight
+        if self.combine == "mean":
+            if weight_sum == 0:
+                return None
+            total /= weight_sum
+        return self.factor * total + self.offset
 
+    def range_of(self, bounds: Mapping[str, tuple[float, float] | None]) -> tuple[float, float] | None:
+        """Return the lowest and the highest possible score; None if an item or a weighted sum has no bounds.
 
-def score_range(rule: Score, bounds: Mapping[str, tuple[float, float] | None]) -> tuple[float, float] | None:
-    """Return the lowest and the highest possible score; None if an item has no bounds, or a weighted sum has none.
-
-    ``bounds`` are each item's smallest and largest answer.
-    """
-    ends = [bounds.get(name) for name in rule.items]
-    known = [pair for pair in ends if pair is not None]
-    if len(known) < len(ends) or (rule.weights_from and rule.combine == "sum"):
-        return None
-    if rule.weights_from:
-        low, high = min(low for low, _ in known), max(high for _, high in known)
-    else:
-        weights = [rule.weights.get(name, 1.0) for name in rule.items]
-        total = sum(weights) if rule.combine == "mean" else 1.0
-        if total == 0:
+        ``bounds`` are each item's smallest and largest answer.
+        """
+        ends = [bounds.get(name) for name in self.items]
+        known = [pair for pair in ends if pair is not None]
+        if len(known) < len(ends) or (self.weights_from and self.combine == "sum"):
             return None
-        weighted = [sorted(weight * end / total for end in pair) for weight, pair in zip(weights, known, strict=True)]
-        low, high = (sum(side) for side in zip(*weighted, strict=True))
-    low, high = sorted(rule.factor * end + rule.offset for end in (low, high))
-    return low, high
+        if self.weights_from:
+            low, high = min(low for low, _ in known), max(high for _, high in known)
+        else:
+            weights = [self.weights.get(name, 1.0) for name in self.items]
+            total = sum(weights) if self.combine == "mean" else 1.0
+            if total == 0:
+                return None
+            weighted = [
+                sorted(weight * end / total for end in pair) for weight, pair in zip(weights, known, strict=True)
+            ]
+            low, high = (sum(side) for side in zip(*weighted, strict=True))
+        low, high = sorted(self.factor * end + self.offset for end in (low, high))
+        return low, high
 
 
 class Questionnaire(Table):

@@ -12,9 +12,9 @@ from study_app.analysis.wording import significant
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Compared, Phase, block_titles, display_language
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
-from study_app.protocol.orders import every_step_of, follows_in
+from study_app.protocol.participants import RecordedSessions
 from study_app.protocol.presented import link_descriptions
-from study_app.protocol.questionnaires import Score, instruments, published_name, score_range
+from study_app.protocol.questionnaires import Score, instruments, published_name
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.source import text_in
 from study_app.protocol.trials import DELAY, DESIGN_KINDS, OF_LINK, Assumed, Design, Method, Stimulus, default_design
@@ -148,7 +148,11 @@ def _of_condition(condition: Mapping[str, Any], code: str, name: str) -> Setting
 
 def main_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[Block, ...]:
     """Return the main blocks with questions, in session order, from the protocol in a receipt."""
-    asked = [protocol["blocks"][step] for step in every_step_of(protocol) if step in protocol["blocks"]]
+    asked = [
+        protocol["blocks"][step]
+        for step in RecordedSessions.model_validate(protocol).steps
+        if step in protocol["blocks"]
+    ]
     return tuple(
         _block(protocol, block, block_titles(protocol)[block["id"]], key)
         for block in asked
@@ -319,7 +323,9 @@ def contrasts_of(key: Key) -> tuple[Contrast, ...]:
 
 def level_blocks(protocol: Mapping[str, Any], key: Key | None) -> tuple[LevelBlock, ...]:
     """Return the blocks with a design from a receipt's protocol, in session order; the key must be open."""
-    steps = [step for step in every_step_of(protocol) if "slots" in protocol["blocks"].get(step, {})]
+    steps = [
+        step for step in RecordedSessions.model_validate(protocol).steps if "slots" in protocol["blocks"].get(step, {})
+    ]
     whole = complete_protocol(protocol, key) if key is not None and steps else None
     return tuple(_level_block(protocol, step, key, whole) for step in steps)
 
@@ -580,7 +586,7 @@ class PlacedScore:
     @property
     def bounds(self) -> tuple[float, float] | None:
         """The lowest and the highest possible score; None if there are none."""
-        return score_range(self.score, {question.id: question.scale_ends for question in self.questions})
+        return self.score.range_of({question.id: question.scale_ends for question in self.questions})
 
 
 @dataclass(frozen=True, slots=True)
@@ -613,15 +619,15 @@ def other_questions(protocol: Mapping[str, Any], key: Key | None) -> OtherQuesti
 
 
 def _questionnaires(protocol: Mapping[str, Any], key: Key | None) -> Iterator[tuple[QuestionPlace, Mapping[str, Any]]]:
-    titles = block_titles(protocol)
-    for step in every_step_of(protocol):
+    titles, sessions = block_titles(protocol), RecordedSessions.model_validate(protocol)
+    for step in sessions.steps:
         if step in protocol["blocks"]:
             block = protocol["blocks"][step]
             if block["phase"] == "main" and block["questionnaire"] is not None:
                 where = QuestionPlace(step, titles[step], False, _settings_in(protocol, step, key))
                 yield where, protocol["questionnaires"][block["questionnaire"]]
         elif step in protocol["questionnaires"]:
-            table, after = protocol["questionnaires"][step], follows_in(protocol, step)
+            table, after = protocol["questionnaires"][step], sessions.follows(step)
             labels = ((START, "At the start") if name is None else (name, f"{AFTER}{titles[name]}") for name in after)
             settings = tuple(Setting(code=name, condition=name, label=label) for name, label in labels)
             yield QuestionPlace(step, _form_title(protocol, step), True, settings), table

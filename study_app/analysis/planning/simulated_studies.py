@@ -27,7 +27,7 @@ from study_app.analysis.statistics.outcome import FEW, SIDES, doubled_ranks, fal
 from study_app.errors import AnalysisError
 from study_app.protocol.blocks import Block, display_language
 from study_app.protocol.model import Contrast, Protocol
-from study_app.protocol.participants import LAPSE_POINTS, SimulatedParticipants, compared_kinds, groups_with
+from study_app.protocol.participants import LAPSE_POINTS, SimulatedParticipants, compared_kinds
 from study_app.protocol.questions import POINTS, Question
 from study_app.protocol.simulated import OPINIONS, TrialFeatures, rater, simulate_ratings
 from study_app.protocol.source import text_in
@@ -145,7 +145,7 @@ def _planned(protocol: Protocol, block: Block, features: ConditionFeatures, lang
     conditions = {name: protocol.conditions[name] for name in block.conditions}
     kind = protocol.compared_in(block.id)
     assert kind is not None  # noqa: S101 - a main block
-    having = groups_with(protocol, block.id)
+    having = protocol.groups_with(block.id)
     names = sorted(conditions, key=lambda name: conditions[name].delay_ms) if kind == "delays" else list(conditions)
     return Planned(
         id=block.id,

@@ -18,8 +18,7 @@ from study_app.analysis.planned_exclusions import NEED_KEY, proposals, rule_cond
 from study_app.analysis.results import BlockResult, Results, lead_phrase, said_of_presentations
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.protocol.blocks import block_titles
-from study_app.protocol.orders import session_steps_of
-from study_app.protocol.participants import blocks_before
+from study_app.protocol.participants import RecordedSessions
 from study_app.protocol.quantities import liquid_words
 from study_app.store.unblinding import RULES
 
@@ -298,10 +297,11 @@ def _questionnaires(study: Study) -> Iterator[str]:
     asked_in = (question.where for question in study.others.questions if question.where.is_form)
     forms = Counter((where.id, where.title) for where in asked_in)
     for (form, title), questions in forms.items():
-        sessions = list(session_steps_of(study.protocol))
-        times = list(dict.fromkeys(_form_times(study, steps, form) for steps in sessions if form in steps))
+        sessions = RecordedSessions.model_validate(study.protocol)
+        every = list(sessions.every_session())
+        times = list(dict.fromkeys(_form_times(study, sessions, steps, form) for steps in every if form in steps))
         differ = ", depending on the group or session" if len(times) > 1 else ""
-        if not differ and not all(form in steps for steps in sessions):
+        if not differ and not all(form in steps for steps in every):
             differ = ", in some groups or sessions"
         yield (
             f"Participants completed the questionnaire “{title}” ({counted(questions, 'question')}) "
@@ -309,13 +309,12 @@ def _questionnaires(study: Study) -> Iterator[str]:
         )
 
 
-def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:
+def _form_times(study: Study, sessions: RecordedSessions, steps: tuple[str, ...], form: str) -> str:
     """Return when a form is completed in a session with these steps."""
     titles = block_titles(study.protocol)
     blocks = [step for step in steps if step in titles]
-    main = {block for block in blocks if study.protocol["blocks"][block].get("phase", "main") == "main"}
-    exchanged = main if study.protocol["study"].get("block_order", "fixed") != "fixed" else set()
-    uses = list(blocks_before(steps, form, titles))
+    main = {block for block in blocks if sessions.blocks[block].phase == "main"}
+    uses = list(sessions.blocks_before(form, steps))
     if len(uses) > 1 and set(uses) == main:
         return "after each main block"
     times = [
@@ -324,7 +323,7 @@ def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:
         else "after the last block"
         if block == blocks[-1]
         else "between the blocks"
-        if block in exchanged
+        if block in sessions.exchanged_blocks
         else f"after “{titles[block]}”"
         for block in uses
     ]

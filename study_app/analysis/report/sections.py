@@ -51,7 +51,8 @@ from study_app.analysis.statistics.outcome import FEW
 from study_app.analysis.wording import counted, listed, ms, number, significant
 from study_app.discovery import by_name
 from study_app.protocol.model import RULES, quoted_title
-from study_app.protocol.orders import Evenness, session_steps_of
+from study_app.protocol.orders import Evenness
+from study_app.protocol.participants import RecordedSessions
 from study_app.store.exclusions import dated_reversals, describe_exclusion
 from study_app.store.merged import folders_of
 from study_app.store.session_progress import MISSING_PERCENT, MissingTrials, broken_limits
@@ -243,7 +244,10 @@ def _fixed_orders(study: Study, results: Results) -> Iterator[str]:
         blocks = result.contrast.blocks
         if len(blocks) < 2 or result.contrast.groups is not None:
             continue
-        orders = {tuple(step for step in steps if step in blocks) for steps in session_steps_of(study.protocol)}
+        orders = {
+            tuple(step for step in steps if step in blocks)
+            for steps in RecordedSessions.model_validate(study.protocol).every_session()
+        }
         if len(orders) == 1 and len(order := orders.pop()) == 2:
             names = dict(zip(blocks, result.compared, strict=True))
             lead = f"Hypothesis{f' {place}' if len(results.contrasts) > 1 else ''}"

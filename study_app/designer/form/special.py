@@ -58,7 +58,6 @@ from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
 from study_app.protocol.model import OF_LEVELS
 from study_app.protocol.orders import block_orders_by_group, measures_of
-from study_app.protocol.participants import follows
 from study_app.protocol.randomization import has_even_borders, row_count
 from study_app.protocol.source import entries, names, value_at
 from study_app.protocol.trials import DESIGN_KINDS, TASK_KINDS
@@ -506,7 +505,6 @@ def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
     protocol, after = valid_part(study).protocol, dict[str, tuple[tuple[str, str], ...]]()
     if protocol is None:
         return after
-    exchanged = [] if protocol.study.block_order == "fixed" else [block.id for block in protocol.main_blocks]
     for name, form in protocol.forms.items():
         title = distinct_title(study.document, ("questionnaires", name))
         words = {score: f"{capitalised(score)} score" for score in form.scores} | {
@@ -515,7 +513,7 @@ def _form_measures(study: Study) -> dict[str, tuple[tuple[str, str], ...]]:
             if item.value_type != "text"
         }
         measures = tuple((f"{name}/{measure}", f"{label} ({title})") for measure, label in words.items())
-        for block in filter(None, follows(protocol, name, protocol.blocks, exchanged)):
+        for block in filter(None, protocol.follows(name)):
             after[block] = (*after.get(block, ()), *measures)
     return after
 

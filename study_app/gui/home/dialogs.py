@@ -27,7 +27,6 @@ from study_app.gui.widgets.controls import ActionButton
 from study_app.gui.widgets.labels import Ink, label, set_ink
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.participants import check_session_number
 from study_app.protocol.source import source_bytes
 from study_app.protocol.warnings import check_translated
 from study_app.protocol.wording import LANGUAGES, language_name
@@ -446,7 +445,7 @@ class NewSessionDialog(QDialog):
         state.used.check_unused(participant, session)
         protocol, group, row_of = self.facts.protocol, self._value("group"), self._value("row_of")
         check_row(row_of, protocol)
-        check_session_number(protocol, session)
+        protocol.check_session_number(session)
         if protocol.asks_group and group is None:
             raise _ChoiceMissing("choose the participant's group")
         check_choice(protocol, state.held, participant, group=group, row_of=row_of)

@@ -15,7 +15,6 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.tracks import measures_of, tracks_of
-from study_app.protocol.participants.groups import follows
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, unknown_name
@@ -204,8 +203,7 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
 
 def _check_form(protocol: Protocol, contrast: Contrast, form: str, block: str, place: Path) -> Iterator[Fault]:
     """Check that a form is asked after a block of a contrast, and has its measure."""
-    exchanged = [] if protocol.study.block_order == "fixed" else [main.id for main in protocol.main_blocks]
-    if block not in follows(protocol, form, protocol.blocks, exchanged):
+    if block not in protocol.follows(form):
         yield Fault((*place, "form"), f"{form} does not follow every block in the comparison", f"add it after {block}")
     asked = protocol.questionnaires[form]
     known = [*(item.id for item in asked.items if item.value_type != "text"), *asked.scores]

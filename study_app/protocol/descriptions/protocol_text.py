@@ -17,7 +17,6 @@ from study_app.protocol.orders.balance import block_order_words, planned_partici
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
 from study_app.protocol.orders.tracks import tracks_of
-from study_app.protocol.participants.groups import sessions_differ
 from study_app.protocol.presented.presentation import link_descriptions
 from study_app.protocol.presented.presented_levels import FASTER, highest_damping
 from study_app.protocol.quantities import liquid_words, quantity
@@ -116,7 +115,7 @@ def _head_lines(protocol: Protocol, language: str) -> Iterable[str]:
         ("Parts", f"{protocol.parts}"),
         *([("Groups", _GROUP_WORDS[study.group_assignment])] if protocol.groups else ()),
         *(("Group", f"{name}, share {group.share}") for name, group in protocol.groups.items()),
-        ("Answers", f"{number_range(counts)} per {'session' if sessions_differ(protocol) else 'participant'}"),
+        ("Answers", f"{number_range(counts)} per {'session' if protocol.sessions_differ else 'participant'}"),
         ("Blinding", _BLINDINGS[study.blinding]),
         ("Expected duration", f"about {number_range(minutes)} min"),
         ("Force limit", f"{device.force_limit_n:g} N"),

@@ -8,14 +8,7 @@ from study_app.protocol.orders.balance import (
     evenness,
     numbered_participants,
 )
-from study_app.protocol.orders.block_orders import (
-    block_codes,
-    every_step_of,
-    follows_in,
-    order_of,
-    orders_of,
-    session_steps_of,
-)
+from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
 from study_app.protocol.orders.durations import (
     ANSWER_S,
     CHOICE_S,
@@ -56,16 +49,13 @@ __all__ = [
     "draw_key",
     "duration_range_s",
     "evenness",
-    "every_step_of",
     "expected_duration_s",
-    "follows_in",
     "measures_of",
     "numbered_participants",
     "order_of",
     "orders_of",
     "recordings_of",
     "reproduce",
-    "session_steps_of",
     "step_duration_s",
     "tracks_of",
     "variants",

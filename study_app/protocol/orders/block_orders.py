@@ -1,15 +1,11 @@
 """Exactly what scheduling needs to know of a study: no conditions, no texts, no tasks."""
 
-from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
-
-from pydantic import BaseModel, ConfigDict
 
 from study_app.protocol.blocks import Block, Order, OrderOfBlocks, Phase
 from study_app.protocol.model import Protocol, Questionnaire
 from study_app.protocol.orders.tracks import tracks_of
-from study_app.protocol.participants.groups import Group, every_step, follows, session_steps
 from study_app.protocol.trials.methods import TrackOrder
 
 CodeOrder: TypeAlias = Literal[Order, TrackOrder]
@@ -111,31 +107,6 @@ def order_of(protocol: Protocol, block: Block) -> BlockOrder:
     questions = protocol.questionnaire_of(block.id)
     codes, about = block_codes(protocol, block), same | _items(questions)
     return BlockOrder(id=block.id, codes=codes, order=order, slots=slots, **about)
-
-
-class _KeptSteps(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="ignore", defer_build=True)
-    sequence: tuple[str, ...] = ()
-    sequences: tuple[tuple[str, ...], ...] = ()
-    groups: dict[str, Group] = {}
-
-
-def every_step_of(protocol: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return the unique steps of all groups and sessions in a receipt's protocol (ValueError: it has none)."""
-    return tuple(dict.fromkeys(every_step(_KeptSteps.model_validate(protocol))))
-
-
-def session_steps_of(protocol: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
-    """Yield the steps of each session of each group in a receipt's protocol."""
-    return session_steps(_KeptSteps.model_validate(protocol))
-
-
-def follows_in(protocol: Mapping[str, Any], form: str) -> tuple[str | None, ...]:
-    """Return the result of `follows` for the protocol in a receipt."""
-    blocks = protocol["blocks"]
-    main = [name for name, block in blocks.items() if block.get("phase", "main") == "main"]
-    exchanged = main if protocol["study"].get("block_order", "fixed") != "fixed" else ()
-    return follows(_KeptSteps.model_validate(protocol), form, blocks, exchanged)
 
 
 def _items(questions: Questionnaire | None) -> dict[str, Any]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from study_app.protocol.model import Block, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.participants.groups import session_count
 from study_app.protocol.trials.methods import Adjustment
 from study_app.protocol.trials.tasks import AnyTask
 
@@ -30,7 +29,7 @@ class Variant:
 def variants(protocol: Protocol) -> Iterator[Variant]:
     """Yield each kind of session of a study; a single one if all sessions are alike."""
     for group in protocol.groups or (None,):
-        count = session_count(protocol, group)
+        count = protocol.session_count(group)
         for session in range(1, (count or 1) + 1):
             own = protocol.for_session(group, session)
             yield Variant(group, session if count is not None else None, own)

@@ -1,19 +1,8 @@
 """Groups of participants, and how simulated participants answer."""
 
-from study_app.protocol.participants.groups import (
-    ASSIGNMENT,
-    EACH_GROUP,
-    blocks_before,
-    check_session_number,
-    follows,
-    groups_with,
-    next_group,
-    sequences_in,
-)
+from study_app.protocol.participants.groups import ASSIGNMENT, EACH_GROUP, RecordedSessions, next_group, sequences_in
 from study_app.protocol.participants.raters import (
-    CONSISTENT,
     LAPSE_POINTS,
-    NOISY,
     REHEARSED,
     STATED,
     SimulatedParticipants,
@@ -22,18 +11,13 @@ from study_app.protocol.participants.raters import (
 
 __all__ = [
     "ASSIGNMENT",
-    "CONSISTENT",
     "EACH_GROUP",
     "LAPSE_POINTS",
-    "NOISY",
     "REHEARSED",
     "STATED",
+    "RecordedSessions",
     "SimulatedParticipants",
-    "blocks_before",
-    "check_session_number",
     "compared_kinds",
-    "follows",
-    "groups_with",
     "next_group",
     "sequences_in",
 ]

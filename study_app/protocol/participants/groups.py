@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable, Iterator, Mapping
-from typing import Annotated, Any, Final, Literal, Protocol, Self, TypeAlias
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from study_app.errors import StudyError
 from study_app.haptics.model.ranges import later, within
@@ -60,41 +60,119 @@ def next_group(shares: Mapping[str, int], sizes: Mapping[str, int]) -> str:
     return min(shares, key=lambda name: sizes.get(name, 0) / shares[name])
 
 
-class HasSteps(Protocol):
-    """A protocol, read from its file or from a receipt."""
+class Sessions:
+    """The steps of a study's sessions, in its file or in a receipt."""
+
+    if TYPE_CHECKING:
+        sequence: Steps
+        sequences: Sequences
+        groups: dict[str, Group]
+        blocks: Any
+        study: Any
 
     @property
-    def sequence(self) -> Steps: ...  # noqa: D102
+    def steps(self) -> Steps:
+        """The pages, blocks and forms in session order; those of all groups and sessions if these differ."""
+        if not self.sessions_differ:
+            return self.sequence
+        return tuple(dict.fromkeys(step for group in self.groups or (None,) for step in self._steps_of_group(group)))
+
     @property
-    def sequences(self) -> Sequences: ...  # noqa: D102
+    def sessions_differ(self) -> bool:
+        """Whether sessions of this study can have different steps."""
+        return bool(self.groups or self.sequences)
+
     @property
-    def groups(self) -> Mapping[str, Group]: ...  # noqa: D102
+    def exchanged_blocks(self) -> tuple[str, ...]:
+        """The blocks whose order differs between participants: the main ones, unless their order is fixed."""
+        main = (name for name, block in self.blocks.items() if block.phase == "main")
+        return () if self.study.block_order == "fixed" else tuple(main)
+
+    def session_count(self, group: str | None) -> int | None:
+        """Return the number of sessions of a participant in a group; None: unlimited, all with the same steps."""
+        return len(self._sequences_of(group)) or None
+
+    def session_steps(self, group: str | None, session: int) -> Steps:
+        """Return the steps of a participant's session (from 1) in a group; StudyError if there are fewer sessions."""
+        sequences = self._sequences_of(group)
+        if not sequences:
+            own = () if group is None else self.groups[group].sequence
+            return own or self.sequence
+        if session > len(sequences):
+            raise _session_number_error(session, len(sequences))
+        return sequences[session - 1]
+
+    def check_session_number(self, session: int) -> None:
+        """Raise StudyError if no group has this session."""
+        counts = [self.session_count(group) for group in self.groups or (None,)]
+        known = [count for count in counts if count is not None]
+        if len(known) == len(counts) and session > max(known):
+            raise _session_number_error(session, max(known))
+
+    def every_session(self) -> Iterator[Steps]:
+        """Yield the steps of each session of each group."""
+        for group in self.groups or (None,):
+            yield from self._sequences_of(group) or (self.session_steps(group, 1),)
+
+    def groups_with(self, step: str) -> tuple[str, ...]:
+        """Return the groups whose sessions contain a step; empty in a study without groups."""
+        return tuple(group for group in self.groups if step in self._steps_of_group(group))
+
+    def blocks_before(self, form: str, steps: Steps) -> Iterator[str | None]:
+        """Yield the last block before each use of a form in a session, None before the first block."""
+        before: str | None = None
+        for step in steps:
+            if step == form:
+                yield before
+            before = step if step in self.blocks else before
+
+    def follows(self, form: str) -> tuple[str | None, ...]:
+        """Return the blocks before each use of a form, None before the first; empty if no session has it twice.
+
+        If main blocks are exchanged, any of them that a session has can precede the form.
+        """
+        preceding: dict[str | None, None] = {}
+        again, exchanged = False, self.exchanged_blocks
+        for steps in self.every_session():
+            again |= steps.count(form) > 1
+            for before in self.blocks_before(form, steps):
+                exchange = [block for block in steps if block in exchanged] if before in exchanged else [before]
+                preceding |= dict.fromkeys(exchange)
+        return tuple(preceding) if again else ()
+
+    def _sequences_of(self, group: str | None) -> Sequences:
+        own = None if group is None else self.groups[group]
+        return self.sequences if own is None or not (own.sequence or own.sequences) else own.sequences
+
+    def _steps_of_group(self, group: str | None) -> Steps:
+        return sum(self._sequences_of(group) or (self.session_steps(group, 1),), ())
 
 
-def sessions_differ(protocol: HasSteps) -> bool:
-    """Return whether sessions of this study can have different steps."""
-    return bool(protocol.groups or protocol.sequences)
+class _Recorded(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="ignore")
 
 
-def session_count(protocol: HasSteps, group: str | None) -> int | None:
-    """Return the number of sessions of a participant in a group; None: unlimited, all with the same steps."""
-    return len(_sequences(protocol, group)) or None
+class _RecordedStudy(_Recorded):
+    block_order: str = "fixed"
 
 
-def steps_of(protocol: HasSteps, group: str | None, session: int) -> Steps:
-    """Return the steps of a participant's session (from 1) in a group; StudyError if there are fewer sessions."""
-    sequences = _sequences(protocol, group)
-    if not sequences:
-        own = () if group is None else protocol.groups[group].sequence
-        return own or protocol.sequence
-    if session > len(sequences):
-        raise _session_number_error(session, len(sequences))
-    return sequences[session - 1]
+class _RecordedBlock(_Recorded):
+    phase: str = "main"
 
 
-def _sequences(protocol: HasSteps, group: str | None) -> Sequences:
-    own = None if group is None else protocol.groups[group]
-    return protocol.sequences if own is None or not (own.sequence or own.sequences) else own.sequences
+class RecordedSessions(Sessions, _Recorded):
+    """The sessions of the protocol in a receipt (ValueError: it has none)."""
+
+    study: _RecordedStudy = _RecordedStudy()
+    blocks: dict[str, _RecordedBlock] = {}
+    sequence: tuple[str, ...] = ()
+    sequences: tuple[tuple[str, ...], ...] = ()
+    groups: dict[str, Group] = {}
+
+    @property
+    def steps(self) -> Steps:
+        """The steps of all groups and sessions without duplicates, in order of first use."""
+        return tuple(dict.fromkeys(super().steps))
 
 
 def _session_number_error(session: int, last: int) -> StudyError:
@@ -104,63 +182,6 @@ def _session_number_error(session: int, last: int) -> StudyError:
         f"session {session} does not exist: the key sequences defines "
         f"{'1 session' if last == 1 else f'{last} sessions'} for each participant; permitted: {permitted}"
     )
-
-
-def check_session_number(protocol: HasSteps, session: int) -> None:
-    """Raise StudyError if no group has this session."""
-    counts = [session_count(protocol, group) for group in protocol.groups or (None,)]
-    known = [count for count in counts if count is not None]
-    if len(known) == len(counts) and session > max(known):
-        raise _session_number_error(session, max(known))
-
-
-def every_step(protocol: HasSteps) -> Steps:
-    """Return the steps of all groups and sessions without duplicates, in order of first use."""
-    if not sessions_differ(protocol):
-        return protocol.sequence
-    of_groups = (_steps_of_group(protocol, group) for group in protocol.groups or (None,))
-    return tuple(dict.fromkeys(step for steps in of_groups for step in steps))
-
-
-def follows(
-    protocol: HasSteps, form: str, blocks: Container[str], exchanged: Container[str] = ()
-) -> tuple[str | None, ...]:
-    """Return the blocks before each use of a form, None before the first; empty if no session has it twice.
-
-    After one of the blocks that are ``exchanged``, any of them that a session has can follow.
-    """
-    preceding: dict[str | None, None] = {}
-    again = False
-    for steps in session_steps(protocol):
-        again |= steps.count(form) > 1
-        for before in blocks_before(steps, form, blocks):
-            exchange = [block for block in steps if block in exchanged] if before in exchanged else [before]
-            preceding |= dict.fromkeys(exchange)
-    return tuple(preceding) if again else ()
-
-
-def blocks_before(steps: Steps, form: str, blocks: Container[str]) -> Iterator[str | None]:
-    """Yield the last block before each use of a form in a session, None before the first block."""
-    before: str | None = None
-    for step in steps:
-        if step == form:
-            yield before
-        before = step if step in blocks else before
-
-
-def session_steps(protocol: HasSteps) -> Iterator[Steps]:
-    """Yield the steps of each session of each group."""
-    for group in protocol.groups or (None,):
-        yield from _sequences(protocol, group) or (steps_of(protocol, group, 1),)
-
-
-def groups_with(protocol: HasSteps, step: str) -> tuple[str, ...]:
-    """Return the groups whose sessions contain a step; empty in a study without groups."""
-    return tuple(group for group in protocol.groups if step in _steps_of_group(protocol, group))
-
-
-def _steps_of_group(protocol: HasSteps, group: str | None) -> Steps:
-    return sum(_sequences(protocol, group) or (steps_of(protocol, group, 1),), ())
 
 
 def parts_by_block(steps: Iterable[str], parts: Mapping[str, int | None]) -> dict[str, int]:

@@ -25,7 +25,7 @@ from typing import Any, Final, NamedTuple
 
 from study_app.errors import StoreError, StudyError
 from study_app.protocol.model import Protocol
-from study_app.protocol.participants import check_session_number, next_group
+from study_app.protocol.participants import next_group
 from study_app.protocol.randomization import enrolment_number, group_of
 from study_app.store.blinded.blinding import Key, read_key
 from study_app.store.blinded.sealing import open_text, seal_values
@@ -210,7 +210,7 @@ def check_session(
         No participant has this session, or the group has fewer; group or replaced participant are rejected
         (`check_choice`); or the study's key cannot be read.
     """
-    check_session_number(protocol, session)
+    protocol.check_session_number(session)
     check_choice(protocol, claims(study), participant, group=group, row_of=row_of)
     if protocol.groups and is_there(study.key):
         known = allocation_of(study, read_key(study.path), participant)

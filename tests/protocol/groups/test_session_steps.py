@@ -11,7 +11,6 @@ from study_app.protocol.orders.balance import balances, numbered_participants
 from study_app.protocol.orders.block_orders import orders_of
 from study_app.protocol.orders.durations import expected_duration_s, variants
 from study_app.protocol.orders.schedule import build_schedule, draw_key
-from study_app.protocol.participants.groups import check_session_number, every_step, steps_of
 from study_app.protocol.randomization.streams import group_of, stream
 from tests.protocol.groups.grouped import grouped
 
@@ -27,31 +26,31 @@ def sessions() -> Protocol:
 def test_a_group_has_its_own_sequence_in_every_session() -> None:
     study = grouped()
     for session in (1, 2, 7):
-        assert steps_of(study, "first_thin", session) == ("hello", "thin", "thick", "end")
-        assert steps_of(study, "first_thick", session) == ("hello", "thick", "thin")
-    assert every_step(study) == study.steps == ("hello", "thin", "thick", "end")
-    check_session_number(study, 99)
+        assert study.session_steps("first_thin", session) == ("hello", "thin", "thick", "end")
+        assert study.session_steps("first_thick", session) == ("hello", "thick", "thin")
+    assert study.steps == ("hello", "thin", "thick", "end")
+    study.check_session_number(99)
 
 
 def test_a_group_without_a_sequence_has_that_of_the_study() -> None:
     groups = '[groups.own]\nsequences = [["thick"], ["thin"]]\n[groups.other]\nshare = 2\n'
     study = grouped((HEAD, f'{HEAD}sequence = ["hello", "thin", "end"]\n'), groups=groups)
-    assert steps_of(study, "other", 3) == ("hello", "thin", "end")
-    assert steps_of(study, "own", 2) == ("thin",)
-    check_session_number(study, 3)
+    assert study.session_steps("other", 3) == ("hello", "thin", "end")
+    assert study.session_steps("own", 2) == ("thin",)
+    study.check_session_number(3)
     assert study.steps == ("thick", "thin", "hello", "end")
 
 
 def test_a_session_beyond_the_last_is_refused() -> None:
     study = sessions()
-    assert steps_of(study, None, 2) == ("thick", "thin", "end")
-    for refused in (lambda: steps_of(study, None, 3), lambda: check_session_number(study, 3)):
+    assert study.session_steps(None, 2) == ("thick", "thin", "end")
+    for refused in (lambda: study.session_steps(None, 3), lambda: study.check_session_number(3)):
         with pytest.raises(
             StudyError,
             match=r"^session 3 does not exist: .* defines 2 sessions for each participant; permitted: 1 to 2$",
         ):
             refused()
-    check_session_number(study, 2)
+    study.check_session_number(2)
 
 
 def test_a_session_has_its_own_blocks_forms_parts_and_duration() -> None:

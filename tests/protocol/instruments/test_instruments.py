@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.questionnaires import Score, instrument, instruments, score, score_range
+from study_app.protocol.questionnaires import Score, instrument, instruments
 
 ITEMS = {"nasa-tlx": 6, "nasa-tlx-weighted": 21, "sus": 10, "ipq": 14, "panas": 20, "ssq": 16, "ueq": 26}
 WITH_TEXTS = {"nasa-tlx", "nasa-tlx-weighted", "sus"}
@@ -38,9 +38,9 @@ def test_published_and_worked_scores(case: dict[str, Any]) -> None:
     bounds = {item["id"]: bounds_of(item, found) for item in found["items"] if item["kind"] != "choice"}
     for which, expected in case["scores"].items():
         counted = Score.model_validate(found["scores"][which])
-        assert score(counted, answers, bounds) == pytest.approx(expected)
+        assert counted.compute(answers, bounds) == pytest.approx(expected)
         without = {item: answer for item, answer in answers.items() if item != counted.items[0]}
-        assert score(counted, without, bounds) is None
+        assert counted.compute(without, bounds) is None
 
 
 RANGES = {
@@ -54,16 +54,16 @@ RANGES = {
 def test_scores_have_their_published_range(name: str, which: str) -> None:
     found = instrument(name)
     bounds = {item["id"]: bounds_of(item, found) for item in found["items"] if item["kind"] != "choice"}
-    assert score_range(Score.model_validate(found["scores"][which]), bounds) == pytest.approx(RANGES[name, which])
+    assert Score.model_validate(found["scores"][which]).range_of(bounds) == pytest.approx(RANGES[name, which])
 
 
 def test_the_range_of_a_score_of_reversed_and_weighted_items() -> None:
     """Items from 1 to 7 and from 0 to 10 with the weights 2 and −1: the sum is from 2 − 10 to 14 − 0."""
     rule = {"items": ["calm", "tense"], "reverse": ["calm"], "combine": "sum", "weights": {"calm": 2, "tense": -1}}
     bounds = {"calm": (1.0, 7.0), "tense": (0.0, 10.0)}
-    assert score_range(Score.model_validate(rule), bounds) == (-8, 14)
-    assert score_range(Score.model_validate(rule | {"factor": -0.5, "offset": 3}), bounds) == (-4, 7)
-    assert score_range(Score.model_validate(rule), bounds | {"tense": None}) is None
+    assert Score.model_validate(rule).range_of(bounds) == (-8, 14)
+    assert Score.model_validate(rule | {"factor": -0.5, "offset": 3}).range_of(bounds) == (-4, 7)
+    assert Score.model_validate(rule).range_of(bounds | {"tense": None}) is None
 
 
 @pytest.mark.parametrize("name", PUBLISHED["items"])
