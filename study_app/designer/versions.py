@@ -40,7 +40,7 @@ from study_app.gui.widgets import (
 from study_app.number_text import capitalised, counted
 from study_app.protocol.descriptions import differences
 from study_app.protocol.source import Path as Place
-from study_app.protocol.source import unbundle, value_at, with_liquid_files
+from study_app.protocol.source import StudySource, value_at
 from study_app.store.files import SessionFolder
 from study_app.store.receipt import without_conditions
 from study_app.store.versions import (
@@ -250,14 +250,14 @@ class Version(NamedTuple):
 
     @property
     def text(self) -> str | None:
-        return None if self.source is None else unbundle(self.source.encode())[0].decode()
+        return None if self.source is None else StudySource.split(self.source.encode()).file.decode()
 
 
 def version_of(opened: Document, run: Run) -> Version:
     """Return a version that was run, from its stored copy or the current file."""
     source = source_of(run)
     if source is None:
-        file = with_liquid_files(opened.saved.encode(), opened.study.folder)
+        file = Study(opened.saved, opened.study.folder).source
         source = file.decode() if content_hash(file) == run.hash else None
     return Version(source, run)
 
@@ -283,9 +283,8 @@ def compare(version: Version, study: Study) -> Comparison:
         if held is None or study.protocol is None:
             return Comparison((), _FAULTY)
         return Comparison(differences(held, json.loads(json.dumps(without_conditions(study.protocol)))), _NO_COPY)
-    now = study.text
-    if unbundle(version.source.encode())[1]:  # kept with its liquid files
-        now = with_liquid_files(now.encode(), study.folder).decode()
+    has_liquids = bool(StudySource.split(version.source.encode()).liquids)  # it is kept with its liquid files
+    now = study.source.decode() if has_liquids else study.text
     before, after = (with_line_feeds(text).split("\n") for text in (version.source, now))
     _, _, *lines = unified_diff(before, after, lineterm="") if before != after else ("", "")
     return Comparison(tuple(lines), "" if lines else _EQUAL)

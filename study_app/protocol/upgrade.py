@@ -12,7 +12,7 @@ from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import read_document
 from study_app.protocol.model import FORMAT
 from study_app.protocol.source.document import entries, frozen, scan_nodes
-from study_app.protocol.source.files import TABLE, unbundle, without_byte_order_mark
+from study_app.protocol.source.files import TABLE, StudySource, without_byte_order_mark
 
 _VELOCITY: Final = 'kind = "ewma"\n'
 _ACCURACY: Final = 'without = ["unsteady_drag"]\n'
@@ -43,7 +43,7 @@ def upgraded_file(source: bytes, name: str) -> bytes:
     """
     document, _ = read_document(source, name)
     expected = {key: value for key, value in upgraded_tables(document).items() if key != TABLE}
-    content = without_byte_order_mark(unbundle(source)[0])
+    content = without_byte_order_mark(StudySource.split(source).file)
     text = content.decode().replace("\r\n", "\n")
     nodes = {node.path: node for node in scan_nodes(text)}
     if expected["scene"].get("accuracy") != document.get("scene", {}).get("accuracy"):

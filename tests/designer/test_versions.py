@@ -72,7 +72,7 @@ def test_a_copy_takes_the_liquid_files_of_its_study_along(designer: Any, tmp_pat
     again.open("mine")
     assert again.editing.opened is not None
     assert again.editing.opened.study.faults == ()
-    assert kept_content(protocol_hash(again.editing.opened.source())) is not None
+    assert kept_content(protocol_hash(again.editing.opened.study.source)) is not None
     again.place.deleteLater()
 
 

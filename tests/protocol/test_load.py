@@ -18,7 +18,7 @@ from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.file_format.scene_file import scene_text
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders.schedule import build_schedule
-from study_app.protocol.source.files import bundle, source_bytes, unbundle
+from study_app.protocol.source.files import StudySource, source_bytes
 from tests.platforms import needs_posix
 from tests.protocol.sound import EVERY_ORDER, SOUND
 
@@ -144,13 +144,13 @@ def test_whatever_is_changed_gives_a_protocol_or_a_list_of_problems(changes: lis
     ],
 )
 def test_a_liquid_file_is_found_however_its_key_is_written(text: str) -> None:
-    study, files = unbundle(bundle(text.encode(), lambda name: f"# {name}"))
-    assert (study, files) == (text.encode(), {"a.toml": "# a.toml"})
+    source = StudySource(text.encode()).with_liquids(lambda name: f"# {name}")
+    assert StudySource.split(source.content) == source == (text.encode(), {"a.toml": "# a.toml"}, {})
 
 
 def test_the_word_in_a_comment_names_no_file() -> None:
     text = b"# This file has no liquid file.\n[liquids.thick]\ndensity_kg_m3 = 1000\n"
-    assert bundle(text, lambda _name: "lost") == text
+    assert StudySource(text).with_liquids(lambda _name: "lost").content == text
 
 
 DAMPER = '[liquids.damper]\ndrag = { law = "linear", damping_nspm = 12 }\n'

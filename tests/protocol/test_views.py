@@ -8,7 +8,7 @@ import pytest
 from study_app.errors import ProtocolError
 from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, parse
-from study_app.protocol.source.files import bundle, hashes_in, protocol_hash, source_bytes, unbundle
+from study_app.protocol.source.files import StudySource, protocol_hash, source_bytes
 
 FOOTAGE = b"not decoded here"
 SEEN = '[conditions.{name}]\nliquid = "thin"\ndelay_ms = {delay}\n{keys}\n\n'
@@ -44,8 +44,8 @@ def test_a_condition_shows_a_camera_or_footage(study: Path) -> None:
 def test_the_studys_hash_covers_the_footage(study: Path) -> None:
     source = source_bytes(study)
     assert source.startswith(study.read_bytes())
-    assert unbundle(source) == (study.read_bytes(), {})
-    assert hashes_in(source) == {"waves/sea.mp4": hashlib.sha256(FOOTAGE).hexdigest()}
+    footage = {"waves/sea.mp4": hashlib.sha256(FOOTAGE).hexdigest()}
+    assert StudySource.split(source) == (study.read_bytes(), {}, footage)
     (study.parent / "waves" / "sea.mp4").write_bytes(FOOTAGE + b".")
     changed = source_bytes(study)
     assert protocol_hash(changed) != protocol_hash(source)
@@ -54,10 +54,9 @@ def test_the_studys_hash_covers_the_footage(study: Path) -> None:
 
 def test_footage_and_liquid_files_come_back_from_one_source() -> None:
     text = b'format = 2\n[liquids.a]\nfile = "a.toml"\n[conditions.a]\nview = "a.mp4"\n'
-    source = bundle(text, lambda name: f"# {name}", {"a.mp4": "00ff"})
-    assert unbundle(source) == (text, {"a.toml": "# a.toml"})
-    assert hashes_in(source) == {"a.mp4": "00ff"}
-    assert bundle(text, lambda _: None) == text
+    source = StudySource(text, footage={"a.mp4": "00ff"}).with_liquids(lambda name: f"# {name}")
+    assert StudySource.split(source.content) == source == (text, {"a.toml": "# a.toml"}, {"a.mp4": "00ff"})
+    assert StudySource(text).with_liquids(lambda _: None).content == text
 
 
 @pytest.mark.parametrize(

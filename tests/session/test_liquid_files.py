@@ -15,7 +15,7 @@ from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load, load_scenes, parse
 from study_app.protocol.orders.block_orders import block_codes
 from study_app.protocol.orders.schedule import Trial, build_schedule, stream
-from study_app.protocol.source.files import protocol_hash, source_bytes, unbundle
+from study_app.protocol.source.files import StudySource, protocol_hash, source_bytes
 from study_app.protocol.warnings.study_warnings import liquid_warnings
 from study_app.session.pages import TaskPage
 from study_app.session.replay import replay
@@ -74,11 +74,11 @@ def test_a_liquid_of_a_file_is_felt_with_its_own_ball_and_the_studys_scale(study
 
 def test_the_hash_covers_the_liquid_files_and_nothing_else_changes_it(study: Path) -> None:
     source = source_bytes(study)
-    assert unbundle(source) == (study.read_bytes(), {"liquids/syrup.toml": SYRUP})
+    assert StudySource.split(source) == (study.read_bytes(), {"liquids/syrup.toml": SYRUP}, {})
     syrup = study.parent / "liquids" / "syrup.toml"
     syrup.write_bytes(SYRUP.encode() + b"# \x7f \xf0\x9f\x8c\x8a \\ \" '''\r\n")
     assert protocol_hash(source_bytes(study)) != protocol_hash(source)
-    assert unbundle(source_bytes(study))[1]["liquids/syrup.toml"].encode() == syrup.read_bytes()
+    assert StudySource.split(source_bytes(study)).liquids["liquids/syrup.toml"].encode() == syrup.read_bytes()
     syrup.write_text(SYRUP, encoding="utf-8", newline="\n")
     assert source_bytes(study) == source
 
@@ -86,7 +86,7 @@ def test_the_hash_covers_the_liquid_files_and_nothing_else_changes_it(study: Pat
 @pytest.mark.parametrize("name", ["demo", "rek2024", "physical_liquids", str(EARLIER / "rek2024.toml")])
 def test_a_file_without_liquid_files_is_its_own_source(name: str) -> None:
     source = source_bytes(name)
-    assert unbundle(source) == (source, {})
+    assert StudySource.split(source) == (source, {}, {})
     assert b"liquid_files" not in source
     assert protocol_hash(source) == hashlib.sha256(source).hexdigest()
 

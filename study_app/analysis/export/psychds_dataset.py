@@ -2,7 +2,6 @@
 
 import json
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path, PurePosixPath
@@ -11,20 +10,9 @@ from typing import Any, Final, NamedTuple
 from study_app import __version__
 from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, stated_credits
-from study_app.errors import ProtocolError
 from study_app.number_text import counted
 from study_app.protocol.blocks import display_language
-from study_app.protocol.source import (
-    bundle,
-    file_hash,
-    has_hash,
-    known_protocols,
-    protocol_file,
-    source_bytes,
-    text_in,
-    unbundle,
-    without_byte_order_mark,
-)
+from study_app.protocol.source import file_hash, find_study_file, text_in
 from study_app.store.blinded import revealed_key
 from study_app.store.files import Column, FileCopy, open_regular, system_message
 from study_app.store.merged import read_merged
@@ -42,15 +30,15 @@ def materials(study: Study) -> Materials:
     if not study.revealed:
         return Materials({}, ())
     footage = _footage(study)
-    found = _study_file(study.name, set(study.participants["protocol_hash"]), footage)
+    found = find_study_file(study.name, set(study.participants["protocol_hash"]), footage)
     if found is None:
         return Materials({}, ("the study file", *(f"{name} (SHA-256 {footage[name]})" for name in footage)))
-    file, content, liquids = found
+    file, source = found
     shown = {name: file.parent / name for name in footage if _is_inside(name)}
     there = {name: path for name, path in shown.items() if file_hash(path) == footage[name]}
     files: dict[str, bytes | FileCopy] = {
-        file.name: content,
-        **{name: text.encode() for name, text in liquids.items() if _is_inside(name)},
+        file.name: source.file,
+        **{name: text.encode() for name, text in source.liquids.items() if _is_inside(name)},
         **{name: FileCopy(path, footage[name]) for name, path in there.items()},
     }
     missing = [
@@ -75,35 +63,10 @@ def _footage(study: Study) -> dict[str, str]:
     )
 
 
-def _study_file(study: str, hashes: set[str], footage: dict[str, str]) -> tuple[Path, bytes, dict[str, str]] | None:
-    """Return the path and content of the study's file and the texts of its liquid files, if it is on this machine."""
-    for name in known_protocols():
-        try:
-            file = protocol_file(name)
-            if not _is_of(study, file):  # the footage of other studies is not hashed: it may be large
-                continue
-            source = source_bytes(name)
-        except ProtocolError:  # possibly another study's; unreadable files cannot be shared
-            continue
-        content, liquids = unbundle(source)
-        if any(has_hash(bundle(content, liquids.get, footage), digest) for digest in hashes):
-            return file, content, liquids
-    return None
-
-
 def _is_inside(name: str) -> bool:
     """Return whether a referenced file is inside the study's folder."""
     path = PurePosixPath(name)
     return ".." not in path.parts and not path.is_absolute()
-
-
-def _is_of(study: str, file: Path) -> bool:
-    """Return whether a protocol file belongs to the study of that name."""
-    try:
-        head = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode()).get("study")
-    except (OSError, ValueError, RecursionError):
-        return False
-    return isinstance(head, dict) and head.get("name") == study
 
 
 def _why_missing(path: Path | None) -> str:

@@ -23,14 +23,12 @@ from study_app.ids import MAX_SHORT_NAME, file_name_fault, free_short_name, shor
 from study_app.number_text import counted
 from study_app.protocol.source import Path as Place
 from study_app.protocol.source import (
+    StudySource,
     did_you_mean,
     file_hash,
-    hashes_in,
     shipped,
     shipped_file,
-    unbundle,
     value_at,
-    with_liquid_files,
     without_byte_order_mark,
 )
 from study_app.protocol.wording import languages_of
@@ -336,22 +334,18 @@ class Document:
 
     # versions
 
-    def source(self) -> bytes:
-        """Return the content that a session would use: the text and the liquid files that it names."""
-        return with_liquid_files(self.study.text.encode(), self.study.folder)
-
     def standing(self, known: tuple[Run, ...]) -> Standing:
         if not any(run.sessions for run in known):
             return version_standing("", "", self.version, known)
-        base = content_hash(with_liquid_files(self.saved.encode(), self.study.folder)) if self.base else ""
-        return version_standing(content_hash(self.source()), base, self.version, known)
+        base = content_hash(Study(self.saved, self.study.folder).source) if self.base else ""
+        return version_standing(content_hash(self.study.source), base, self.version, known)
 
     def save(self, known: tuple[Run, ...]) -> None:
         """Write the file, and store the content for sessions.
 
         It is rejected if sessions were run with this version and other content, or if the file was changed outside.
         """
-        source = self.source()
+        source = self.study.source
         if others := self.standing(known).others:
             raise Refused(
                 f"version {self.version} has already been run with different content "
@@ -368,12 +362,13 @@ class Document:
         folder = self.file.resolve().parent
         if self.study.folder.resolve() == folder:
             return
-        for name, text in unbundle(source)[1].items():
+        named = StudySource.split(source)
+        for name, text in named.liquids.items():
             path = folder / name
             if path.exists() and _file_content(path) != text.encode():
                 raise Refused(f"{path} already exists and contains a different liquid: rename one of the two files")
             write_whole(path, text.encode())
-        for name, digest in hashes_in(source).items():
+        for name, digest in named.footage.items():
             if (digest_here := file_hash(folder / name)) is None:
                 try:
                     (folder / name).parent.mkdir(parents=True, exist_ok=True)

@@ -44,14 +44,15 @@ class Study:
     unfinished: tuple[Entry, ...] = field(default=(), compare=False)
 
     @cached_property
-    def _source(self) -> bytes:
+    def source(self) -> bytes:
+        """The content that a session would use: the text and the liquid files that it names."""
         return with_liquid_files(self.text.encode(), self.folder)
 
     @cached_property
     def _read(self) -> tuple[dict[str, Any] | None, Places, tuple[Problem, ...]]:
         """The document with its liquid files and line numbers, or None and the problem if it is not TOML."""
         try:
-            return *read_document(self._source, ""), ()
+            return *read_document(self.source, ""), ()
         except ProtocolError as error:
             return None, Places(""), error.problems
 
@@ -69,7 +70,7 @@ class Study:
         document = self._read[0]
         if document is None:
             return self.before
-        bundled = self._source != self.text.encode()
+        bundled = self.source != self.text.encode()
         return {key: value for key, value in document.items() if key != TABLE} if bundled else document
 
     @property

@@ -25,7 +25,7 @@ from study_app.lab.ab_comparison import Side as LabSide
 from study_app.lab.parameters import parameter
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import FormStep, PageStep, Step, Trial, build_schedule, variants
-from study_app.protocol.source import Path, has, liquid_file_name, unbundle, value_at, with_liquid_files
+from study_app.protocol.source import Path, StudySource, has, liquid_file_name, value_at
 from study_app.protocol.wording import language_name, languages_of
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
@@ -237,7 +237,7 @@ _MOST_EARLIER: Final = 5
 def last_valid_study(opened: Document) -> Study | None:
     """Return the study in the file, or in its newest stored version without faults."""
     earlier = (kept_content(version.hash) or b"" for version in reversed(kept_versions(opened.file)[-_MOST_EARLIER:]))
-    for text in (opened.saved.encode(), *(unbundle(content)[0] for content in earlier)):
+    for text in (opened.saved.encode(), *(StudySource.split(content).file for content in earlier)):
         with suppress(Refused):
             study = read_study(text, opened.study.folder)
             if study.protocol is not None:
@@ -290,7 +290,7 @@ def part_to_play(study: Study, path: Path, position: StepPosition | None = None)
     if position.name:
         step = _step_of(shown, position.name, position.trial) or 0
     return Playable(
-        with_liquid_files(completed.text.encode(), completed.folder),
+        completed.source,
         completed.folder,
         completed.protocol,
         step,

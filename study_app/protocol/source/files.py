@@ -13,11 +13,11 @@ import hashlib
 import json
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path, PureWindowsPath
 from types import MappingProxyType
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from study_app.errors import Problem, ProtocolError
 from study_app.ids import file_name_fault
@@ -44,6 +44,31 @@ def is_utf16(content: bytes) -> bool:
     return content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in content[:2]
 
 
+class StudySource(NamedTuple):
+    """A study's file, and by name the texts of the liquid files and the SHA-256 of the footage that it names."""
+
+    file: bytes
+    liquids: Mapping[str, str] = MappingProxyType({})
+    footage: Mapping[str, str] = MappingProxyType({})
+
+    @classmethod
+    def split(cls, source: bytes) -> StudySource:
+        """Return the parts of a source."""
+        rest, liquids = _split(source, _HEADER)
+        file, footage = _split(rest, _FOOTAGE_HEADER)
+        return cls(file, liquids, footage)
+
+    def with_liquids(self, text_of: Callable[[str], str | None]) -> StudySource:
+        """Return it with other liquid files; ``text_of`` returns the text of one, None if it is missing."""
+        names = _section_texts(self.file, "liquids", "file")
+        return self._replace(liquids={name: text for name in names if (text := text_of(name)) is not None})
+
+    @property
+    def content(self) -> bytes:
+        """The study's file followed by the files that it names."""
+        return self.file + _table_bytes(_FOOTAGE_HEADER, self.footage) + _table_bytes(_HEADER, self.liquids)
+
+
 def with_liquid_files(study: bytes, folder: Path) -> bytes:
     """Return a study's source: its file without a byte order mark, and the liquid files that it names in ``folder``.
 
@@ -53,30 +78,7 @@ def with_liquid_files(study: bytes, folder: Path) -> bytes:
     if _HEADER in study or _FOOTAGE_HEADER in study:
         return study
     hashes = {name: digest for name in _footage_names(study) if (digest := file_hash(folder / name)) is not None}
-    return bundle(study, lambda name: _text_of_file(folder / name), hashes)
-
-
-def bundle(
-    study: bytes, text_of: Callable[[str], str | None], hashes: Mapping[str, str] = MappingProxyType({})
-) -> bytes:
-    """Return a study's file followed by the files that it names.
-
-    ``text_of`` returns the text of a liquid file, None if it is missing; ``hashes`` are the SHA-256 of its footage by
-    name.
-    """
-    texts = {name: text for name in _section_texts(study, "liquids", "file") if (text := text_of(name)) is not None}
-    return study + _table_bytes(_FOOTAGE_HEADER, hashes) + _table_bytes(_HEADER, texts)
-
-
-def unbundle(source: bytes) -> tuple[bytes, dict[str, str]]:
-    """Return the study's file in a source, and the texts of its liquid files by name."""
-    rest, texts = _split(source, _HEADER)
-    return _split(rest, _FOOTAGE_HEADER)[0], texts
-
-
-def hashes_in(source: bytes) -> dict[str, str]:
-    """Return the SHA-256 of the footage in a source, by name."""
-    return _split(_split(source, _HEADER)[0], _FOOTAGE_HEADER)[1]
+    return StudySource(study, footage=hashes).with_liquids(lambda name: _text_of_file(folder / name)).content
 
 
 def _split(source: bytes, header: bytes) -> tuple[bytes, dict[str, str]]:
@@ -232,6 +234,34 @@ def source_bytes(name_or_path: str | Path) -> bytes:
         return with_liquid_files(source, path.parent)
     except OSError as error:
         raise _not_found(name_or_path, f"cannot be read: {error.strerror}", "check its permissions") from error
+
+
+def find_study_file(study: str, hashes: Iterable[str], footage: Mapping[str, str]) -> tuple[Path, StudySource] | None:
+    """Return the file of a study by its name, with one of these hashes of its source, among the known protocols.
+
+    ``footage`` has the SHA-256 of the study's footage by name, which may be elsewhere.
+    """
+    for name in known_protocols():
+        try:
+            file = protocol_file(name)
+            if not _is_of(study, file):  # the footage of other studies is not hashed: it may be large
+                continue
+            source = StudySource.split(source_bytes(name))
+        except ProtocolError:  # possibly another study's; unreadable files cannot be shared
+            continue
+        content = source._replace(footage=footage).content
+        if any(has_hash(content, digest) for digest in hashes):
+            return file, source
+    return None
+
+
+def _is_of(study: str, file: Path) -> bool:
+    """Return whether a protocol file belongs to the study of that name."""
+    try:
+        head = tomllib.loads(without_byte_order_mark(file.read_bytes()).decode()).get("study")
+    except (OSError, ValueError, RecursionError):
+        return False
+    return isinstance(head, dict) and head.get("name") == study
 
 
 def check_size(source: bytes, name: str) -> None:

@@ -14,7 +14,7 @@ from study_app.ids import read_as
 from study_app.protocol.load import protocol_hash
 from study_app.protocol.model import Protocol
 from study_app.protocol.randomization import stream
-from study_app.protocol.source import unbundle
+from study_app.protocol.source import StudySource
 from study_app.protocol.trials import LEVEL_RULES
 from study_app.store import receipt
 from study_app.store.blinded.allocation import Allocation, allocate, allocation_of, check_session
@@ -143,7 +143,7 @@ def begin_session(
     clock = clock if clock is not None else SessionClock()
     make_folder(study_folder.path)
     draw = stream(start.seed, "blinding").random if start.simulated else None
-    key = open_or_draw_key(study_folder.path, protocol, draw, unbundle(source)[1])
+    key = open_or_draw_key(study_folder.path, protocol, draw, StudySource.split(source).liquids)
     place = Place(study_folder, study_folder.session(start.participant, start.session), protocol.study.name)
     sealed = not reveals(study_folder.path)
     opening = _claim(place)

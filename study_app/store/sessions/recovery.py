@@ -19,7 +19,7 @@ from study_app.errors import StoreError
 from study_app.protocol.descriptions import CONDITIONS_DIFFER, differences
 from study_app.protocol.model import Protocol
 from study_app.protocol.randomization import stream
-from study_app.protocol.source import bundle, has_hash, hashes_in, unbundle
+from study_app.protocol.source import StudySource, has_hash
 from study_app.protocol.upgrade import needs_upgrade
 from study_app.store import receipt
 from study_app.store.blinded.blinding import (
@@ -195,7 +195,7 @@ def sealed_source(session_folder: Path, source: bytes) -> bytes:
         files = read_key(study_folder.path).files
     except StoreError:  # `reopen_store` reports the error
         return source
-    return bundle(unbundle(source)[0], files.get, hashes_in(source)) if files else source
+    return StudySource.split(source).with_liquids(files.get).content if files else source
 
 
 def rebuild_session(session_folder: Path) -> Rebuilt:

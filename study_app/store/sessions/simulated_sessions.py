@@ -17,7 +17,7 @@ from typing import Any, Self
 
 from study_app.protocol.model import Protocol
 from study_app.protocol.randomization import stream
-from study_app.protocol.source import unbundle
+from study_app.protocol.source import StudySource
 from study_app.store import receipt
 from study_app.store.blinded.allocation import Entries, allocate
 from study_app.store.blinded.blinding import open_or_draw_key, opened_key, reveals, seal_event
@@ -79,7 +79,9 @@ class SimulatedStudy:
             check_participant(person)
             used.check_unused(person, 1)
         make_folder(self.folder.path)
-        self.key = open_or_draw_key(self.folder.path, protocol, stream(seed, "blinding").random, unbundle(source)[1])
+        self.key = open_or_draw_key(
+            self.folder.path, protocol, stream(seed, "blinding").random, StudySource.split(source).liquids
+        )
         self.protocol = protocol
         self.entries = Entries(self.folder)
         self._opening: Opening | None = None

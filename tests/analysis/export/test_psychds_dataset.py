@@ -13,11 +13,11 @@ import pytest
 from click.testing import CliRunner
 
 from study_app.analysis.export import psychds_dataset
-from study_app.analysis.export.psychds_dataset import FOLDER, _footage, _study_file, variables
+from study_app.analysis.export.psychds_dataset import FOLDER, _footage, variables
 from study_app.analysis.export_study import export
 from study_app.cli import commands
 from study_app.errors import AnalysisError
-from study_app.protocol.source.files import protocol_hash, shipped_file
+from study_app.protocol.source.files import find_study_file, protocol_hash, shipped_file
 from study_app.store.blinded.blinding import reveal
 from study_app.store.files.csv_files import Column, optional
 from study_app.store.files.output_files import FileCopy, write_files
@@ -136,9 +136,9 @@ def test_the_readme_says_who_took_part_and_where_what_is(is_revealed: bool, sent
 
 def test_the_file_and_the_footage_of_a_study_are_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     file = shipped_file("rek2024")
-    found = _study_file("rek2024", {protocol_hash(file.read_bytes())}, {})
+    found = find_study_file("rek2024", {protocol_hash(file.read_bytes())}, {})
     assert found is not None
-    assert (found[0].name, found[1:]) == (file.name, (file.read_bytes(), {}))
+    assert (found[0].name, found[1]) == (file.name, (file.read_bytes(), {}, {}))
     conditions = {"fast": {"view": "b.mp4", "footage_sha256": "1f"}, "slow": {"view": "a.mp4", "footage_sha256": "2e"}}
     key = SimpleNamespace(tables={"conditions": conditions | {"none": {"view": ""}}})
     monkeypatch.setattr(psychds_dataset, "revealed_key", lambda _folder: key)

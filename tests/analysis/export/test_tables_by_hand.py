@@ -19,6 +19,7 @@ from study_app.analysis.data.study_tables import Study
 from study_app.analysis.export import psychds_dataset, spss
 from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name, table_files
 from study_app.analysis.export.tables import Delivered, exported_tables, names_of_sealed, wide_table
+from study_app.protocol.source.files import StudySource, _is_of
 from study_app.store.files.columns import INTERVALS
 from study_app.store.files.csv_files import Column, header, optional, unsealed_columns
 from tests.analysis.made_up import ITEMS, study
@@ -343,8 +344,8 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         digests[name] = hashlib.sha256(b"in.mp4").hexdigest()
     digests |= {"../out.mp4": "1f", "/abs.mp4": "2e", "gone.mp4": "3d"}
     monkeypatch.setattr(psychds_dataset, "_footage", lambda _study: digests)
-    found = file, b"text", {"oil.toml": "oil", "../no.toml": "no"}
-    monkeypatch.setattr(psychds_dataset, "_study_file", lambda *_: found)
+    found = file, StudySource(b"text", {"oil.toml": "oil", "../no.toml": "no"})
+    monkeypatch.setattr(psychds_dataset, "find_study_file", lambda *_: found)
     own = psychds_dataset.materials(made)
     copy = psychds_dataset.FileCopy(tmp_path / "in.mp4", digests["in.mp4"])
     assert own.files == {"kitchen.toml": b"text", "oil.toml": b"oil", "in.mp4": copy}
@@ -354,7 +355,7 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         f"../out.mp4 (SHA-256 1f; {outside})", f"/abs.mp4 (SHA-256 2e; {outside})",
         "gone.mp4 (SHA-256 3d; the file cannot be read: No such file or directory)",
     )  # fmt: skip
-    monkeypatch.setattr(psychds_dataset, "_study_file", lambda *_: None)
+    monkeypatch.setattr(psychds_dataset, "find_study_file", lambda *_: None)
     assert psychds_dataset.materials(made).missing[:2] == ("the study file", f"in.mp4 (SHA-256 {digests['in.mp4']})")
     assert psychds_dataset.materials(replace(made, settings={})) == ({}, ())
     for name, text, is_of in (
@@ -363,5 +364,5 @@ def test_footage_outside_of_the_folder_or_with_other_content_is_missing(
         ("c", "[", False),
     ):
         (tmp_path / name).write_bytes(text.encode())
-        assert psychds_dataset._is_of("oil", tmp_path / name) == is_of
-    assert not psychds_dataset._is_of("oil", tmp_path / "nowhere")
+        assert _is_of("oil", tmp_path / name) == is_of
+    assert not _is_of("oil", tmp_path / "nowhere")
