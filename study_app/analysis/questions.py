@@ -13,7 +13,7 @@ from study_app.analysis.data.study_tables import Study, groups_shown
 from study_app.analysis.results import GroupAnswers, QuestionResult, ScoreResult
 from study_app.analysis.wording import number, with_group
 from study_app.discovery import by_name
-from study_app.protocol.questionnaires import instrument, instruments
+from study_app.protocol.questionnaires import Instrument
 
 Numbers: TypeAlias = Mapping[str, Any]
 
@@ -197,13 +197,13 @@ def scored(study: Study, asked: PlacedScore) -> pd.DataFrame:
 
 
 def _score(study: Study, asked: PlacedScore) -> ScoreResult:
-    known = asked.instrument is not None and asked.instrument in instruments()
+    known = asked.instrument is not None and asked.instrument in Instrument.names()
     return ScoreResult(
         where=asked.where.id,
         title=asked.where.title,
         name=asked.name,
         instrument=asked.instrument,
-        source=str(instrument(asked.instrument)["source"]) if known and asked.instrument is not None else None,
+        source=str(Instrument(asked.instrument).table["source"]) if known and asked.instrument is not None else None,
         groups=tuple(
             GroupAnswers(code, name, _summary(rows["score"].dropna().to_numpy(dtype=float)))
             for code, name, rows in _groups(asked.where, scored(study, asked))

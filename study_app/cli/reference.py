@@ -15,7 +15,7 @@ from study_app.haptics.model.effects import EFFECTS
 from study_app.haptics.model.layout import LIMITERS
 from study_app.outlets.markers import CODES
 from study_app.protocol import questions
-from study_app.protocol.questionnaires import instrument, instruments
+from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.trials import DESIGN_KINDS, METHOD_KINDS
 from study_app.protocol.warnings import longest_delay_ms, stored_table
 
@@ -89,8 +89,8 @@ def _question_rows() -> Iterator[tuple[str, ...]]:
 
 
 def _instrument_rows() -> Iterator[tuple[str, ...]]:
-    for name in instruments():
-        about = instrument(name)
+    for name in Instrument.names():
+        about = Instrument(name).table
         doubt = f"; from memory: {about['from_memory']}" if "from_memory" in about else ""
         scores = ", ".join(f"`{score}`" for score in about["scores"])
         texts = ", ".join(about["languages"]) or "yours"

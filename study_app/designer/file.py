@@ -31,7 +31,7 @@ from study_app.designer.parts import cut_text
 from study_app.gui.theme import Coloured, Theme, draw_icon
 from study_app.gui.widgets import Card, Icon, hbox, label
 from study_app.protocol.load import located_problems
-from study_app.protocol.source import Path, places_of
+from study_app.protocol.source import Path, Places
 
 
 class _VisibleLine(NamedTuple):
@@ -67,7 +67,7 @@ class FileText:
 
 def file_text(study: Study, name: str, path: Path) -> FileText:
     """Return the file with the lines of the element at ``path`` marked."""
-    problems = study.problems if not study.is_toml else located_problems(study.shown_faults, places_of(study.text))
+    problems = study.problems if not study.is_toml else located_problems(study.shown_faults, Places.of(study.text))
     faulty = tuple(sorted({problem.line - 1 for problem in problems if problem.line}))
     selected: tuple[tuple[int, int], ...] = ()
     if study.is_toml and path:

@@ -83,9 +83,9 @@ from study_app.ids import MAX_SHORT_NAME, free_short_name, short_name_of
 from study_app.number_text import capitalised, counted, duration, number_of, typed_numbers, unclear_number
 from study_app.protocol.load import read_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import expected_duration_s, orders_of, step_duration_s
+from study_app.protocol.orders import expected_duration_s, orders_of
 from study_app.protocol.source import Path as Place
-from study_app.protocol.source import names, protocol_file, shipped, shipped_file
+from study_app.protocol.source import names, protocol_file, shipped
 from study_app.protocol.wording import LANGUAGES, languages_of
 from study_app.store.versions import draft_of, drafted_files, kept_original, unsaved_files
 from study_app.workspace import workspace
@@ -217,12 +217,12 @@ def template_choice(name: str, study: Study) -> TemplateChoice:
     )  # fmt: skip
     if protocol is None:
         return choice
-    language, document = protocol.study.languages[0], study.document
+    document = study.document
     session = (
         (
             icon_of((section, step), document),
             title_of(document, (section, step)),
-            duration(step_duration_s(protocol, step, language)),
+            duration(expected_duration_s(protocol, step)),
         )
         for step in protocol.steps
         for section in _STEPS
@@ -359,7 +359,7 @@ def new_choices(source: str = "") -> tuple[TemplateChoice, ...]:
     taken = taken_names()
     copied = dict.fromkeys([source, *shipped()] if source and not source.startswith("template:") else shipped())
     for name in copied:
-        file = shipped_file(name) if name in shipped() else protocol_file(name)
+        file = shipped().get(name) or protocol_file(name)
         note = _SHIPPED if name in shipped() else str(file.name)
         document, _places = read_document(file.read_bytes(), name)
         stem = re.sub(f"{_COPY}[0-9]*$", "", short_name_of(file.stem)) or "study"

@@ -65,7 +65,7 @@ from study_app.gui.widgets import (
 )
 from study_app.number_text import counted, duration
 from study_app.protocol.checks import OWN
-from study_app.protocol.questionnaires import instrument, instruments
+from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.questions import STATEMENT
 from study_app.protocol.source import Path, names, value_at
 from study_app.protocol.wording import language_name, languages_of
@@ -284,8 +284,8 @@ def _addable_questions(study: Study, around: Path) -> Iterator[Addable]:
 def _addable_instruments(languages: tuple[str, ...]) -> tuple[Addable, ...]:
     """Return the standard questionnaires, with publisher and licence of their texts, and the languages they lack."""
     entries = []
-    for name in instruments():
-        source = instrument(name)
+    for name in Instrument.names():
+        source = Instrument(name).table
         lacking = " or ".join(language_name(code) for code in languages if code not in source["languages"])
         texts = f". The program does not include its {lacking} texts, so you must write them" if lacking else ""
         help_ = f"{source['source']}. Licence: {source['licence']}{texts}"

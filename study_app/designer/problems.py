@@ -36,7 +36,7 @@ from study_app.gui.widgets import (
     vbox,
 )
 from study_app.number_text import capitalised, counted
-from study_app.protocol.source import Fault, Path, names, places_of
+from study_app.protocol.source import Fault, Path, Places, names
 from study_app.protocol.warnings import untranslated_texts
 from study_app.protocol.wording import language_name
 
@@ -111,7 +111,7 @@ def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
             )
             for fault, problem in zip(study.faults, study.problems, strict=True)
         )
-    places = places_of(study.text)
+    places = Places.of(study.text)
     rows = [_problem_row(study, fault, places.line(fault.path)) for fault in study.faults]
     orders = {element: key_order(study.document, element) for element in {row.element for row in rows}}
 
@@ -124,7 +124,7 @@ def fault_rows(study: Study) -> tuple[ProblemRow, ...]:
 
 def warning_rows(study: Study, sentences: Iterable[str]) -> tuple[ProblemRow, ...]:
     """Return the warnings of ``check`` in order, each with the first element that it names."""
-    places = places_of(study.text) if study.is_toml else None
+    places = Places.of(study.text) if study.is_toml else None
     rows = []
     for sentence in dict.fromkeys(sentences):
         path, text = _place_and_sentence(study, sentence)

@@ -31,6 +31,7 @@ from study_app.ids import file_name_fault
 from study_app.protocol.blocks import Block, Compared, Kind, OrderOfBlocks
 from study_app.protocol.participants.groups import Group, GroupAssignment, Sequences, Sessions, Steps, parts_by_block
 from study_app.protocol.participants.raters import SimulatedParticipants
+from study_app.protocol.quantities import MAX_FORCE_N
 from study_app.protocol.questionnaires import Questionnaire
 from study_app.protocol.questions import Scale
 from study_app.protocol.source.table import Body as PageBody
@@ -67,7 +68,6 @@ __all__ = [
     "StudyHead",
 ]
 
-MAX_FORCE_N = 8.0
 HandForceN: TypeAlias = Annotated[
     float, within(0.1, MAX_FORCE_N, "participants can barely feel less than 0.1 N, and 8 N is the maximum safe force")
 ]
@@ -814,6 +814,21 @@ class Protocol(Sessions, Table):
         if stimulus.level_kind == "value" and self.design_of(block).intervals == 1:
             return (None,)
         return block.standards or stimulus.standards or (self.present_value(stimulus),)
+
+    def measures_of(self, block: Block) -> tuple[str, ...]:
+        """Return the measures of `OF_LEVELS` that the answers of a block with a design determine.
+
+        An exponent needs estimates, or thresholds at two standards or more, on a level that is not a value.
+        """
+        design, stimulus = self.design_of(block), None if block.stimulus is None else self.stimulus_of(block)
+        measures = {"rating": {"d_prime"}, "number": {"exponent"}, "setting": {"pse"}}.get(design.reply, set())
+        if design.reply == "choice" and design.can_be_correct(stimulus):
+            measures.add("d_prime")
+        if design.reply == "choice" and stimulus is not None and stimulus.rises(design):
+            measures.add("threshold")
+            if stimulus.level_kind != "value" and len(self.standards_of(block)) > 1:
+                measures.add("exponent")
+        return tuple(measure for measure in OF_LEVELS if measure in measures)
 
     def present_value(self, stimulus: Stimulus) -> float:
         """Return the varied number's value in the protocol (StudyError if the condition has none)."""

@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from study_app.haptics.model.effects import EFFECTS, NAMED, Parameter
 from study_app.number_text import exact_text
-from study_app.protocol.model import MAX_FORCE_N
 
+MAX_FORCE_N: Final = 8.0
 _P = Parameter
 _OF_THE_SCENE: Final = {
     it.name: it

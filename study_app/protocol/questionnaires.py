@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 from pathlib import Path as File
-from typing import Annotated, Any, Final, Literal, Self
+from typing import Annotated, Any, Final, Literal, NamedTuple, Self
 
 from pydantic import Field, model_validator
 
@@ -139,16 +139,48 @@ FOLDER: Final = File(__file__).parent / "instruments"
 _TEXTS: Final = ("text", "short", "low", "high", "title", "intro", "labels")
 
 
-def instruments() -> tuple[str, ...]:
-    """Return the ids of the standard questionnaires, sorted."""
-    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
-
-
 @cache
-def instrument(name: str) -> Mapping[str, Any]:
-    """Return the file content of a standard questionnaire (OSError if there is none)."""
+def _instrument_table(name: str) -> Mapping[str, Any]:
     table: Mapping[str, Any] = frozen(tomllib.loads((FOLDER / f"{name}.toml").read_text(encoding="utf-8")))
     return table
+
+
+class Instrument(NamedTuple):
+    """A standard questionnaire, by its id."""
+
+    name: str
+
+    @staticmethod
+    def names() -> tuple[str, ...]:
+        """Return the ids of the standard questionnaires, sorted."""
+        return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+    @property
+    def table(self) -> Mapping[str, Any]:
+        """The content of its file (OSError if there is none)."""
+        return _instrument_table(self.name)
+
+    @property
+    def published_name(self) -> str:
+        """The name under which it is published, which is its heading where it has no title."""
+        return self.name.upper().removesuffix("-WEIGHTED")
+
+    def scale_name(self, scale: str) -> str:
+        """Return a study's name for one of its scales."""
+        return f"{self.name.replace('-', '_')}_{scale}"
+
+    def tables_in(self, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the table and scales that a study needs for it, in full if texts are missing."""
+        table: dict[str, Any] = {"instrument": self.name}
+        filled, lacking = _fill_in((), table, languages, {})
+        if not lacking:
+            return table, {}
+        scales = {
+            self.scale_name(name): _merged({"labels": scale.get("labels", {})}, {}, languages)
+            for name, scale in self.table.get("scales", {}).items()
+        }
+        table |= {key: filled[key] for key in ("intro", "items") if key in filled}
+        return table, {name: scale for name, scale in scales.items() if scale}
 
 
 def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[Fault]]:
@@ -166,37 +198,13 @@ def with_instruments(document: Mapping[str, Any]) -> tuple[dict[str, Any], list[
     for name, table in tables.items():
         if not isinstance(table, Mapping) or "instrument" not in table:
             continue
-        if table["instrument"] in instruments():
+        if table["instrument"] in Instrument.names():
             filled[name], lacking = _fill_in(("questionnaires", name), table, languages, scales)
             faults += lacking
         else:
             path, wrong = ("questionnaires", name, "instrument"), str(table["instrument"])
-            faults.append(unknown_name(path, f'there is no instrument "{wrong}"', wrong, instruments()))
+            faults.append(unknown_name(path, f'there is no instrument "{wrong}"', wrong, Instrument.names()))
     return {**completed, "questionnaires": filled, **({"scales": scales} if scales else {})}, faults
-
-
-def instrument_tables(of: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the table and scales that a study needs for an instrument, in full if texts are missing."""
-    table: dict[str, Any] = {"instrument": of}
-    filled, lacking = _fill_in((), table, languages, {})
-    if not lacking:
-        return table, {}
-    known = instrument(of).get("scales", {}).items()
-    scales = {
-        scale_name(of, name): _merged({"labels": scale.get("labels", {})}, {}, languages) for name, scale in known
-    }
-    table |= {key: filled[key] for key in ("intro", "items") if key in filled}
-    return table, {name: scale for name, scale in scales.items() if scale}
-
-
-def published_name(of: str) -> str:
-    """Return the name under which an instrument is published, which is its heading where it has no title."""
-    return of.upper().removesuffix("-WEIGHTED")
-
-
-def scale_name(of: str, scale: str) -> str:
-    """Return the study's name for a scale of a standard questionnaire."""
-    return f"{of.replace('-', '_')}_{scale}"
 
 
 def _fill_in(
@@ -204,7 +212,8 @@ def _fill_in(
 ) -> tuple[dict[str, Any], list[Fault]]:
     """Return a questionnaire completed from its instrument, and faults; its scales are added to ``scales``."""
     of = str(table["instrument"])
-    source = instrument(of)
+    standard = Instrument(of)
+    source = standard.table
     known = {item["id"]: item for item in source["items"]}
     own = _tables_by_id(table, "items")
     faults = [
@@ -229,7 +238,7 @@ def _fill_in(
 
     made = _merged({key: source[key] for key in ("title", "intro") if key in source}, table, languages)
     if "title" not in table and set(made.get("title", ())) != set(languages):
-        made["title"] = dict.fromkeys(languages, published_name(of))
+        made["title"] = dict.fromkeys(languages, standard.published_name)
     ask(() if "intro" in table else None, of, made, "intro")
     items = []
     for name, item in known.items():
@@ -238,7 +247,7 @@ def _fill_in(
         if isinstance(short := whole.get("short", {}), Mapping):
             whole["short"] = {**dict.fromkeys(languages, name.replace("_", " ").capitalize()), **short}
         if "scale" in item and "scale" not in written:
-            whole["scale"] = scale_name(of, item["scale"])
+            whole["scale"] = standard.scale_name(item["scale"])
         kind = item.get("kind", STATEMENT)
         if whole.get("kind", kind) != kind:
             fault = f'must be "{kind}", as in {of}'
@@ -268,7 +277,7 @@ def _fill_in(
                     ask(None, name, {"options": option.get("text", {})}, "options")
         items.append(whole)
     for scale, labelled in source.get("scales", {}).items():
-        own_name = scale_name(of, scale)
+        own_name = standard.scale_name(scale)
         known_labels = _merged({key: labelled[key] for key in ("labels",) if key in labelled}, {}, languages)
         if own_name in scales and isinstance(scales[own_name], Mapping):
             scales[own_name] = {**scales[own_name], **_merged(known_labels, scales[own_name], languages)}
@@ -313,7 +322,7 @@ def _unpublished_fault(path: Path, of: str, language: str, lacks: Sequence[tuple
     listed = "; ".join(
         f"{', '.join(texts)} of {', '.join(names)}".removesuffix(f" of {of}") for texts, names in same.items()
     )
-    source = instrument(of)
+    source = Instrument(of).table
     translation = source.get("published", {}).get(language)
     published = f", although a translation has been published ({translation})" if translation else ""
     why = (

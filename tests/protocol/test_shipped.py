@@ -21,7 +21,7 @@ NAMES = sorted(path.stem for path in PROTOCOLS.glob("*.toml"))
 
 def test_what_ships_is_listed():
     tracked = subprocess.run(["git", "ls-files", "*.toml"], cwd=PROTOCOLS, capture_output=True, text=True, check=False)
-    assert shipped() == tuple(sorted(Path(name).stem for name in tracked.stdout.split()) or NAMES)
+    assert tuple(shipped()) == tuple(sorted(Path(name).stem for name in tracked.stdout.split()) or NAMES)
 
 
 def test_a_study_made_in_a_checkout_does_not_ship(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -14,7 +14,7 @@ from study_app.protocol.blocks import Compared, Phase, block_titles, display_lan
 from study_app.protocol.model import Analysis, Contrast, Protocol, Published
 from study_app.protocol.participants import RecordedSessions
 from study_app.protocol.presented import link_descriptions
-from study_app.protocol.questionnaires import Score, instruments, published_name
+from study_app.protocol.questionnaires import Instrument, Score
 from study_app.protocol.questions import Context, Question, Scale, Statement, question_of
 from study_app.protocol.source import text_in
 from study_app.protocol.trials import DELAY, DESIGN_KINDS, OF_LINK, Assumed, Design, Method, Stimulus, default_design
@@ -578,9 +578,9 @@ class PlacedScore:
     def title(self) -> str:
         """Its name after that of its standard questionnaire: "SUS", "NASA-TLX raw"."""
         name = self.name.replace("_", " ")
-        if self.instrument is None or self.instrument not in instruments():
+        if self.instrument is None or self.instrument not in Instrument.names():
             return name
-        published = published_name(self.instrument)
+        published = Instrument(self.instrument).published_name
         return published if name.upper() == published else f"{published} {name}"
 
     @property
@@ -638,10 +638,11 @@ def _form_title(protocol: Mapping[str, Any], form: str) -> str:
     forms = protocol["questionnaires"]
     title, instrument = forms[form]["title"], forms[form].get("instrument")
     words = form.replace("_", " ").capitalize() if title is None else text_in(title, display_language(protocol))
-    if instrument not in instruments():
+    if instrument not in Instrument.names():
         return words
     is_alone = sum(other.get("instrument") == instrument for other in forms.values()) == 1
-    return published_name(instrument) if is_alone else f"{published_name(instrument)} ({words})"
+    published = Instrument(instrument).published_name
+    return published if is_alone else f"{published} ({words})"
 
 
 def _question(table: Mapping[str, Any], where: QuestionPlace) -> Question:

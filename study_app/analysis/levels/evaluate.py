@@ -16,7 +16,6 @@ from study_app.analysis.levels.tracks import answers_timed, tracks
 from study_app.analysis.page_layout import Picture
 from study_app.analysis.results import GroupAnswers, LevelsResult
 from study_app.analysis.wording import number
-from study_app.protocol.quantities import quantity, quantity_words
 
 READ: Final = (
     *("participant", "session", "trial", "block", "code", "track", "catch", "standard", "level", "level_delivered"),
@@ -67,8 +66,8 @@ def _levels_of_block(study: Study, block: LevelBlock, timed: pd.DataFrame, opene
         result = replace(
             result,
             vary=stimulus.vary,
-            quantity=quantity_words(stimulus.vary),
-            unit=quantity(stimulus.vary).unit,
+            quantity=stimulus.quantity,
+            unit=stimulus.unit,
             level_kind=stimulus.level_kind,
             spacing=stimulus.spacing,
         )

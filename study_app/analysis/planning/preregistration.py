@@ -28,7 +28,6 @@ from study_app.protocol.descriptions import describe, limit_rows
 from study_app.protocol.load import parse, protocol_hash, source_bytes
 from study_app.protocol.model import Analysis, Contrast, Protocol
 from study_app.protocol.orders import block_orders_by_group
-from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.source import text_in
 from study_app.protocol.warnings import PRECISION, expected_of, precision_plan, precision_rows, threshold_plan
 from study_app.psychophysics.people import BETWEEN_PEOPLE
@@ -178,7 +177,7 @@ def _of_intervals(protocol: Protocol, block: Block) -> Iterator[str]:
         yield f"Block {title}: how well can {listed(others)} be discriminated from {block.standard} (d′)?"
         return
     stimulus = protocol.stimulus_of(block)
-    what, unit = quantity_words(stimulus.vary), quantity(stimulus.vary).unit
+    what, unit = stimulus.quantity, stimulus.unit
     standards = [one for one in protocol.standards_of(block) if one is not None]
     if threshold_plan(protocol, block) is None:
         asked = {"number": "What is the exponent of the power law for", "rating": "How do ratings change with"}

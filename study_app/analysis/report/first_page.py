@@ -33,7 +33,6 @@ from study_app.analysis.statistics.outcome import clopper_pearson
 from study_app.analysis.wording import interval, listed, ms, number, significant
 from study_app.number_text import capitalised
 from study_app.protocol.model import quoted_title
-from study_app.protocol.quantities import quantity, quantity_words
 
 _BREAKS: Final = re.compile(r"\[[^\]]*\]| %|\b[np] [=<>] |\b(?:d_z|g) (?=[−\d])")
 """Where a line must not break: in an interval, before a percent sign, in "n = 12" and "p < .001"."""
@@ -96,7 +95,7 @@ def presented_in(study: Study) -> dict[str, Presented]:
             delay = "a varied visual delay" if not delays else f"a visual delay of {ms(delays[0])}"
         details = []
         if stimulus is not None and delays:
-            details.append(f"varied {quantity_words(stimulus.vary)}{_standards(block)}")
+            details.append(f"varied {stimulus.quantity}{_standards(block)}")
         details.append("no visual delay" if delays == [0.0] else delay)
         design = f" ({block.design.paper_name}{_trials(study, block)})" if isinstance(block, LevelBlock) else ""
         by_condition: dict[str, list[Setting]] = {"": [*conditions]}
@@ -174,7 +173,7 @@ def _standards(block: Block | LevelBlock) -> str:
         return ""
     standards = sorted({float(setting.standard) for setting in block.settings if setting.standard is not None})
     values = listed([f"{standard:g}" for standard in standards])
-    unit = quantity(block.stimulus.vary).unit
+    unit = block.stimulus.unit
     return f" (standard{'s' * (len(standards) > 1)}: {values} {unit})" if standards else ""
 
 

@@ -31,7 +31,7 @@ from study_app.number_text import MINUS, exact_text, number_of
 from study_app.protocol.checks import TEXTS, check_paced, missing_for_rule
 from study_app.protocol.model import RULE_LIMITS, RULES
 from study_app.protocol.participants import ASSIGNMENT
-from study_app.protocol.questionnaires import instrument_tables, instruments
+from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.source import Fault, Path, entries, has, names, rule_of, shown_value, value_at
 from study_app.protocol.warnings import untranslated_texts
 from study_app.protocol.wording import LANGUAGES, language_name, languages_of
@@ -131,8 +131,8 @@ def with_language(study: Study, code: str) -> tuple[Edit, ...]:
 def _instrument_texts(study: Study, codes: tuple[str, ...]) -> Iterator[Edit]:
     """Yield the edits that write the texts of standard questionnaires that lack a language into the study."""
     for path, of in entries(study.document, "questionnaires.*.instrument"):
-        if of in instruments() and not {"intro", "items"} & value_at(study.document, path[:-1]).keys():
-            table, scales = instrument_tables(of, codes)
+        if of in Instrument.names() and not {"intro", "items"} & value_at(study.document, path[:-1]).keys():
+            table, scales = Instrument(of).tables_in(codes)
             yield from (
                 Set((*path[:-1], key), as_written(value)) for key, value in table.items() if key != "instrument"
             )

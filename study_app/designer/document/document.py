@@ -22,15 +22,7 @@ from study_app.errors import StoreError
 from study_app.ids import MAX_SHORT_NAME, file_name_fault, free_short_name, short_name_of
 from study_app.number_text import counted
 from study_app.protocol.source import Path as Place
-from study_app.protocol.source import (
-    StudySource,
-    did_you_mean,
-    file_hash,
-    shipped,
-    shipped_file,
-    value_at,
-    without_byte_order_mark,
-)
+from study_app.protocol.source import StudySource, did_you_mean, file_hash, shipped, value_at, without_byte_order_mark
 from study_app.protocol.wording import languages_of
 from study_app.store.files import StudyFolder, cannot_write
 from study_app.store.integrity import is_open
@@ -324,7 +316,7 @@ class Document:
 
     def why_read_only(self, results: Path) -> str:
         """Return why the study cannot be changed now, "" if it can."""
-        if any(self.file.resolve() == shipped_file(name).resolve() for name in shipped()):
+        if any(self.file.resolve() == file.resolve() for file in shipped().values()):
             return "This study ships with the program. Make a copy to change it."
         if self.file.exists() and not os.access(self.file, os.W_OK):
             return "You do not have permission to write this file. Make a copy to change it."

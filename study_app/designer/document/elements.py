@@ -24,7 +24,7 @@ from study_app.designer.document.fields import (
 from study_app.designer.document.study import Study
 from study_app.number_text import counted, exact_duration
 from study_app.protocol.participants import sequences_in
-from study_app.protocol.questionnaires import published_name
+from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.source import Path, entries, has, names, value_at
 from study_app.protocol.wording import languages_of
 
@@ -95,7 +95,7 @@ def title_of(document: Mapping[str, Any], path: Path) -> str:
     if called := _title_text(document, value):
         return called
     if path[0] == "questionnaires" and isinstance(of := value.get("instrument"), str):
-        return published_name(of)
+        return Instrument(of).published_name
     if path[:2] == EXCLUSIONS and isinstance(rule := value.get("rule"), str):
         return label_of(rule)
     if isinstance(path[-1], int) and "id" not in value:

@@ -48,10 +48,10 @@ from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unse
 from study_app.designer.document.toml_text import Refused, with_own_line_ends
 from study_app.ids import free_id
 from study_app.number_text import counted
-from study_app.protocol.load import read_document, shipped, source_bytes
+from study_app.protocol.load import read_document
 from study_app.protocol.model import SceneDefaults
-from study_app.protocol.questionnaires import instrument, instrument_tables
-from study_app.protocol.source import Path, names, value_at
+from study_app.protocol.questionnaires import Instrument
+from study_app.protocol.source import Path, names, shipped, source_bytes, value_at
 from study_app.protocol.wording import language_name, languages_of
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
@@ -277,7 +277,7 @@ class AddInstrument(Request):
     def step(self, at: Situation) -> Step:
         table, edits = _instrument_edits(at.study, self.name)
         path = ("questionnaires", free_id(names(at.study.document, "questionnaires"), self.name.replace("-", "_")))
-        codes, known = languages_of(at.study.document), instrument(self.name)["languages"]
+        codes, known = languages_of(at.study.document), Instrument(self.name).table["languages"]
         lacking, said = [language_name(code) for code in codes if code not in known], ""
         if 0 < len(lacking) < len(codes):
             where = "The next problem (F8), or “Write …” at the study's languages, lists them"
@@ -287,7 +287,7 @@ class AddInstrument(Request):
 
 def _instrument_edits(study: Study, name: str) -> tuple[dict[str, Any], tuple[Edit, ...]]:
     """Return the table of a standard questionnaire, and the edits that add the scales it needs."""
-    table, scales = instrument_tables(name, languages_of(study.document))
+    table, scales = Instrument(name).tables_in(languages_of(study.document))
     known = names(study.document, "scales")
     return table, tuple(Set(("scales", scale), value) for scale, value in scales.items() if scale not in known)
 

@@ -82,7 +82,7 @@ from study_app.gui.widgets import (
 )
 from study_app.gui.widgets import grid as grid_of
 from study_app.number_text import capitalised
-from study_app.protocol.questionnaires import instruments
+from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.source import Path
 
 KINDS = {
@@ -784,7 +784,7 @@ class FormCard(Card):
                 self.asked.emit(UseSource(path, name))
         elif path[::2] == _INSTRUMENT:
             self.instruments.clear()
-            for name in instruments():
+            for name in Instrument.names():
                 use = self.instruments.addAction(name.upper())
                 use.triggered.connect(partial(self.asked.emit, UseSource(path, name)))
             self.instruments.popup(self.adds[path].mapToGlobal(self.adds[path].rect().bottomLeft()))

@@ -28,10 +28,9 @@ from study_app.designer.measures.levels import (
 from study_app.gui.theme import Themed, draw_icon, font
 from study_app.gui.widgets import Range, smooth_painter
 from study_app.number_text import capitalised, duration, exact_duration
-from study_app.protocol.orders import ANSWER_S, CHOICE_S
-from study_app.protocol.presented import level_limits, levels
+from study_app.protocol.presented import level_limits
 from study_app.protocol.source import Path, value_at
-from study_app.protocol.trials import ORDINALS, Adjustment, AnyTask, Stimulus
+from study_app.protocol.trials import ORDINALS, AnyTask, Stimulus
 
 _FARTHEST: Final = 3.0
 """A limit is drawn up to so many times the highest level, or spans above it."""
@@ -116,7 +115,7 @@ def _limits(study: Study, row: Row, scale: LevelWords) -> tuple[str, dict[Limit,
     block = block_of(protocol, row.path[:-1])
     if protocol is None or block is None or block.stimulus is None or block.design is None:
         return "", {}
-    highest = max((level.standard for level in levels(protocol, block.id) if level.standard is not None), default=None)
+    highest = max((standard for standard in protocol.standards_of(block) if standard is not None), default=None)
     standard = "" if highest is None else f"standard {rounded(highest)} {scale.value_unit}".rstrip()
     limits: dict[Limit, _AxisLimit] = {}
     if (reached := level_limits(protocol, block)) is not None:
@@ -272,12 +271,11 @@ def _trial_strip(study: Study, row: Row) -> _TrialStrip | None:
             _Phase("interval", "Interval", ordinal, task.expected_s, ("tasks", block.task, _duration_key(task)), free)
         )
     method = protocol.method_of(block) if block.stimulus is not None else None
-    if isinstance(method, Adjustment):
+    if method is not None and method.adjusts:
         field = ("methods", str(block.method), "most_s") if block.method in protocol.methods else ()
-        phases.append(_Phase("question", "Setting", "", method.most_s / 2, field, about=True))
+        phases.append(_Phase("question", "Setting", "", method.setting_s, field, about=True))
     else:
-        reply_s = CHOICE_S if design.reply == "choice" else ANSWER_S
-        phases.append(_Phase("question", "Question", design.reply, reply_s, of_design("question"), about=True))
+        phases.append(_Phase("question", "Question", design.reply, design.answer_s, of_design("question"), about=True))
     if design.shows_feedback(block.phase == "practice"):
         phases.append(_Phase("feedback", "Feedback", "", design.feedback_s, of_design("feedback_s")))
     phases.append(_Phase("pause", label_of("between_s"), "", design.between_s, of_design("between_s")))

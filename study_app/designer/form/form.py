@@ -63,7 +63,7 @@ from study_app.number_text import capitalised
 from study_app.protocol.checks import missing_for_rule
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.participants import ASSIGNMENT, sequences_in
-from study_app.protocol.source import Fault, Path, Places, has, names, places_of, value_at
+from study_app.protocol.source import Fault, Path, Places, has, names, value_at
 from study_app.protocol.warnings import untranslated_at
 from study_app.protocol.wording import LANGUAGES, language_name, languages_of
 
@@ -92,7 +92,7 @@ def form_of(study: Study, path: Path, to_write: tuple[Path, ...] = ()) -> Form:
             faults=why,
             unreadable=True,
         )
-    document, places = study.document, places_of(study.text)
+    document, places = study.document, Places.of(study.text)
     if path == STUDY_LANGUAGES:
         return Form(
             path=path,

@@ -57,7 +57,7 @@ from study_app.gui.widgets import (
 from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
 from study_app.protocol.model import OF_LEVELS
-from study_app.protocol.orders import block_orders_by_group, measures_of
+from study_app.protocol.orders import block_orders_by_group
 from study_app.protocol.randomization import has_even_borders, row_count
 from study_app.protocol.source import entries, names, value_at
 from study_app.protocol.trials import DESIGN_KINDS, TASK_KINDS
@@ -474,7 +474,7 @@ def _measures_of_design(study: Study, block: str) -> tuple[tuple[str, str], ...]
     """Return the measures of a block with a design; every measure if the block has problems."""
     protocol = valid_part(study).protocol
     valid = None if protocol is None else protocol.blocks.get(block)
-    known = OF_LEVELS if protocol is None or valid is None else measures_of(protocol, valid)
+    known = OF_LEVELS if protocol is None or valid is None else protocol.measures_of(valid)
     return tuple(measure for measure in _MEASURES if measure[0] in known)
 
 

@@ -7,7 +7,6 @@ from typing import Final, Literal, TypeAlias
 from study_app.gui.theme import Theme
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.quantities import quantity
 from study_app.protocol.source import Path
 from study_app.protocol.trials import Stimulus
 
@@ -35,7 +34,7 @@ class LevelWords:
     @property
     def value_unit(self) -> str:
         try:
-            return quantity(self.stimulus.vary).unit
+            return self.stimulus.unit
         except KeyError:
             return ""
 

@@ -25,7 +25,6 @@ from study_app.protocol.orders import (
     expected_duration_s,
     numbered_participants,
     orders_of,
-    step_duration_s,
     variants,
 )
 from study_app.protocol.randomization import row_count
@@ -307,9 +306,8 @@ def facts(study: Study) -> Facts:
     valid = valid_part(study)
     if (protocol := valid.protocol) is None:
         return Facts(missing=missing, warnings=translate)
-    language = protocol.study.languages[0]
     known = Facts(
-        steps_s={step: step_duration_s(protocol, step, language) for step in protocol.steps},
+        steps_s={step: expected_duration_s(protocol, step) for step in protocol.steps},
         missing=missing,
         warnings=translate,
     )

@@ -25,7 +25,7 @@ from study_app.lab.ab_comparison import Side as LabSide
 from study_app.lab.parameters import parameter
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import FormStep, PageStep, Step, Trial, build_schedule, variants
-from study_app.protocol.source import Path, StudySource, has, liquid_file_name, value_at
+from study_app.protocol.source import Path, StudySource, has, value_at
 from study_app.protocol.wording import language_name, languages_of
 from study_app.session.pages import Page
 from study_app.session.transitions.page_builder import PARTICIPANT, SEED, Moment, Preview, preview
@@ -384,7 +384,7 @@ class Feeling(QObject):
             )
             return
         title = title_of(document, path)
-        if liquid_file_name(value_at(document, path)) is not None:
+        if value_at(document, (*path, "file")) is not None:
             sentence = f"{title} is in a separate liquid file. Save it there as a preset."
             self.place.message.emit("The liquid was not put back into the study", sentence)
             return

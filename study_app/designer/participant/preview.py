@@ -79,8 +79,8 @@ from study_app.number_text import counted
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import Trial
 from study_app.protocol.questions import Value
-from study_app.protocol.source import Path, places_of, value_at
-from study_app.protocol.wording import words
+from study_app.protocol.source import Path, Places, value_at
+from study_app.protocol.wording import LANGUAGES
 from study_app.session.pages import DesignPage, Page, QuestionnairePage, TaskPage
 from study_app.session.simulated.observers import ProgrammedBall
 from study_app.session.tasks import TankView
@@ -215,7 +215,7 @@ class _LivePage(Coloured, QGraphicsView):
     def _open_page(self, view: ParticipantView) -> ParticipantWindow:
         self.close_page()
         made = ParticipantWindow(
-            words(view.language),
+            LANGUAGES[view.language],
             clock=lambda: time.perf_counter() - self._since_s,
             windowed=True,
             text_scale=self._screen.text_scale,
@@ -614,7 +614,7 @@ class ParticipantPreview(Card):
         if place is None:
             faults = study.faults if study.is_toml else ()
             hiding = next((fault for fault in faults if fault.kind != "no text"), None)  # a missing text hides no page
-            found = study.problems[:1] if hiding is None else (hiding.located(places_of(study.text)),)
+            found = study.problems[:1] if hiding is None else (hiding.located(Places.of(study.text)),)
             problem = next(map(str, found), "the session does not have any steps")
             note = f"The page cannot be shown: {problem}"
             if hiding is not None and study.is_unfinished(hiding):

@@ -24,7 +24,7 @@ from study_app.number_text import counted
 from study_app.protocol.load import is_scene_file, load, parse
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders import Schedule, Trial
-from study_app.protocol.source import known_protocols, protocol_file, shipped, shipped_file, without_byte_order_mark
+from study_app.protocol.source import known_protocols, protocol_file, shipped, without_byte_order_mark
 from study_app.protocol.wording import language_name
 from study_app.session.resume import begun_schedule, find_protocol, is_rehearsal, resume_at, source_to_resume
 from study_app.store import receipt
@@ -203,7 +203,7 @@ def _holds_liquids_alone(path: Path, _changed_ns: int, _size: int) -> bool:
 def is_shipped(source: str) -> bool:
     """Return whether a source is a shipped study rather than one of the same name in the workspace."""
     try:
-        return source in shipped() and protocol_file(source).resolve() == shipped_file(source).resolve()
+        return source in shipped() and protocol_file(source).resolve() == shipped()[source].resolve()
     except ProtocolError:
         return False
 

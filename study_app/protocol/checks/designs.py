@@ -14,7 +14,7 @@ from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.orders.tracks import measures_of, tracks_of
+from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.quantities import can_vary
 from study_app.protocol.source.document import Path, entries, names
 from study_app.protocol.source.problems import Fault, unknown_name
@@ -186,7 +186,7 @@ def _check_contrast(protocol: Protocol, contrast: Contrast, place: Path) -> Iter
             yield from _check_form(protocol, contrast, contrast.form, name, place)
             continue
         items = [item.id for item in asked.statements] if asked is not None else []
-        known = items if block.design is None else measures_of(protocol, block)
+        known = items if block.design is None else protocol.measures_of(block)
         if contrast.measure not in known:
             yield unknown_name(
                 (*place, "measure"), f'block "{name}" does not measure {contrast.measure}', contrast.measure, known

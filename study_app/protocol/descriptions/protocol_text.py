@@ -15,12 +15,12 @@ from study_app.number_text import counted
 from study_app.protocol.model import Block, Condition, Limits, Protocol
 from study_app.protocol.orders.balance import block_order_words, planned_participants
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
-from study_app.protocol.orders.durations import Variant, block_duration_s, expected_duration_s, variants
+from study_app.protocol.orders.durations import Variant, expected_duration_s, variants
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.presented.presentation import link_descriptions
 from study_app.protocol.presented.presented_levels import FASTER, highest_damping
-from study_app.protocol.quantities import liquid_words, quantity
-from study_app.protocol.questionnaires import instrument
+from study_app.protocol.quantities import liquid_words
+from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.questions import Context, Question
 from study_app.protocol.randomization.sequences import row_count
 from study_app.protocol.trials.methods import Adjustment
@@ -173,7 +173,7 @@ def _block_lines(protocol: Protocol, block: Block, language: str, delay_ticks: i
     ]
     if block.design is not None:
         rows += _design_rows(protocol, block, delay_ticks)
-        rows.append(("Duration", f"about {block_duration_s(protocol, block, language) / 60:.0f} min"))
+        rows.append(("Duration", f"about {expected_duration_s(protocol, block.id) / 60:.0f} min"))
     rows.append(("Task", protocol.tasks[block.task].summary))
     if block.design is None and questionnaire is None:
         rows.append(("Asked", "no questions"))
@@ -218,7 +218,7 @@ def _design_rows(protocol: Protocol, block: Block, delay_ticks: int) -> Iterator
         yield "Settings", f"{steps} steps from one end to the other, starting near either end, {longest}"
     pairs = product(protocol.standards_of(block), levels)
     compared = [stimulus.comparison(standard, level) for standard, level in pairs]
-    unit = quantity(stimulus.vary).unit
+    unit = stimulus.unit
     yield "Comparisons", f"{stimulus.vary} from {min(compared):.4g} to {max(compared):.4g} {unit}".rstrip()
     task = protocol.tasks[block.task]
     if isinstance(task, Follow) and stimulus.vary != DELAY:
@@ -327,7 +327,7 @@ def _question_lines(protocol: Protocol, name: str, language: str) -> Iterable[st
     ]
     more = [f"  Scores: {', '.join(questionnaire.scores)}"] if questionnaire.scores else []
     if questionnaire.instrument is not None:
-        standard = instrument(questionnaire.instrument)
+        standard = Instrument(questionnaire.instrument).table
         more += [f"  Source: {standard['source']}", f"  Compared: {standard['compared']}"]
     return (title, *_aligned(rows), *more)
 

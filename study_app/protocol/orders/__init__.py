@@ -9,15 +9,7 @@ from study_app.protocol.orders.balance import (
     numbered_participants,
 )
 from study_app.protocol.orders.block_orders import block_codes, order_of, orders_of
-from study_app.protocol.orders.durations import (
-    ANSWER_S,
-    CHOICE_S,
-    duration_range_s,
-    expected_duration_s,
-    recordings_of,
-    step_duration_s,
-    variants,
-)
+from study_app.protocol.orders.durations import duration_range_s, expected_duration_s, recordings_of, variants
 from study_app.protocol.orders.schedule import (
     FormStep,
     PageStep,
@@ -29,11 +21,9 @@ from study_app.protocol.orders.schedule import (
     draw_key,
     reproduce,
 )
-from study_app.protocol.orders.tracks import measures_of, tracks_of
+from study_app.protocol.orders.tracks import tracks_of
 
 __all__ = [
-    "ANSWER_S",
-    "CHOICE_S",
     "Evenness",
     "FormStep",
     "PageStep",
@@ -50,13 +40,11 @@ __all__ = [
     "duration_range_s",
     "evenness",
     "expected_duration_s",
-    "measures_of",
     "numbered_participants",
     "order_of",
     "orders_of",
     "recordings_of",
     "reproduce",
-    "step_duration_s",
     "tracks_of",
     "variants",
 ]

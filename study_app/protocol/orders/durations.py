@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from study_app.protocol.model import Block, Protocol, Questionnaire
 from study_app.protocol.orders.block_orders import order_of
-from study_app.protocol.trials.methods import Adjustment
+from study_app.protocol.trials.designs import ANSWER_S
 from study_app.protocol.trials.tasks import AnyTask
 
 
@@ -37,23 +37,19 @@ def variants(protocol: Protocol) -> Iterator[Variant]:
 
 _READING_WORDS_PER_S = 3.0
 _PAGE_S = 5.0
-ANSWER_S = 6.0
-CHOICE_S = 2.0
-"""How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page, answer one
-statement, choose an interval."""
+"""How long people take, for the expected duration [choice]: read (180 words a minute) and turn a page."""
 
 
-def expected_duration_s(protocol: Protocol) -> float:
-    """Return the expected duration of a session [s], between the shortest and the longest."""
-    language = protocol.study.languages[0]
-    return sum(step_duration_s(protocol, step, language) for step in protocol.steps)
+def expected_duration_s(protocol: Protocol, *steps: str) -> float:
+    """Return the expected duration of some steps, or of a session [s], between the shortest and the longest."""
+    return sum(_step_duration_s(protocol, step) for step in steps or protocol.steps)
 
 
 def duration_range_s(protocol: Protocol) -> tuple[float, float]:
     """Return the shortest and the longest duration of a session [s], since tasks may end before their limit."""
 
     def session_s(own: Protocol, task_s: Callable[[AnyTask], float]) -> float:
-        return sum(step_duration_s(own, step, own.study.languages[0], task_s) for step in own.steps)
+        return sum(_step_duration_s(own, step, task_s) for step in own.steps)
 
     kinds = [variant.protocol for variant in variants(protocol)]
     least_s = min(
@@ -62,23 +58,20 @@ def duration_range_s(protocol: Protocol) -> tuple[float, float]:
     return least_s, max(session_s(session, lambda task: task.limit_s) for session in kinds)
 
 
-def step_duration_s(
-    protocol: Protocol, step: str, language: str, of_task: Callable[[AnyTask], float] | None = None
-) -> float:
-    """Return the duration of a page, form or block [s], read in one of the study's languages."""
+def _step_duration_s(protocol: Protocol, step: str, of_task: Callable[[AnyTask], float] | None = None) -> float:
+    """Return the duration of a page, form or block [s]; ``of_task`` is that of a task if it is not the expected one."""
     if step in protocol.pages:
-        return _reading_s(protocol, step, language)
+        return _reading_s(protocol, step)
     if step in protocol.forms:
         return _answering_s(protocol.forms[step])
-    return block_duration_s(protocol, protocol.blocks[step], language, of_task)
+    return _block_duration_s(protocol, protocol.blocks[step], of_task)
 
 
 def recordings_of(protocol: Protocol) -> Iterator[tuple[int, float]]:
     """Yield the number of a block's recordings in a session and the expected duration of each [s]."""
     for block in (protocol.blocks[step] for step in protocol.steps if step in protocol.blocks):
-        method = protocol.method_of(block) if block.stimulus is not None else None
         intervals = 1 if block.design is None else protocol.design_of(block).intervals
-        longer_s = method.most_s / 2 if isinstance(method, Adjustment) else 0.0
+        longer_s = 0.0 if block.stimulus is None else protocol.method_of(block).setting_s
         yield order_of(protocol, block).trials * intervals, protocol.tasks[block.task].expected_s + longer_s
 
 
@@ -87,26 +80,25 @@ def _answering_s(questionnaire: Questionnaire) -> float:
     return _PAGE_S + ANSWER_S * len(questionnaire.items)
 
 
-def _reading_s(protocol: Protocol, page_id: str, language: str) -> float:
+def _reading_s(protocol: Protocol, page_id: str) -> float:
+    """Return the time to read a page in the study's first language [s]."""
     page = protocol.pages[page_id]
-    return max(_PAGE_S + len(protocol.text(page.body, language).split()) / _READING_WORDS_PER_S, page.min_s or 0.0)
+    words = protocol.text(page.body, protocol.study.languages[0]).split()
+    return max(_PAGE_S + len(words) / _READING_WORDS_PER_S, page.min_s or 0.0)
 
 
-def block_duration_s(
-    protocol: Protocol, block: Block, language: str, of_task: Callable[[AnyTask], float] | None = None
-) -> float:
-    """Return the duration of a block [s]; ``of_task`` gives a task's duration if it is not the expected one."""
+def _block_duration_s(protocol: Protocol, block: Block, of_task: Callable[[AnyTask], float] | None) -> float:
     questionnaire = protocol.questionnaire_of(block.id)
     answering = 0.0 if questionnaire is None else _answering_s(questionnaire)
     order = order_of(protocol, block)
-    resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page, language)
+    resting = 0.0 if block.break_page is None else order.breaks * _reading_s(protocol, block.break_page)
     task = protocol.tasks[block.task]
     task_s = task.expected_s if of_task is None else of_task(task)
     if block.design is not None:
         design = protocol.design_of(block)
-        answer_s = CHOICE_S if design.reply == "choice" else ANSWER_S
-        answering = answer_s + design.between_s + design.feedback_s * design.shows_feedback(block.phase == "practice")
+        feedback_s = design.feedback_s * design.shows_feedback(block.phase == "practice")
+        answering = design.answer_s + design.between_s + feedback_s
         task_s = design.intervals * task_s + (design.intervals - 1) * design.pause_s
-        if isinstance(method := protocol.method_of(block) if block.stimulus else None, Adjustment):
-            task_s, answering = task_s + method.most_s / 2, design.between_s
+        if block.stimulus is not None and (setting_s := protocol.method_of(block).setting_s):
+            task_s, answering = task_s + setting_s, design.between_s
     return order.trials * (task_s + answering) + resting

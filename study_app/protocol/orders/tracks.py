@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import OF_LEVELS, Protocol
+from study_app.protocol.model import Protocol
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,19 +46,3 @@ def tracks_of(protocol: Protocol, block: Block) -> tuple[Track, ...]:
 def track_of(protocol: Protocol, block: Block, name: str) -> Track:
     """Return the track with a name (StopIteration if there is none)."""
     return next(track for track in tracks_of(protocol, block) if track.name == name)
-
-
-def measures_of(protocol: Protocol, block: Block) -> tuple[str, ...]:
-    """Return the measures of `OF_LEVELS` that the answers of a block with a design determine.
-
-    An exponent needs estimates, or thresholds at two standards or more, which are on a level that is not a value.
-    """
-    design, stimulus = protocol.design_of(block), None if block.stimulus is None else protocol.stimulus_of(block)
-    measures = {"rating": {"d_prime"}, "number": {"exponent"}, "setting": {"pse"}}.get(design.reply, set())
-    if design.reply == "choice" and design.can_be_correct(stimulus):
-        measures.add("d_prime")
-    if design.reply == "choice" and stimulus is not None and stimulus.rises(design):
-        measures.add("threshold")
-        if stimulus.level_kind != "value" and len(protocol.standards_of(block)) > 1:
-            measures.add("exponent")
-    return tuple(measure for measure in OF_LEVELS if measure in measures)

@@ -1,17 +1,6 @@
 """The protocol file: where it is, its lines and its problems."""
 
-from study_app.protocol.source.document import (
-    Node,
-    Path,
-    Places,
-    entries,
-    frozen,
-    has,
-    names,
-    places_of,
-    scan_nodes,
-    value_at,
-)
+from study_app.protocol.source.document import Node, Path, Places, entries, frozen, has, names, scan_nodes, value_at
 from study_app.protocol.source.files import (
     TABLE,
     StudySource,
@@ -20,7 +9,6 @@ from study_app.protocol.source.files import (
     has_hash,
     is_utf16,
     known_protocols,
-    liquid_file_name,
     protocol_file,
     protocol_hash,
     shipped,
@@ -64,9 +52,7 @@ __all__ = [
     "has_hash",
     "is_utf16",
     "known_protocols",
-    "liquid_file_name",
     "names",
-    "places_of",
     "protocol_file",
     "protocol_hash",
     "rule_of",

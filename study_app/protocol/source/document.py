@@ -224,6 +224,12 @@ class Places:
     def __init__(self, source: str) -> None:
         self._source = source
 
+    @staticmethod
+    @lru_cache(maxsize=2)
+    def of(text: str) -> Places:
+        """Return the lines of a TOML text with any kind of line endings."""
+        return Places(text.replace("\r\n", "\n"))
+
     @cached_property
     def _lines(self) -> dict[Path, int]:
         """The lines by path; only texts with problems are scanned for them."""
@@ -242,9 +248,3 @@ class Places:
             if (line := self._lines.get(path[:length])) is not None:
                 return line
         return None
-
-
-@lru_cache(maxsize=2)
-def places_of(text: str) -> Places:
-    """Return the lines of a TOML text with any kind of line endings."""
-    return Places(text.replace("\r\n", "\n"))

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from pathlib import Path, PureWindowsPath
 from types import MappingProxyType
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from study_app.errors import Problem, ProtocolError
 from study_app.ids import file_name_fault
@@ -93,11 +93,6 @@ def _table_bytes(header: bytes, texts: Mapping[str, str]) -> bytes:
 
     rows = "".join(f"{quoted(name)} = {quoted(text)}\n" for name, text in texts.items())
     return header + rows.encode() if texts else b""
-
-
-def liquid_file_name(liquid: Any) -> Any:
-    """Return the file name in a liquid's table; None if it has none."""
-    return liquid.get("file") if isinstance(liquid, Mapping) else None
 
 
 def file_path_fault(path: str) -> str:
@@ -179,9 +174,9 @@ def _shipped_folder() -> Path:
     return inside if inside.is_dir() else _PACKAGE.parent / "protocols"
 
 
-def shipped() -> tuple[str, ...]:
-    """Return the sorted names of the shipped protocols."""
-    return tuple(name for name in _SHIPPED if shipped_file(name).is_file())
+def shipped() -> dict[str, Path]:
+    """Return the files of the shipped protocols by name, sorted."""
+    return {name: file for name in _SHIPPED if (file := shipped_file(name)).is_file()}
 
 
 def shipped_file(name: str) -> Path:
@@ -192,7 +187,7 @@ def shipped_file(name: str) -> Path:
 def shipped_studies() -> tuple[Path, ...]:
     """Return the files of all shipped studies: protocols and the designer's templates."""
     templates = (_PACKAGE / "designer" / "templates").glob("*.toml")
-    return (*(shipped_file(name) for name in shipped()), *sorted(templates))
+    return (*shipped().values(), *sorted(templates))
 
 
 def known_protocols() -> tuple[str, ...]:

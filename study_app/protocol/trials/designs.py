@@ -28,6 +28,9 @@ _Arrangement: TypeAlias = tuple[bool, ...]
 _AnswerCounts: TypeAlias = Mapping[tuple[int, str], int]
 """How often each answer was given to each arrangement."""
 Model: TypeAlias = Literal["differencing", "independent"]
+ANSWER_S: Final = 6.0
+_CHOICE_S: Final = 2.0
+"""How long people take to answer one statement and to choose an interval, for the expected duration. [choice]"""
 ORDINALS: Final = ("first", "second", "third", "fourth")
 
 
@@ -109,6 +112,11 @@ class Design(Table):
     def adjusts(self) -> bool:
         """Whether the participant sets the level of the last interval while it is presented."""
         return self.reply == "setting"
+
+    @property
+    def answer_s(self) -> float:
+        """How long people take to answer [s]."""
+        return _CHOICE_S if self.reply == "choice" else ANSWER_S
 
     @property
     def name(self) -> str:

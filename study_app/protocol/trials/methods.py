@@ -101,6 +101,11 @@ class Method(Table):
     """The percentage of successes at the mean of its reversals; None where it has no steps."""
 
     @property
+    def setting_s(self) -> float:
+        """How long people take to set a level, in addition to the task [s]; 0 if they do not."""
+        return 0.0
+
+    @property
     def paper_name(self) -> str:
         """Its name in publications, with the source."""
         return self.kind
@@ -250,6 +255,10 @@ class Adjustment(Method):
     most_s: Annotated[float, within(2, 600, "a hand needs 2 s to feel a change and tires within minutes")] = Field(
         default=60, description="Maximum time for each setting [s]."
     )
+
+    @property
+    def setting_s(self) -> float:
+        return self.most_s / 2
 
     def levels_of(self, stimulus: Stimulus) -> tuple[float, ...]:
         return stimulus.levels

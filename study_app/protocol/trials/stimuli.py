@@ -16,6 +16,7 @@ from pydantic.json_schema import SkipJsonSchema
 from study_app.haptics.model import scene
 from study_app.haptics.model.ranges import later, within
 from study_app.haptics.model.scene import ForceLink
+from study_app.protocol.quantities import quantity, quantity_words
 from study_app.protocol.source.table import Id, Table, invalid
 from study_app.protocol.trials.designs import Design
 from study_app.psychophysics.families import Family, Floats
@@ -200,6 +201,16 @@ class Stimulus(Table):
     direction: Literal["up", "down"] = Field(
         default="up", description="up: comparisons are above the standard; down: below it."
     )
+
+    @property
+    def quantity(self) -> str:
+        """The name of the varied quantity within a sentence (KeyError if there is none)."""
+        return quantity_words(self.vary)
+
+    @property
+    def unit(self) -> str:
+        """The unit of the varied quantity (KeyError if there is none)."""
+        return quantity(self.vary).unit
 
     @property
     def level_kind(self) -> _LevelKind:

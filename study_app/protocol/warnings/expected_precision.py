@@ -21,7 +21,6 @@ from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.presented.presented_levels import Clipping, clipping
-from study_app.protocol.quantities import quantity
 from study_app.protocol.trials.designs import Design, Rated
 from study_app.protocol.trials.methods import Method, TrackSetting
 from study_app.protocol.trials.stimuli import LINEAR_WIDTH, WIDTH_PRIOR, Stimulus
@@ -258,7 +257,7 @@ class ThresholdPlan:
     def unit(self) -> str:
         """The unit of a threshold with a leading space."""
         weber = self.stimulus.level_kind == "weber"
-        return "" if weber else f" {quantity(self.stimulus.vary).unit}".rstrip()
+        return "" if weber else f" {self.stimulus.unit}".rstrip()
 
     def each_standard(self) -> tuple[ThresholdPlan, ...]:
         """Return the plan of each standard with its clipping, the highest first; only this one if all are alike."""

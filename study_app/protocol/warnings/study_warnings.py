@@ -19,7 +19,7 @@ from study_app.protocol.model import Follow, Protocol, Published, Reach
 from study_app.protocol.orders.durations import variants
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.presented.presented_levels import highest_damping
-from study_app.protocol.questionnaires import instrument
+from study_app.protocol.questionnaires import Instrument
 from study_app.protocol.questions import POINTS
 from study_app.protocol.trials.stimuli import DELAY, OF_CONDITION, OF_LINK
 from study_app.protocol.warnings.delayed_force import delay_warnings
@@ -405,7 +405,7 @@ def _tasks_without_target(protocol: Protocol) -> Iterator[str]:
 def _recalled_instruments(protocol: Protocol) -> Iterator[str]:
     for name, questionnaire in protocol.questionnaires.items():
         of = questionnaire.instrument
-        if of is not None and (recalled := instrument(of).get("from_memory")) is not None:
+        if of is not None and (recalled := Instrument(of).table.get("from_memory")) is not None:
             yield (
                 f"questionnaires.{name}: the wording was written from memory and has not been checked "
                 f"against a source ({recalled}); check it against your copy"

@@ -28,7 +28,7 @@ from study_app.protocol.load import load
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_level
-from study_app.protocol.source.document import places_of, value_at
+from study_app.protocol.source.document import Places, value_at
 from study_app.protocol.source.files import shipped, shipped_file
 from study_app.protocol.warnings.expected_precision import ThresholdPlan, expected, threshold_plan
 from tests.designer.document.grown import PROTOCOLS
@@ -56,7 +56,7 @@ def test_what_does_not_belong_there_is_removed_by_a_repair_and_not_by_its_reader
     for study, fault, case in surplus:
         assert not re.search(r"\bomit|\bremove\b", f"{fault.message} {fault.hint}"), case.name
         assert "Remove" in [repair.words for repair in repairs(study, fault)], (case.name, fault)
-        assert str(fault.located(places_of(study.text))).endswith("remove it)")
+        assert str(fault.located(Places.of(study.text))).endswith("remove it)")
     for case, study in studies:
         assert not [fault for fault in study.faults if "omit" in f"{fault.message} {fault.hint}"], case.name
 

@@ -5,14 +5,7 @@ from typing import Any
 import pytest
 
 from study_app.protocol.load import parse
-from study_app.protocol.questionnaires import (
-    Questionnaire,
-    instrument,
-    instrument_tables,
-    instruments,
-    scale_name,
-    with_instruments,
-)
+from study_app.protocol.questionnaires import Instrument, Questionnaire, with_instruments
 from study_app.protocol.questions import Context, NumberView, Scale, ShowIf, shown_questions
 from study_app.protocol.source.document import frozen
 from study_app.protocol.source.problems import Fault
@@ -39,21 +32,21 @@ def test_names_of_trials_are_in_every_language_of_the_study() -> None:
     assert label == {"en": "Trial", "nl": "Ronde"}
 
 
-def bare(name: str, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
+def bare(standard: Instrument, languages: tuple[str, ...]) -> tuple[dict[str, Any], dict[str, Any]]:
     items = [
         {"id": item["id"], **({"options": [{"id": one["id"]} for one in item["options"]]} if "options" in item else {})}
-        for item in instrument(name)["items"]
+        for item in standard.table["items"]
     ]
-    return {"instrument": name, "items": items}, {}
+    return {"instrument": standard.name, "items": items}, {}
 
 
-@pytest.mark.parametrize("begin", [bare, instrument_tables])
+@pytest.mark.parametrize("begin", [bare, Instrument.tables_in])
 @pytest.mark.parametrize("other", ["en", "nl", "de", "fr", "ar"])
-@pytest.mark.parametrize("name", instruments())
+@pytest.mark.parametrize("name", Instrument.names())
 def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_rest(
     name: str, other: str, begin: Any
 ) -> None:
-    languages, source = tuple(dict.fromkeys(("en", other))), instrument(name)
+    languages, source = tuple(dict.fromkeys(("en", other))), Instrument(name).table
     lacking = [one for one in languages if one not in source["languages"]]
 
     def filled(table: dict[str, Any], scales: dict[str, Any]) -> tuple[Any, list[Fault]]:
@@ -69,7 +62,7 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
             included if source["languages"] else f"the licence of {name} does not permit its texts to be included"
         )
 
-    table, scales = begin(name, languages)
+    table, scales = begin(Instrument(name), languages)
     for _ in range(3):
         found, faults = filled(frozen(table), frozen(scales))
         for fault in faults:
@@ -82,7 +75,7 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
                 continue
             table["intro"] = {**table.get("intro", {}), **dict.fromkeys(words, "own")}
             for scale, one in source.get("scales", {}).items():
-                labels = scales.setdefault(scale_name(name, scale), {"labels": {}})["labels"]
+                labels = scales.setdefault(Instrument(name).scale_name(scale), {"labels": {}})["labels"]
                 labels.update((language, [f"{language} {n}" for n in range(one["points"])]) for language in words)
         for scale in scales.values():
             known = next(iter(scale["labels"].values()))
@@ -90,7 +83,7 @@ def test_a_study_inherits_what_is_known_of_an_instrument_and_is_asked_for_the_re
     assert faults == []
     form = Questionnaire.model_validate(found["questionnaires"]["form"])
     assert set(form.scores) == set(source["scores"])
-    assert set(found["scales"]) == {scale_name(name, one) for one in source.get("scales", {})}
+    assert set(found["scales"]) == {Instrument(name).scale_name(one) for one in source.get("scales", {})}
     for item, known in zip(form.items, source["items"], strict=True):
         assert (item.id, item.kind_id) == (known["id"], known["kind"])
         context = Context({one: Scale.model_validate(scale) for one, scale in found["scales"].items()}, None, "en")

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from study_app.protocol.questionnaires import Score, instrument, instruments
+from study_app.protocol.questionnaires import Instrument, Score
 
 ITEMS = {"nasa-tlx": 6, "nasa-tlx-weighted": 21, "sus": 10, "ipq": 14, "panas": 20, "ssq": 16, "ueq": 26}
 WITH_TEXTS = {"nasa-tlx", "nasa-tlx-weighted", "sus"}
@@ -19,8 +19,8 @@ def bounds_of(item: dict[str, Any], found: dict[str, Any]) -> tuple[float, float
 
 @pytest.mark.parametrize("name", sorted(ITEMS))
 def test_an_instrument_has_its_items_source_and_licence_and_no_texts_that_it_may_not_have(name: str) -> None:
-    assert set(instruments()) == set(ITEMS)
-    found = instrument(name)
+    assert set(Instrument.names()) == set(ITEMS)
+    found = Instrument(name).table
     assert len({item["id"] for item in found["items"]}) == len(found["items"]) == ITEMS[name]
     assert min(len(found[key]) for key in ("source", "licence", "compared")) > 20
     texts = [key for item in found["items"] for key in ("text", "low", "high", "short") if key in item]
@@ -31,7 +31,7 @@ def test_an_instrument_has_its_items_source_and_licence_and_no_texts_that_it_may
 
 @pytest.mark.parametrize("case", PUBLISHED["worked"], ids=lambda case: f"{case['instrument']} {case['answers']}"[:40])
 def test_published_and_worked_scores(case: dict[str, Any]) -> None:
-    found = instrument(case["instrument"])
+    found = Instrument(case["instrument"]).table
     asked = [item["id"] for item in found["items"]]
     given = case["answers"] if isinstance(case["answers"], list) else [case["answers"]] * len(asked)
     answers = dict(zip(asked, given, strict=True))
@@ -52,7 +52,7 @@ RANGES = {
 
 @pytest.mark.parametrize(("name", "which"), RANGES)
 def test_scores_have_their_published_range(name: str, which: str) -> None:
-    found = instrument(name)
+    found = Instrument(name).table
     bounds = {item["id"]: bounds_of(item, found) for item in found["items"] if item["kind"] != "choice"}
     assert Score.model_validate(found["scores"][which]).range_of(bounds) == pytest.approx(RANGES[name, which])
 
@@ -68,7 +68,7 @@ def test_the_range_of_a_score_of_reversed_and_weighted_items() -> None:
 
 @pytest.mark.parametrize("name", PUBLISHED["items"])
 def test_scores_have_their_published_items(name: str) -> None:
-    found = instrument(name)
+    found = Instrument(name).table
     places = {item["id"]: place for place, item in enumerate(found["items"], start=1)}
     for which, expected in PUBLISHED["items"][name].items():
         assert sorted(places[item] for item in found["scores"][which]["items"]) == expected
