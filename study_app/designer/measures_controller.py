@@ -29,7 +29,7 @@ from study_app.designer.window import DesignerPlace
 from study_app.errors import StudyError
 from study_app.gui.widgets import delayed_call
 from study_app.number_text import capitalised, counted
-from study_app.protocol.source import protocol_hash, source_bytes
+from study_app.protocol.source import protocol_hash
 from study_app.store.files import study_folder, write_files
 from study_app.workers.server import Crashed
 
@@ -102,7 +102,7 @@ class MeasuresController(QObject):
         try:
             study = study_folder(self._editing.results, str(opened.study.document["study"]["name"]))
             text = (study.path / PREREGISTRATION).read_text(encoding="utf-8")
-            return bool(opened.base) and protocol_hash(source_bytes(str(opened.file))) not in text
+            return bool(opened.base) and protocol_hash(opened.saved_source) not in text
         except (StudyError, OSError, UnicodeDecodeError, LookupError, TypeError):
             return False
 

@@ -257,7 +257,7 @@ def version_of(opened: Document, run: Run) -> Version:
     """Return a version that was run, from its stored copy or the current file."""
     source = source_of(run)
     if source is None:
-        file = Study(opened.saved, opened.study.folder).source
+        file = opened.saved_source
         source = file.decode() if content_hash(file) == run.hash else None
     return Version(source, run)
 

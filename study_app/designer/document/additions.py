@@ -28,7 +28,7 @@ from study_app.designer.document.toml_edits import Duplicate, Edit, Insert, Move
 from study_app.designer.document.toml_text import Refused
 from study_app.ids import MAX_ID, free_id
 from study_app.number_text import MINUS, exact_text, number_of
-from study_app.protocol.checks import TEXTS, check_paced, missing_for_rule
+from study_app.protocol.checks import TEXTS, check_paced, fitting_rules
 from study_app.protocol.model import RULE_LIMITS, RULES
 from study_app.protocol.participants import ASSIGNMENT
 from study_app.protocol.questionnaires import Instrument
@@ -441,7 +441,7 @@ def edits_to_add(
 def _usual_rule(study: Study) -> dict[str, Any]:
     """Return the first exclusion rule that applies to the study and is not in it yet, with its usual limit."""
     known = {value for _, value in entries(study.document, "analysis.exclusions.*.rule")}
-    fitting = [rule for rule in RULES if study.formed is None or not missing_for_rule(study.formed, rule)]
+    fitting = tuple(RULES) if study.formed is None else fitting_rules(study.formed)
     rule = next((rule for rule in fitting if rule not in known), fitting[0])
     limit = RULE_LIMITS.get(rule)
     return {"rule": rule} if limit is None else {"rule": rule, "limit": limit.usual}

@@ -22,7 +22,7 @@ from study_app.errors import StoreError
 from study_app.ids import MAX_SHORT_NAME, file_name_fault, free_short_name, short_name_of
 from study_app.number_text import counted
 from study_app.protocol.source import Path as Place
-from study_app.protocol.source import StudySource, did_you_mean, file_hash, shipped, value_at, without_byte_order_mark
+from study_app.protocol.source import StudySource, did_you_mean, file_hash, shipped, value_at
 from study_app.protocol.wording import languages_of
 from study_app.store.files import StudyFolder, cannot_write
 from study_app.store.integrity import is_open
@@ -294,7 +294,7 @@ class Document:
 
     def keep_edits(self, now_s: float) -> None:
         content = _file_content(self.file) if self.file.exists() else b""
-        self.saved = without_byte_order_mark(content).decode("utf-8", "replace")
+        self.saved = content.decode("utf-8-sig", "replace")
         self._rebase(content_hash(content) if self.file.exists() else "")
         self.note_edit(now_s)
 
@@ -326,10 +326,15 @@ class Document:
 
     # versions
 
+    @property
+    def saved_source(self) -> bytes:
+        """The content of the saved study that a session would use."""
+        return Study(self.saved, self.study.folder).source
+
     def standing(self, known: tuple[Run, ...]) -> Standing:
         if not any(run.sessions for run in known):
             return version_standing("", "", self.version, known)
-        base = content_hash(Study(self.saved, self.study.folder).source) if self.base else ""
+        base = content_hash(self.saved_source) if self.base else ""
         return version_standing(content_hash(self.study.source), base, self.version, known)
 
     def save(self, known: tuple[Run, ...]) -> None:

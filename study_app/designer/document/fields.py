@@ -20,7 +20,7 @@ from study_app.protocol.checks import CHOICES, ITEM_REFERENCES
 from study_app.protocol.file_format import length_texts, schema
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.questions import POINTS
-from study_app.protocol.source import ALTERNATIVES, NOT_WITH, SECTIONS, Path, entries, has, names, rule_of, value_at
+from study_app.protocol.source import FormKey, Path, entries, has, names, rule_of, value_at
 from study_app.protocol.trials import DESIGN_KINDS as DESIGNS
 from study_app.protocol.trials import METHOD_KINDS as METHODS
 from study_app.protocol.trials import Design, default_design
@@ -543,14 +543,14 @@ def rows(document: Mapping[str, Any], path: Path) -> tuple[Row, ...]:
 def sections_of(document: Mapping[str, Any], path: Path) -> tuple[tuple[str, tuple[str, ...]], ...]:
     """Return the form sections of a table's model, each heading with its keys; other keys come last."""
     node = table_of(node_at(document, path), value_at(document, path)) or {}
-    return tuple((heading, tuple(keys)) for heading, keys in node.get(SECTIONS, ()))
+    return tuple((heading, tuple(keys)) for heading, keys in node.get(FormKey.SECTIONS, ()))
 
 
 def key_order(document: Mapping[str, Any], path: Path) -> dict[str, int]:
     """Return the position of each key of an element in its form, in which inner tables come last."""
     nodes, value = node_at(document, path), value_at(document, path)
     node, table = table_of(nodes, value) or {}, value if isinstance(value, Mapping) else {}
-    in_sections = (key for _, keys in node.get(SECTIONS, ()) for key in keys)
+    in_sections = (key for _, keys in node.get(FormKey.SECTIONS, ()) for key in keys)
     written = (distinguishing_key(nodes)[0], *in_sections, *node.get("properties", ()), *table)
     inner = {key for key, part in table.items() if isinstance(part, Mapping)
              and any("properties" in node for node in node_at(document, (*path, key)))}  # fmt: skip
@@ -565,7 +565,7 @@ def refused_at(document: Mapping[str, Any], path: Path) -> frozenset[str]:
         return frozenset()
     if path[:2] == EXCLUSIONS:
         return frozenset() if table.get("rule") in RULE_LIMITS else frozenset({"limit"})
-    applies = (keys for given, keys in node.get(NOT_WITH, ()) if all(key in table for key in given))
+    applies = (keys for given, keys in node.get(FormKey.NOT_WITH, ()) if all(key in table for key in given))
     return frozenset(next(applies, ()))
 
 
@@ -595,7 +595,7 @@ def row_at(document: Mapping[str, Any], path: Path) -> Row | None:
     if not nodes:
         return None if value is None else Row(path=path, kind="unknown", label=label_of(path[-1]), value=value)
     row = _make_row(document, path, nodes, value, required=path[-1] in around.get("required", ()))
-    pairs = [pair for pair in around.get(ALTERNATIVES, ()) if path[-1] in pair]
+    pairs = [pair for pair in around.get(FormKey.ONE_OF, ()) if path[-1] in pair]
     instead = next((key for pair in pairs for key in pair if key != path[-1]), "")
     return replace(row, instead=instead, model=around.get("title", ""))
 

@@ -43,15 +43,13 @@ from study_app.designer.document.fields import (
     unit_of,
     with_references,
 )
-from study_app.designer.document.study import Study
+from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Edit, Insert, Move, Set, Unset
 from study_app.designer.document.toml_text import Refused, with_own_line_ends
 from study_app.ids import free_id
 from study_app.number_text import counted
-from study_app.protocol.load import read_document
-from study_app.protocol.model import SceneDefaults
 from study_app.protocol.questionnaires import Instrument
-from study_app.protocol.source import Path, names, shipped, source_bytes, value_at
+from study_app.protocol.source import Path, names, shipped, value_at
 from study_app.protocol.wording import language_name, languages_of
 
 Recorded: TypeAlias = Callable[[Path], frozenset[str]]
@@ -324,7 +322,7 @@ _SCALE: Final = ("scene", "scale")
 
 @cache
 def _shipped_documents() -> dict[str, Mapping[str, Any]]:
-    return {name: read_document(source_bytes(name), name)[0] for name in shipped()}
+    return {name: read_study(file.read_bytes(), file.parent).document for name, file in shipped().items()}
 
 
 @cache
@@ -376,7 +374,7 @@ class AddLiquid(Request):
     def _scales(self, study: Study) -> tuple[float, float]:
         """Return the scale of the scene in the shipped study and in this one."""
         documents = (_shipped_documents()[self.source], study.document)
-        theirs, own = (value_at(it, _SCALE) or SceneDefaults.model_fields["scale"].default for it in documents)
+        theirs, own = (value_at(it, _SCALE) or initial_value(it, _SCALE) for it in documents)
         return theirs, own
 
     def step(self, at: Situation) -> Step:

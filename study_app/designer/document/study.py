@@ -14,7 +14,7 @@ from study_app.designer.document.toml_text import Refused, Splice, Splices, appl
 from study_app.errors import Problem, ProtocolError
 from study_app.protocol.load import located_problems, read_document, validate_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.source import TABLE, Fault, Path, Places, is_utf16, with_liquid_files, without_byte_order_mark
+from study_app.protocol.source import TABLE, Fault, Path, Places, is_utf16, with_liquid_files
 
 _NOT_TOML: Final = "the file cannot be read: correct its text first"
 
@@ -162,7 +162,7 @@ def read_study(source: bytes, folder: File = File()) -> Study:
     if is_utf16(source):
         raise Refused("this is UTF-16 text: save the file as UTF-8")
     try:
-        return Study(without_byte_order_mark(source).decode("utf-8"), folder)
+        return Study(source.decode("utf-8-sig"), folder)
     except UnicodeDecodeError as error:
         line = source.count(b"\n", 0, error.start) + 1
         raise Refused(f"line {line} is not UTF-8 text: save the file as UTF-8") from error

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import compress
 from typing import Any, Final
 
 from study_app.designer.document.additions import number_rows
@@ -60,7 +59,7 @@ from study_app.designer.form.rows import (
 from study_app.designer.measures.study_facts import copied_texts, texts_by_language, valid_part
 from study_app.designer.outline import icon_of
 from study_app.number_text import capitalised
-from study_app.protocol.checks import missing_for_rule
+from study_app.protocol.checks import fitting_rules
 from study_app.protocol.model import RULE_LIMITS
 from study_app.protocol.participants import ASSIGNMENT, sequences_in
 from study_app.protocol.source import Fault, Path, Places, has, names, value_at
@@ -317,8 +316,8 @@ def _exclusion_row(study: Study, row: Row) -> Row:
     protocol = valid_part(study).protocol
     if row.path[-1] != "rule" or protocol is None:
         return row
-    fits = (choice.value == row.value or not missing_for_rule(protocol, str(choice.value)) for choice in row.choices)
-    return replace(row, choices=tuple(compress(row.choices, fits)))
+    fitting = (row.value, *fitting_rules(protocol))
+    return replace(row, choices=tuple(choice for choice in row.choices if choice.value in fitting))
 
 
 def _notes(document: Mapping[str, Any], row: Row) -> Iterator[tuple[str, str]]:

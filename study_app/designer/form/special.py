@@ -56,7 +56,6 @@ from study_app.gui.widgets import (
 )
 from study_app.number_text import capitalised, number_of, unclear_number
 from study_app.protocol import questions
-from study_app.protocol.model import OF_LEVELS
 from study_app.protocol.orders import block_orders_by_group
 from study_app.protocol.randomization import has_even_borders, row_count
 from study_app.protocol.source import entries, names, value_at
@@ -398,7 +397,9 @@ GROUP_ASSIGNMENT: Final = SpecialEditor(
     (("StudyHead", "group_assignment"),), adds=lambda _field: _Said(), facts=_choice_sentences
 )
 
-_MEASURES: Final = tuple(zip(OF_LEVELS, ("Threshold", "Exponent", "Sensitivity d′", "Setting (PSE)"), strict=True))
+_MEASURES: Final = (
+    ("threshold", "Threshold"), ("exponent", "Exponent"), ("d_prime", "Sensitivity d′"), ("pse", "Setting (PSE)"),
+)  # fmt: skip
 _RELATIONS: Final = (
     (None, "is different from"), ("higher", "is higher than"), ("lower", "is lower than"), ("equal", "is equal to"),
 )  # fmt: skip
@@ -474,7 +475,9 @@ def _measures_of_design(study: Study, block: str) -> tuple[tuple[str, str], ...]
     """Return the measures of a block with a design; every measure if the block has problems."""
     protocol = valid_part(study).protocol
     valid = None if protocol is None else protocol.blocks.get(block)
-    known = OF_LEVELS if protocol is None or valid is None else protocol.measures_of(valid)
+    if protocol is None or valid is None:
+        return _MEASURES
+    known = protocol.measures_of(valid)
     return tuple(measure for measure in _MEASURES if measure[0] in known)
 
 

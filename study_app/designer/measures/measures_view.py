@@ -24,7 +24,6 @@ from study_app.designer.measures.simulation import Simulated
 from study_app.designer.measures.study_facts import (
     PARTICIPANTS,
     Facts,
-    balance_of,
     copied_texts,
     planned_participants,
     revealing_texts,
@@ -34,7 +33,7 @@ from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
 from study_app.number_text import capitalised, counted, duration, duration_figure, duration_range
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import order_of
+from study_app.protocol.orders import block_balance, order_of
 from study_app.protocol.source import Path
 from study_app.protocol.wording import language_name, languages_of
 
@@ -158,10 +157,10 @@ def _balance_card(study: Study, protocol: Protocol, block: Block) -> list[Measur
     """Return how balanced the orders of a block are for the planned participants; none if it has one code."""
     planned = planned_participants(study)
     participants = planned or PARTICIPANTS
-    judged = balance_of(protocol, block, participants)
+    judged = block_balance(protocol, block.id, participants)
     if judged is None:
         return []
-    order, evenness, rows = judged
+    order, evenness, rows = judged.order, judged.evenness, judged.rows
     if evenness.balanced:
         verdict: Verdict = ("ok", "check", "balanced")
         if rows is not None:

@@ -14,20 +14,10 @@ from study_app.designer.document.study import Study
 from study_app.designer.document.toml_edits import Set, Unset, meant_document
 from study_app.designer.document.toml_text import Refused
 from study_app.haptics.model.slope_limits import HAND_MPS, steady_force
-from study_app.protocol.blocks import Block
 from study_app.protocol.file_format import schema
 from study_app.protocol.load import validate_document
 from study_app.protocol.model import Protocol
-from study_app.protocol.orders import (
-    Evenness,
-    balances,
-    duration_range_s,
-    expected_duration_s,
-    numbered_participants,
-    orders_of,
-    variants,
-)
-from study_app.protocol.randomization import row_count
+from study_app.protocol.orders import duration_range_s, expected_duration_s, orders_of, variants
 from study_app.protocol.source import Fault, Path, frozen, has, value_at
 from study_app.protocol.warnings import describe_untranslated, untranslated_texts, warnings
 from study_app.protocol.wording import languages_of
@@ -37,7 +27,6 @@ from study_app.store.workstation import device_without_force
 _PLANNED: Final = ("analysis", "participants")
 PARTICIPANTS: Final = 12
 """Participants of a study without `analysis.participants`."""
-_SEED: Final = 1
 _SHORTEST: Final = 3
 """Letters of an id that does not stand in a text by chance."""
 READ: Final = ("pages", "blocks", "tasks", "designs")
@@ -335,17 +324,3 @@ def planned_participants(study: Study) -> int | None:
     planned = value_at(study.document, _PLANNED)
     faulty = any(fault.path == _PLANNED for fault in study.faults)
     return planned if isinstance(planned, int) and not faulty else None
-
-
-def balance_of(protocol: Protocol, block: Block, participants: int) -> tuple[str, Evenness, int | None] | None:
-    """Return order and evenness of a block, and the participants per round of its square, if it has one.
-
-    None where the block has one code.
-    """
-    for judged in balances(protocol, numbered_participants(participants), _SEED):
-        for judged_block in judged.blocks:
-            if judged_block.id == block.id:
-                order, codes = judged_block.order, judged_block.evenness.codes
-                rows = row_count(order, len(codes)) if order in ("williams", "latin") else None
-                return order, judged_block.evenness, rows
-    return None

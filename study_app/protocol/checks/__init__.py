@@ -1,7 +1,7 @@
 """Checks of a protocol: cross-references and consistency."""
 
 from study_app.protocol.checks.cross_references import CHOICES, ITEM_REFERENCES, OWN, TEXTS
-from study_app.protocol.checks.designs import missing_for_rule
+from study_app.protocol.checks.designs import fitting_rules
 from study_app.protocol.checks.force_limits import blocks_by_stimulus, check_paced, slope_limit_fault
 
 __all__ = [
@@ -11,6 +11,6 @@ __all__ = [
     "TEXTS",
     "blocks_by_stimulus",
     "check_paced",
-    "missing_for_rule",
+    "fitting_rules",
     "slope_limit_fault",
 ]

@@ -12,7 +12,7 @@ from typing import Any, Final
 from study_app.errors import StudyError
 from study_app.haptics.model.overrides import number_names, override_value
 from study_app.protocol.blocks import Block
-from study_app.protocol.model import Contrast, Protocol, Published
+from study_app.protocol.model import RULES, Contrast, Protocol, Published
 from study_app.protocol.orders.block_orders import order_of
 from study_app.protocol.orders.tracks import tracks_of
 from study_app.protocol.quantities import can_vary
@@ -64,11 +64,11 @@ def check_designs(protocol: Protocol) -> Iterator[Fault]:
     for number, contrast in enumerate(protocol.analysis.contrasts if protocol.analysis is not None else ()):
         yield from _check_contrast(protocol, contrast, ("analysis", "contrasts", number))
     for number, rule in enumerate(protocol.analysis.exclusions if protocol.analysis is not None else ()):
-        if (lacks := missing_for_rule(protocol, rule.rule)) is not None:
+        if (lacks := _missing_for_rule(protocol, rule.rule)) is not None:
             yield Fault(("analysis", "exclusions", number, "rule"), f'"{rule.rule}" never applies: {lacks}')
 
 
-def missing_for_rule(protocol: Protocol, rule: str) -> str | None:
+def _missing_for_rule(protocol: Protocol, rule: str) -> str | None:
     """Return the part that the study lacks for a rule to apply."""
     blocks = [block for block in protocol.main_blocks if block.design is not None]
     if rule == "constant_answers":
@@ -82,6 +82,11 @@ def missing_for_rule(protocol: Protocol, rule: str) -> str | None:
     ):
         return "no main block has questions with a correct answer"
     return None
+
+
+def fitting_rules(protocol: Protocol) -> tuple[str, ...]:
+    """Return the exclusion rules that can apply to the study."""
+    return tuple(rule for rule in RULES if _missing_for_rule(protocol, rule) is None)
 
 
 def _check_block(protocol: Protocol, block: Block) -> Iterator[Fault]:

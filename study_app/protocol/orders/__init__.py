@@ -3,6 +3,7 @@
 from study_app.protocol.orders.balance import (
     Evenness,
     balances,
+    block_balance,
     block_orders_by_group,
     describe_balance,
     evenness,
@@ -32,6 +33,7 @@ __all__ = [
     "Step",
     "Trial",
     "balances",
+    "block_balance",
     "block_codes",
     "block_orders_by_group",
     "build_schedule",

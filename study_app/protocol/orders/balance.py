@@ -68,7 +68,7 @@ class Evenness:
 
 
 @dataclass(frozen=True, slots=True)
-class _BlockBalance:
+class BlockBalance:
     """A block's evenness and order settings; ``unnumbered`` are participants whose ID has no number."""
 
     id: str
@@ -77,6 +77,11 @@ class _BlockBalance:
     repetitions: int
     evenness: Evenness
     unnumbered: tuple[str, ...]
+
+    @property
+    def rows(self) -> int | None:
+        """The number of participants in a full round of its square; None without one."""
+        return row_count(self.order, len(self.evenness.codes)) if self.order in ("williams", "latin") else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +92,7 @@ class Balance:
     session: str
     participants: int
     seed: int
-    blocks: tuple[_BlockBalance, ...]
+    blocks: tuple[BlockBalance, ...]
 
 
 def numbered_participants(count: int, first: str = "P001") -> tuple[str, ...]:
@@ -143,11 +148,11 @@ def balance(
             title = protocol.text(protocol.blocks[block.id].title, protocol.study.languages[0])
             shown = [codes_of(orders.study, block, who, seed, place) for who, place in placed]
             counted = evenness(block.codes, shown)
-            blocks.append(_BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
+            blocks.append(BlockBalance(block.id, title, block.order, block.repetitions, counted, unnumbered))
     if orders.block_order != "fixed" and sum(block.phase == "main" for block in orders.blocks) > 1:
         order: CodeOrder = "williams" if orders.block_order == "balanced" else "shuffled"
         of_blocks = _block_evenness(orders, placed, seed)
-        blocks.append(_BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
+        blocks.append(BlockBalance("", "The main blocks", order, 1, of_blocks, unnumbered))
     return Balance(orders.study, session, len(participants), seed, tuple(blocks))
 
 
@@ -170,6 +175,12 @@ def balances(protocol: Protocol, participants: Sequence[str], seed: int) -> Iter
             yield balance(
                 variant.protocol, members[variant.group], seed, variant.name, in_group=variant.group is not None
             )
+
+
+def block_balance(protocol: Protocol, block_id: str, count: int) -> BlockBalance | None:
+    """Return the balance of a block for ``count`` participants of a rehearsal; None if it has only one code."""
+    judged = balances(protocol, numbered_participants(count), 1)
+    return next((block for session in judged for block in session.blocks if block.id == block_id), None)
 
 
 def planned_participants(protocol: Protocol, group: str | None) -> int | None:
@@ -238,7 +249,7 @@ def describe_balance(judged: Balance) -> str:
     return "\n\n".join((head, *("\n".join(_block_lines(block)) for block in judged.blocks)))
 
 
-def _block_lines(block: _BlockBalance) -> Iterator[str]:
+def _block_lines(block: BlockBalance) -> Iterator[str]:
     counted = block.evenness
     times = "" if block.repetitions == 1 else f", each {block.repetitions} times"
     if block.id:
@@ -278,7 +289,7 @@ def _verdict_lines(counted: Evenness) -> Iterator[str]:
         yield f"At most {counted.longest_run} presentations of a condition occur in a row; {least}."
 
 
-def _advice(block: _BlockBalance) -> Iterator[str]:
+def _advice(block: BlockBalance) -> Iterator[str]:
     """Yield the guarantees of the order, and possible improvements."""
     codes, repetitions = len(block.evenness.codes), block.repetitions
     match block.order:
@@ -304,7 +315,7 @@ def _advice(block: _BlockBalance) -> Iterator[str]:
                 yield 'A Latin square balances only positions; order = "williams" also balances carry-over.'
 
 
-def _round_lines(block: _BlockBalance, rows: int) -> Iterator[str]:
+def _round_lines(block: BlockBalance, rows: int) -> Iterator[str]:
     """Yield whether the participants complete rounds of rows, and how many would."""
     codes, people = len(block.evenness.codes), block.evenness.orders
     if block.unnumbered:

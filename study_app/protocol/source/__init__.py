@@ -18,25 +18,14 @@ from study_app.protocol.source.files import (
     without_byte_order_mark,
 )
 from study_app.protocol.source.problems import Fault, did_you_mean, faults_of, rule_of, shown_value
-from study_app.protocol.source.table import (
-    ALTERNATIVES,
-    NOT_WITH,
-    RECORDED,
-    SECTIONS,
-    UNPRINTABLE,
-    characters,
-    text_in,
-    unprintable_character,
-)
+from study_app.protocol.source.table import RECORDED, UNPRINTABLE, FormKey, characters, text_in, unprintable_character
 
 __all__ = [
-    "ALTERNATIVES",
-    "NOT_WITH",
     "RECORDED",
-    "SECTIONS",
     "TABLE",
     "UNPRINTABLE",
     "Fault",
+    "FormKey",
     "Node",
     "Path",
     "Places",

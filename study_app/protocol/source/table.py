@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from collections.abc import Mapping
+from enum import StrEnum
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Final, Generic, Self, TypeAlias, TypeVar
 
@@ -146,13 +147,12 @@ def text_in(value: str | Mapping[str, str], language: str) -> str:
     return value if isinstance(value, str) else value[language]
 
 
-ALTERNATIVES: Final = "alternatives"
-"""Where the JSON Schema of a table keeps `Table.ONE_OF`, for forms."""
+class FormKey(StrEnum):
+    """The keys of a table's JSON Schema for forms, each with the value of a class attribute of `Table`."""
 
-SECTIONS: Final = "sections"
-"""Where it keeps `Table.SECTIONS`, for forms."""
-NOT_WITH: Final = "not with"
-"""Where it keeps `Table.NOT_WITH`, for forms."""
+    ONE_OF = "alternatives"
+    SECTIONS = "sections"
+    NOT_WITH = "not with"
 
 
 def invalid(
@@ -191,8 +191,8 @@ class Table(BaseModel):
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
         """Return the schema with the pairs of alternative keys, and the sections of its form."""
         node = handler(core_schema)
-        stated: Any = ((ALTERNATIVES, cls.ONE_OF), (SECTIONS, cls.SECTIONS), (NOT_WITH, cls.NOT_WITH))
-        handler.resolve_ref_schema(node).update((key, to_jsonable_python(value)) for key, value in stated if value)
+        stated = {key.value: to_jsonable_python(getattr(cls, key.name)) for key in FormKey}
+        handler.resolve_ref_schema(node).update({key: value for key, value in stated.items() if value})
         return node
 
 

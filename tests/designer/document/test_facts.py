@@ -14,17 +14,11 @@ from study_app.designer.document.elements import outline
 from study_app.designer.document.steps import AddElement, AddInstrument, AddKey, ChangeLanguage, Situation
 from study_app.designer.document.study import Study, read_study
 from study_app.designer.document.toml_edits import Set, Unset
-from study_app.designer.measures.study_facts import (
-    balance_of,
-    facts,
-    revealing_texts,
-    text_keys,
-    texts_by_language,
-    valid_part,
-)
+from study_app.designer.measures.study_facts import facts, revealing_texts, text_keys, texts_by_language, valid_part
 from study_app.haptics.model.slope_limits import slope_limit
 from study_app.protocol.descriptions.protocol_text import describe
 from study_app.protocol.load import load
+from study_app.protocol.orders import block_balance
 from study_app.protocol.orders.durations import duration_range_s, expected_duration_s
 from study_app.protocol.orders.schedule import FormStep, Trial, build_schedule
 from study_app.protocol.presented.presented_levels import LevelLimits, clipping, level_limits, levels, standard_level
@@ -250,13 +244,12 @@ def test_a_text_that_names_what_is_compared_is_found(text: str, word: str) -> No
 
 def test_an_order_is_even_at_full_rounds_of_its_square() -> None:
     protocol = load("physical2")
-    block = protocol.blocks["liquids"]
-    even, uneven = balance_of(protocol, block, 12), balance_of(protocol, block, 13)
+    even, uneven = block_balance(protocol, "liquids", 12), block_balance(protocol, "liquids", 13)
     assert even is not None
     assert uneven is not None
-    assert (even[2], even[1].balanced) == (6, True)
-    assert (uneven[2], uneven[1].balanced) == (6, False)
-    assert balance_of(protocol, protocol.blocks["practice"], 12) is None
+    assert (even.rows, even.evenness.balanced) == (6, True)
+    assert (uneven.rows, uneven.evenness.balanced) == (6, False)
+    assert block_balance(protocol, "practice", 12) is None
 
 
 def test_numbers_continue_while_a_text_is_missing() -> None:
