@@ -297,11 +297,10 @@ def _questionnaires(study: Study) -> Iterator[str]:
     asked_in = (question.where for question in study.others.questions if question.where.is_form)
     forms = Counter((where.id, where.title) for where in asked_in)
     for (form, title), questions in forms.items():
-        sessions = RecordedSessions.model_validate(study.protocol)
-        every = list(sessions.every_session())
-        times = list(dict.fromkeys(_form_times(study, sessions, steps, form) for steps in every if form in steps))
+        sessions = list(RecordedSessions.model_validate(study.protocol).every_session())
+        times = list(dict.fromkeys(_form_times(study, steps, form) for steps in sessions if form in steps))
         differ = ", depending on the group or session" if len(times) > 1 else ""
-        if not differ and not all(form in steps for steps in every):
+        if not differ and not all(form in steps for steps in sessions):
             differ = ", in some groups or sessions"
         yield (
             f"Participants completed the questionnaire “{title}” ({counted(questions, 'question')}) "
@@ -309,9 +308,9 @@ def _questionnaires(study: Study) -> Iterator[str]:
         )
 
 
-def _form_times(study: Study, sessions: RecordedSessions, steps: tuple[str, ...], form: str) -> str:
+def _form_times(study: Study, steps: tuple[str, ...], form: str) -> str:
     """Return when a form is completed in a session with these steps."""
-    titles = block_titles(study.protocol)
+    titles, sessions = block_titles(study.protocol), RecordedSessions.model_validate(study.protocol)
     blocks = [step for step in steps if step in titles]
     main = {block for block in blocks if sessions.blocks[block].phase == "main"}
     uses = list(sessions.blocks_before(form, steps))

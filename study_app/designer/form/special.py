@@ -397,7 +397,7 @@ GROUP_ASSIGNMENT: Final = SpecialEditor(
     (("StudyHead", "group_assignment"),), adds=lambda _field: _Said(), facts=_choice_sentences
 )
 
-_MEASURES: Final = (
+_MEASURES: Final[tuple[tuple[str, str], ...]] = (
     ("threshold", "Threshold"), ("exponent", "Exponent"), ("d_prime", "Sensitivity d′"), ("pse", "Setting (PSE)"),
 )  # fmt: skip
 _RELATIONS: Final = (

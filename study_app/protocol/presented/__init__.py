@@ -10,7 +10,7 @@ from study_app.protocol.presented.presentation import (
     recorded_presentation,
     trial_result,
 )
-from study_app.protocol.presented.presented_levels import extreme_levels, highest_damping, level_limits, levels
+from study_app.protocol.presented.presented_levels import extreme_levels, highest_damping, level_limits
 
 __all__ = [
     "Presentation",
@@ -18,7 +18,6 @@ __all__ = [
     "highest_damping",
     "is_criterion_met",
     "level_limits",
-    "levels",
     "link_descriptions",
     "link_seed",
     "longest_delay_s",
