@@ -73,7 +73,7 @@ def test_the_entry_of_every_folder_that_is_created_is_flushed(
         flushed.append(path)
         sync_folder(path)
 
-    for module in ("atomic", "sessions.begin"):
+    for module in ("files.atomic", "sessions.begin"):
         monkeypatch.setattr(f"study_app.store.{module}.sync_folder", sync)
     results = tmp_path / "results" / "study"
     start(results=results).close()
