@@ -204,7 +204,7 @@ def failing(story: Story) -> None:
     write, look = (partial(story.act, "write", saving.write_draft), partial(story.act, "look", saving.look_again))
     denied, not_up_to_date = "the draft cannot be deleted: Permission denied", "The draft is not up to date: the draft"
     story.ask(SetValue(VERSION, "0.7"))
-    with refusing("store.drafts.delete_draft", denied):
+    with refusing("store.versions.drafts.delete_draft", denied):
         story.drafts_are_kept = False
         story.play("ctrl+z")
         story.expect(not_up_to_date, kept="saved")
@@ -247,7 +247,7 @@ def failing(story: Story) -> None:
     story.act("begin", lambda: designer.controller.begin_study("template:compare-liquids", "mine"))
     story.act("open another", designer.open)
     story.act("open it again", lambda: designer.open(str(designer.file.with_name("mine.toml"))))
-    with refusing("store.drafts.delete_draft", denied):
+    with refusing("store.versions.drafts.delete_draft", denied):
         story.play("[Discard the draft]")
         story.act("confirm", designer.place.prompt.go_on.click)
         story.expect("The draft was not discarded: the draft cannot be deleted: Permission denied.", kept="not saved")
