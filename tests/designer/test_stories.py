@@ -446,6 +446,7 @@ def fields(story: Story) -> None:
     assert "“12x” is not a number" in form()
     story.play("@liquids.thick")
     assert "12x" not in form()
+    assert field("liquids", "thick", "density_kg_m3").line.property("state") == ""
     story.play(":liquids.thick.density_kg_m3 Escape @liquids.thin")
     assert "12x" not in form()
     story.expect(undo="", kept="saved")

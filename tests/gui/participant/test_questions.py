@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QPoint
-from PySide6.QtGui import QPointingDevice
+from PySide6.QtGui import QFont, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from study_app.gui.participant.forms.question_field import _QuestionWords
 from study_app.gui.participant.forms.questions import FIELDS
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
@@ -375,3 +376,13 @@ def test_a_session_with_a_question_of_every_kind_is_done_by_keys_alone(opening: 
     values = {row.item: row.value for row in rows}
     assert (values["age"], values["hand"], values["used"]) == (33, "left", ("mouse",))
     assert (values["thickness"], values["pleasant"], values["effort"], values["sus10"]) == (2, 5, 5, 2)
+
+
+def test_the_text_of_a_question_begins_right_of_the_column_of_numbers(qtbot: Any) -> None:
+    row = QWidget()
+    qtbot.addWidget(row)
+    question = _QuestionWords(3, "How thick was it?", row)
+    question.set_fonts(QFont(), QFont(), QFont(), 2.0)
+    without = question.minimumSizeHint().width()
+    question.set_number_width(40)
+    assert question.minimumSizeHint().width() == without + 40

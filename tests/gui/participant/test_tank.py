@@ -11,6 +11,7 @@ from PySide6.QtCore import QEvent, QObject, QPoint, QRect
 from PySide6.QtGui import QColor, QPaintEvent, QRegion
 from PySide6.QtWidgets import QApplication
 
+from study_app.gui.participant.tank.frame import Box
 from study_app.gui.participant.tank_widget import TankWidget
 from tests.gui.drawn import shown
 from tests.gui.small import follow, follow_view, task_page, view
@@ -160,3 +161,13 @@ def test_patch_in_the_corner_turns_white_at_the_onset_unless_it_is_switched_off(
         if colours:
             assert found == [QColor(one) for one in colours]
         assert (edge == QColor("black")) is photodiode
+
+
+def test_the_ball_reaches_the_whole_workspace_between_floor_and_water() -> None:
+    ball_m, margin_m = 0.0034, 0.0025
+    box = Box.around(WORKSPACE_M, ball_m)
+    assert (-box.floor, box.water) == pytest.approx((0.03 + ball_m + margin_m,) * 2)
+    assert box.top > box.water
+    assert min(box.x - 0.05, box.z - 0.03) >= ball_m + margin_m
+    wide = Box.around((0.5, 0.06, 0.3), ball_m)
+    assert (wide.x, wide.z) == pytest.approx((0.25 + ball_m + margin_m, 0.15 + ball_m + margin_m))
