@@ -16,7 +16,6 @@ from study_app.designer.document.study import Study
 from study_app.designer.file import file_text
 from study_app.designer.new_study_page import KnownAnswer, header_state, template_choice
 from study_app.designer.problems import fault_rows, problem_rows, warning_rows
-from study_app.designer.prompts import naming_places
 from study_app.errors import StudyError
 from study_app.store.study_runs import Run
 from study_app.store.study_versions import Kept
@@ -59,7 +58,6 @@ NAMES = {
     )},
     **{name: getattr(document, name) for name in ("Standing", "version_standing", "check_version", "next_version")},
     "words": lambda choice: choice.words, "template_choice": template_choice, "place_words": place_words, "demo": demo,
-    "naming_places": naming_places,
     "recovery": recovery, "warned": lambda *said: [row.message for row in warning_rows(Study(DEMO, NOWHERE), said)],
     "STUDY": Study(DEMO, NOWHERE), "NOWHERE": NOWHERE, "DEMO": DEMO,
     "NOW": datetime(2026, 3, 9, 18, 30, tzinfo=timezone(timedelta(hours=2))),

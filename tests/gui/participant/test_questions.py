@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QPoint
-from PySide6.QtGui import QFont, QPointingDevice
+from PySide6.QtGui import QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from study_app.gui.participant.forms.question_field import _QuestionWords
 from study_app.gui.participant.forms.questions import FIELDS
 from study_app.protocol.load import load
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream
@@ -378,11 +377,10 @@ def test_a_session_with_a_question_of_every_kind_is_done_by_keys_alone(opening: 
     assert (values["thickness"], values["pleasant"], values["effort"], values["sus10"]) == (2, 5, 5, 2)
 
 
-def test_the_text_of_a_question_begins_right_of_the_column_of_numbers(qtbot: Any) -> None:
-    row = QWidget()
-    qtbot.addWidget(row)
-    question = _QuestionWords(3, "How thick was it?", row)
-    question.set_fonts(QFont(), QFont(), QFont(), 2.0)
-    without = question.minimumSizeHint().width()
-    question.set_number_width(40)
-    assert question.minimumSizeHint().width() == without + 40
+def test_the_text_of_a_question_begins_right_of_the_column_of_numbers(opening: Opening) -> None:
+    question = opening(KINDS["number"].page, FULL).question(1).statement
+    widths = []
+    for column in (40, 70):
+        question.set_number_width(column)
+        widths.append(question.minimumSizeHint().width())
+    assert widths[1] == widths[0] + 30
