@@ -95,7 +95,9 @@ def test_each_field_changes_its_own_key(designer: Any) -> None:
     known: set[tuple[Any, ...]] = set()
     for name in ("demo", "every_design"):
         file = designer.file.with_name(f"{name}.toml")
-        file.write_text(text_of(name).replace('languages = ["en"]', 'languages = ["en", "nl"]'), encoding="utf-8")
+        file.write_text(
+            text_of(name).replace('languages = ["en"]', 'languages = ["en", "nl"]'), encoding="utf-8", newline="\n"
+        )
         designer.open(name)
         for path in elements(designer.study.document):
             designer.go_to(*path)
