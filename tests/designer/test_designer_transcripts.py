@@ -1,6 +1,6 @@
 """The designer's window: what it tells of each kind of element and in each state, compared with a reviewed text.
 
-Every act of the flows is checked as well (`Story.check`); each tab shows each element, and each field is used once.
+Every act of the flows is checked as well (`Story.check`); each tab shows each element.
 """
 
 from collections.abc import Callable, Mapping
@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 from PySide6.QtCore import QEvent
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication
 
 from study_app.designer.document.steps import ChangeLanguage, RetypeFile, SetValue
 from study_app.protocol.source.document import Path
 from tests.designer.document.test_commands import elements, generic, studies
-from tests.designer.support.story import Story, settle
-from tests.gui.transcript import CONTROLS, compare, is_usable, told, use
+from tests.designer.support.story import Story
+from tests.gui.transcript import compare, told
 from tests.protocol.edited_studies import text_of
 
 TABS = ("measures", "file", "changes", "participant")
@@ -172,36 +172,3 @@ def test_each_tab_shows_each_element(story: Callable[..., Story], name: str, but
             assert len(told(place.pane)) > len(told(place.pane.tabs)), (path, tab)
         assert place.file.editor.toPlainText() == designer.text
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
-
-
-FIELDS = {"rek2024": ("tasks", "scales"), "viscosityjnd": ("designs",)}
-
-
-@pytest.mark.nightly
-@pytest.mark.parametrize(("name", "section"), [(name, one) for name, sections in FIELDS.items() for one in sections])
-def test_each_field_of_a_form_used_once(story: Callable[..., Story], name: str, section: str) -> None:
-    acted = story(text_of(name))
-    designer = acted.designer
-    changed = 0
-    for path in one_of_each(designer.study.document):
-        used: set[str] = set()
-        while path[0] == section:
-            designer.undo_all()
-            designer.go_to(*path)
-            settle(designer)
-            free = [
-                one for one in designer.place.form.findChildren(QWidget) if isinstance(one, CONTROLS) and is_usable(one)
-            ]
-            named = {f"{type(one).__name__} {one.accessibleName() or one.property('text')!r}": one for one in free}
-            key = next((key for key in named if key not in used), None)
-            if key is None:
-                break
-            used.add(key)
-            acted.act(f"use {key} of {path}", lambda part=named[key]: use(part))
-            if (popup := QApplication.activePopupWidget()) is not None:
-                assert len(told(popup)) > 1, key
-                popup.close()
-            changed += designer.text != text_of(name)
-    designer.undo_all()
-    assert designer.text == text_of(name)
-    assert changed > len(used) / 2, "most fields change the study"

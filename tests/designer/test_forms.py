@@ -8,7 +8,7 @@ import shiboken6
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QFocusEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel, QLineEdit, QPlainTextEdit, QWidget, QWidgetItem
 
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.steps import AddElement, AddKey, ChangeLanguage, RemoveKey, RenameElement
@@ -135,13 +135,15 @@ def test_a_liquid_file_is_chosen_before_a_liquid_changes(designer: Any, monkeypa
     preset.parent.mkdir()
     preset.write_text("format = 2\n[liquids.thin]\ndensity_kg_m3 = 913.5\n", encoding="utf-8", newline="\n")
     answers = iter(["", str(preset)])
-    monkeypatch.setattr("study_app.designer.form.card.choose_protocol", lambda _by, _title: next(answers))
+    asked: list[tuple[str, ...]] = []
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda _by, *words: (asked.append(words) or next(answers), ""))
     designer.open("kitchen", "liquids", "thin")
     before = designer.text
     press_add = designer.place.form.adds["liquids", "thin", "file"].click
     press_add()
     assert designer.text == before, "after Cancel"
     press_add()
+    assert asked == [("Choose a liquid file", str(designer.file.parent), "Protocols (*.toml)")] * 2
     assert designer.value("liquids", "thin") == {"file": "presets/thin.toml"}
     assert designer.study.faults == ()
     assert designer.study.protocol.liquids["thin"].density_kg_m3 == 913.5

@@ -11,7 +11,7 @@ import pytest
 from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, Qt
 from PySide6.QtGui import QDropEvent, QEnterEvent, QGuiApplication, QKeyEvent
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication, QFileDialog
+from PySide6.QtWidgets import QApplication, QFileDialog, QLabel
 
 from study_app.designer.document.additions import texts_of
 from study_app.designer.document.steps import (
@@ -446,6 +446,7 @@ def fields(story: Story) -> None:
     assert "“12x” is not a number" in form()
     story.play("@liquids.thick")
     assert "12x" not in form()
+    assert field("liquids", "thick", "density_kg_m3").line.property("state") == ""
     story.play(":liquids.thick.density_kg_m3 Escape @liquids.thin")
     assert "12x" not in form()
     story.expect(undo="", kept="saved")
@@ -743,6 +744,7 @@ def menu(story: Story) -> None:
     story.expect(selected="conditions.late_2", undo="Duplicate Late")
     assert story.designer.value("conditions", "late_2") == story.designer.value("conditions", "late")
     story.play("ctrl+z Delete")
+    assert "Block Delays: Conditions, 2" in {part.text() for part in story.designer.place.prompt.findChildren(QLabel)}
     story.act("all", story.designer.place.prompt.all.click)
     story.expect("1 warning", undo="Delete Late")
     story.has('conditions = ["prompt"]')

@@ -1,4 +1,7 @@
-"""All that the lab does at each signal of its place, with a servo that only records what it is asked."""
+"""All that the lab does at each signal of its place, with a servo that only records what it is asked.
+
+People change ``lab.txt``; no option regenerates it.
+"""
 
 import random
 from dataclasses import replace
@@ -13,10 +16,8 @@ from study_app.lab.ab_comparison import Workbench
 from study_app.lab.presets import Choice
 from study_app.workers.server import Crashed
 from tests.app.lab.worlds import COSTS, ERRORS, PATIENCE, SOON_MS
-from tests.golden import compare, each_once, what_comes
+from tests.golden import check_kept, what_comes
 from tests.golden_values import changed, value_lines
-
-GOLDEN = Path(__file__).parent / "golden" / "lab.txt"
 
 
 class Recorded:
@@ -161,7 +162,7 @@ STEPS: dict[str, Any] = {
 OPENING = ("entered", "fade in after a fault", "open again", "device", "no device", "back", "opened anew")
 
 
-def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any, pytestconfig: Any) -> None:
+def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any) -> None:
     from study_app.gui.lab.view import LabPlace
 
     monkeypatch.setattr(lab_controller, "STARTS_AFTER_MS", 0)
@@ -208,8 +209,12 @@ def test_every_signal(qtbot: Any, tmp_path: Path, monkeypatch: Any, caplog: Any,
         lines += [f"== {name}", *done, *(f"log {one.levelname} {one.getMessage()}" for one in caplog.records)]
         lines += changed(before, after)
         before = after
+        if name == "path":
+            with monkeypatch.context() as patch:
+                patch.setattr(Recorded, "tail", lambda _live, side: side)
+                assert (lab.view().tail_a, lab.view().tail_b) == ("A", "B")
     lab.end(PATIENCE)
     caplog.clear()
     lines += [*map(str, sorted(path.name for path in tmp_path.iterdir()))]
     found = (line.replace(repr(str(tmp_path))[1:-1], "FOLDER").replace(str(tmp_path), "FOLDER") for line in lines)
-    compare(GOLDEN, each_once(what_comes(found)), pytestconfig)
+    check_kept(Path(__file__).with_name("lab.txt"), what_comes(found))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.designer.document.additions import edits_to_duplicate, edits_to_fill_in, repairs
+from study_app.designer.document.additions import edits_to_duplicate, edits_to_fill_in, number_rows, repairs
 from study_app.designer.document.document import template
 from study_app.designer.document.elements import title_of
 from study_app.designer.document.fields import kind_note, refused_at, row_at
@@ -273,3 +273,12 @@ def test_a_block_that_becomes_practice_loses_the_keys_of_a_main_block() -> None:
     practised = after(study, SetValue(("blocks", "viscosity", "phase"), "practice"))
     assert [fault.message for fault in practised.faults] == ["there is no main block"]
     assert "code_prefix" not in practised.document["blocks"]["viscosity"]
+
+
+def test_a_series_of_a_block_varies_its_numbers_or_those_of_its_first_condition() -> None:
+    document = template("two-liquids-abx").document
+    first, *others = document["blocks"]["liquids"]["conditions"]
+    assert others
+    varied = [row.path for row in number_rows(document, ("blocks", "liquids"))]
+    assert {path[:2] for path in varied} == {("blocks", "liquids"), ("conditions", first)}
+    assert ("conditions", first, "delay_ms") in varied

@@ -6,6 +6,7 @@ import tempfile
 import threading
 from datetime import datetime
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -15,6 +16,7 @@ from PySide6.QtWidgets import QAbstractButton
 
 from study_app.app.session import playing
 from study_app.app.session.bridge import SessionBridge
+from study_app.app.session.live_session import BUG
 from study_app.designer.document.document import template
 from study_app.designer.participant.playable import StepPosition
 from study_app.errors import DeviceLost
@@ -286,3 +288,36 @@ def test_an_adaptive_study_is_played_from_its_tenth_trial(qtbot: Any, designer: 
     assert not any(isinstance(page, FeedbackPage) for page in player.pages)
     assert kept(qtbot, designer).name == "kitchen-pilot-1"
     assert not list(folders.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("facts", "said", "outcome"),
+    [
+        ({"error": DeviceLost("the device is gone")}, ("Playback was stopped", "the device is gone."), None),
+        (
+            {"code": BUG, "has_begun": True, "status": "broken"},
+            ("A bug in the program stopped the pilot", "The terminal shows the details."),
+            "failed",
+        ),
+        ({"has_begun": True, "status": "completed"}, None, "completed"),
+        ({"has_begun": True, "status": "incomplete"}, None, "completed, but some trials were not delivered"),
+        ({"has_begun": True, "status": "aborted"}, None, "stopped"),
+        ({"has_begun": True, "status": "withdrawn"}, None, "no consent"),
+        ({"has_begun": True, "status": None}, None, "stopped"),
+    ],
+)
+def test_the_end_of_a_pilot_is_told(
+    designer: Any, folders: Path, facts: dict[str, Any], said: tuple[str, str] | None, outcome: str | None
+) -> None:
+    designer.open()
+    ended = {"error": None, "code": 0, "is_opening": False, "has_begun": False, "status": None} | facts
+    data = folders / "pilot"
+    data.mkdir()
+    designer.playing.pilot = playing._Pilot(
+        SimpleNamespace(words="Thin"), "scripted", data, None, SimpleNamespace(**ended)
+    )
+    designer.playing._finish_pilot()
+    assert designer.messages == [said] * (said is not None)
+    notice = designer.place.header.strip.notice
+    words = f"Played from Thin: {outcome}. The recorded data will be deleted unless you save them."
+    assert (notice and notice.words, data.exists()) == ((words, True) if outcome else (None, False))

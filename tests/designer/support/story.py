@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QAbstractButton, QApplication
+from PySide6.QtWidgets import QAbstractButton, QApplication, QLabel
 
 from study_app.designer.document.steps import Request
 from study_app.designer.document.study import read_study
@@ -96,7 +96,12 @@ class Story:
         assert focus is None or focus.isVisible(), f"the keyboard is at {name_of(focus)!r}, which is hidden"
         if opened is None:
             return
-        header, form = designer.place.header, designer.place.form
+        header, form, prompt = designer.place.header, designer.place.form, designer.place.prompt
+        if prompt is not None and prompt.isVisible():
+            heading = prompt.heading.text()
+            assert (prompt.accessibleName(), heading.endswith((".", ":"))) == (heading, False), heading
+            explanations = [part.text() for part in prompt.findChildren(QLabel) if part.text() != heading]
+            assert explanations[0].endswith((".", ":")), explanations
         if opened.study.text != self._checked:
             self._checked = opened.study.text
             again = read_study(self._checked.encode(), opened.file.parent)

@@ -35,6 +35,16 @@ def test_a_link_leads_to_a_heading_of_another_page_and_back_returns(place, qtbot
     assert not place.back.isEnabled()
 
 
+@pytest.mark.parametrize(
+    ("link", "page"),
+    [("../delays.md", "delays"), ("0002-compiled-servo-loop.md", "decisions/0002-compiled-servo-loop")],
+)
+def test_a_link_on_a_page_of_a_folder_begins_there(place, link, page):
+    place.open_page("decisions/0001-layers-point-downwards")
+    place.reader.anchorClicked.emit(QUrl(link))
+    assert place.reader.page == page
+
+
 def test_an_address_is_opened_outside_the_program(place, monkeypatch):
     opened = []
     monkeypatch.setattr(QDesktopServices, "openUrl", opened.append)

@@ -76,6 +76,17 @@ def test_a_number_that_can_be_read_in_two_ways_changes_nothing(place: Any, told:
     assert told[-1] == ("wake.length", 2500, False)
 
 
+def test_the_other_side_releases_a_held_knob_and_forgets_what_was_typed(place: Any, told: Any, still: LabView) -> None:
+    name = "liquid.density_kg_m3"
+    row, other = fields(place)[name], still.workbench.switch()
+    QTest.mousePress(row.slider, Qt.MouseButton.LeftButton)
+    QTest.keyClicks(row.field, "7")
+    assert row.slider.dragged
+    place.show_view(dataclasses.replace(still, workbench=other))
+    assert not row.slider.dragged
+    assert float(row.field.text()) == other.in_hand.value(name) != still.workbench.in_hand.value(name)
+
+
 def test_stop_force_speaks_at_the_press_and_is_never_disabled_hidden_or_moved(place: Any, still: LabView) -> None:
     place.show_view(still)
     said = heard(place, "stop")

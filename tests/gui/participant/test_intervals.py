@@ -211,7 +211,9 @@ def test_the_head_of_a_trial_of_intervals_stays_in_its_room(qapp: QApplication, 
     scale, room = 2.0, QRectF(0, 0, 360, 40)
     progress = Progress(part=1, parts=2, label=words(language).trial + " 57", index=57, of=220, at_most=True)
     painter = QPainter(image := QImage(400, 40, QImage.Format.Format_RGB32))
+    before = painter.font(), painter.pen(), painter.layoutDirection()
     end = draw_progress(painter, room, progress, words(language), scale=scale)
+    assert (painter.font(), painter.pen(), painter.layoutDirection()) == before
     painter.end()
     assert not image.isNull()
     assert end <= room.width() + 10 * scale + 1

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import pytest
 from PySide6.QtCore import QPoint
-from PySide6.QtGui import QPointingDevice
+from PySide6.QtGui import QImage, QPointingDevice
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import (
     QAbstractButton,
@@ -375,3 +376,27 @@ def test_a_session_with_a_question_of_every_kind_is_done_by_keys_alone(opening: 
     values = {row.item: row.value for row in rows}
     assert (values["age"], values["hand"], values["used"]) == (33, "left", ("mouse",))
     assert (values["thickness"], values["pleasant"], values["effort"], values["sus10"]) == (2, 5, 5, 2)
+
+
+def test_the_text_of_a_question_begins_right_of_the_column_of_numbers(opening: Opening) -> None:
+    question = opening(KINDS["number"].page, FULL).question(1).statement
+    widths = []
+    for column in (40, 70):
+        question.set_number_width(column)
+        widths.append(question.minimumSizeHint().width())
+    assert widths[1] == widths[0] + 30
+
+
+def test_the_foot_is_written_in_letters_of_the_pages_size(opening: Opening) -> None:
+    scales, heights = [], []
+    for text_scale in (1.0, 1.6):
+        foot = opening(KINDS["number"].page, FULL, text_scale=text_scale).page.foot
+        foot.show_state("", 3, 5, "")
+        image = foot.parentWidget().grab(foot.geometry()).toImage().convertToFormat(QImage.Format.Format_Grayscale8)
+        greys = np.frombuffer(image.constBits(), np.uint8).reshape(image.height(), -1)
+        written = greys[4:, : foot.button.x() - 4].astype(int)
+        (rows,) = np.nonzero((abs(written - np.median(written)) > 60).any(axis=1))
+        scales.append(foot._scale)
+        heights.append(np.ptp(rows))
+    assert scales[1] > 1.2 * scales[0]
+    assert heights[1] / heights[0] == pytest.approx(scales[1] / scales[0], rel=0.15)

@@ -12,6 +12,7 @@ from PySide6.QtGui import QColor, QPaintEvent, QRegion
 from PySide6.QtWidgets import QApplication
 
 from study_app.gui.participant.tank_widget import TankWidget
+from study_app.protocol.wording.languages import words
 from tests.gui.drawn import shown
 from tests.gui.small import follow, follow_view, task_page, view
 
@@ -160,3 +161,24 @@ def test_patch_in_the_corner_turns_white_at_the_onset_unless_it_is_switched_off(
         if colours:
             assert found == [QColor(one) for one in colours]
         assert (edge == QColor("black")) is photodiode
+
+
+def test_the_ball_reaches_the_whole_workspace_between_floor_and_water(made: Make) -> None:
+    ball_m, margin_m = 0.0034, 0.0025
+    around = type(made()._box).around
+    box = around(WORKSPACE_M, ball_m)
+    assert (-box.floor, box.water) == pytest.approx((0.03 + ball_m + margin_m,) * 2)
+    assert box.top > box.water
+    assert min(box.x - 0.05, box.z - 0.03) >= ball_m + margin_m
+    wide = around((0.5, 0.06, 0.3), ball_m)
+    assert (wide.x, wide.z) == pytest.approx((0.25 + ball_m + margin_m, 0.15 + ball_m + margin_m))
+
+
+def test_a_person_with_the_mouse_is_told_to_click(made: Make) -> None:
+    spoken = words("en")
+    for by_mouse, now, hint in (
+        (False, spoken.continue_now, spoken.pause_hint),
+        (True, spoken.click_now, spoken.pause_title),
+    ):
+        shown_words = made(by_mouse=by_mouse)._words
+        assert (shown_words.continue_now, shown_words.pause_hint) == (now, hint)

@@ -23,7 +23,7 @@ from study_app.store.blinded.blinding import read_key
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal_events
 from study_app.store.journals.journal_events import UNDELIVERED
-from study_app.store.session_progress.missing_trials import MissingTrials
+from study_app.store.session_progress.missing_trials import MISSING_PERCENT, MissingTrial, MissingTrials
 from study_app.store.unblinding import unblind
 from tests.golden import compare, each_once, what_comes
 from tests.golden_values import changed
@@ -157,6 +157,34 @@ def test_presentations_beyond_a_limit_are_counted(undelivered: int, sentence: st
     trials = [trial, *[replace(trial, outcome=UNDELIVERED)] * undelivered]
     text = _limits_sentence(trials, MissingTrials(limits={}), sealed=False)
     assert text == f"{sentence}The one trial so far met the study's limits."
+
+
+@pytest.mark.parametrize(
+    ("permitted", "excluded", "more"),
+    [
+        ({}, False, ""),
+        ({MISSING_PERCENT: 25.0}, False, "The study allows up to 25 % of the trials to be missing. "),
+        (
+            {MISSING_PERCENT: 24.0},
+            False,
+            "The study allows up to 24 % of the trials to be missing. The session is incomplete. "
+            "It was included manually. ",
+        ),
+        (
+            {MISSING_PERCENT: 24.0},
+            True,
+            "The study allows up to 24 % of the trials to be missing. The session is incomplete. "
+            "Include it again in Results to analyse it. ",
+        ),
+    ],
+)
+def test_missing_trials_are_counted_and_compared_with_those_permitted(permitted, excluded, more):
+    lost = tuple(MissingTrial(trial=at, block="pairs", code="A", broken=("force_limit_n",)) for at in (3, 5))
+    missing = MissingTrials(missing=lost, asked=8, limits={"force_limit_n": 6.5, **permitted})
+    assert _limits_sentence([], missing, excluded=excluded, sealed=False) == (
+        "2 of 8 trials were not delivered: the force limit was reached (limit 6.5 N). These trials were not answered. "
+        f"{more}No trials have been measured yet."
+    )
 
 
 def test_a_sealed_session_beyond_a_sealed_limit_is_out_of_limits_before_unblinding_already(tmp_path):

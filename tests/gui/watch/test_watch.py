@@ -3,16 +3,18 @@
 import shutil
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
-from PySide6.QtGui import QImage
+from PySide6.QtGui import QColor, QImage
 from PySide6.QtWidgets import QLabel, QWidget
 
 from study_app.gui.sessions.session_facts import sessions
 from study_app.gui.sessions.session_page import SessionPage
 from study_app.gui.theme.theme import DARK
+from study_app.gui.watch.window import _TimeLine
 from study_app.protocol.load import load
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.session.watch import _mark_text
@@ -124,6 +126,18 @@ def test_every_moment_is_the_recordings(opened, whole):
 )
 def test_each_line_of_the_journal_has_its_mark(event, fields, mark):
     assert _mark_text(event_of(event, **fields)) == mark
+
+
+def test_the_time_line_has_a_mark_of_its_own_colour_at_each_moment(qtbot):
+    moments = {"target": 2.0, "answer": 5.0, "event": 8.0}
+    marks = [SimpleNamespace(kind=kind, at_s=at_s) for kind, at_s in moments.items()]
+    line = _TimeLine(SimpleNamespace(begins_s=0.0, ends_s=10.0, marks=marks))
+    qtbot.addWidget(line)
+    line.resize(400, 40)
+    line.show_time(0.0)
+    seen = line.grab().toImage()
+    drawn = [seen.pixelColor(round(line._position_of(at_s)), 6).name() for at_s in moments.values()]
+    assert drawn == [QColor(ink).name() for ink in (line.theme.ok, line.theme.accent, line.theme.text2)]
 
 
 def test_keys_mouse_and_speed_move_through_time(opened, whole, qtbot, monkeypatch):
