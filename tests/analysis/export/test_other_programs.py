@@ -90,17 +90,17 @@ def test_wide_tables_hold_the_stored_answers_and_say_what_was_asked(mixed: tuple
                 assert float(held) == value == pytest.approx(float(cell)), name
     book = json.loads((out / "codebook.json").read_bytes())
     described = {column["name"]: column for column in book["files"][file.name]}
-    for name, description, bounds in (
-        ("feels_liquid__thin", "It feels like a liquid. About Thin, in Stir.", (1, 7)),
-        ("stir__thickness__thick", "How thick was it? In Stir. About Thick.", (1, 5)),
-        ("stir__pleasant__thin", "How pleasant was it? In Stir. About Thin.", (0, 100)),
-        ("start__age", "How old are you? In Start.", (16, 99)),
-        ("start__hand", "Which hand do you write with? In Start.", (None, None)),
-        ("load__raw", "Score raw of nasa-tlx, in NASA-TLX.", (None, None)),
+    for name, kind, description, bounds in (
+        ("feels_liquid__thin", "integer", "It feels like a liquid. About Thin, in Stir.", (1, 7)),
+        ("stir__thickness__thick", "integer", "How thick was it? In Stir. About Thick.", (1, 5)),
+        ("stir__pleasant__thin", "integer", "How pleasant was it? In Stir. About Thin.", (0, 100)),
+        ("start__age", "integer", "How old are you? In Start.", (16, 99)),
+        ("start__hand", "text", "Which hand do you write with? In Start.", (None, None)),
+        ("load__raw", "number", "Score raw of nasa-tlx, in NASA-TLX.", (None, None)),
     ):
         column = described[name]
         assert (column["description"], column.get("minimum"), column.get("maximum")) == (description, *bounds)
-        assert (about.column_names_to_labels[name], column["may_miss"]) == (description, True)
+        assert (about.column_names_to_labels[name], column["may_miss"], column["type"]) == (description, True, kind)
     questions = {question["id"]: question for question in book["questions"]}
     assert [(it["form"], it["name"], it["instrument"], it["items"]) for it in book["scores"]] == [
         ("load", "raw", "nasa-tlx", [*questions][6:12]), ("usability", "sus", "sus", [*questions][12:22]),

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -16,8 +17,8 @@ import pytest
 
 from study_app.analysis.data.blocks import Item, Setting
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.export import psychds_dataset, spss
-from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name, table_files
+from study_app.analysis.export import psychds_dataset, spss, table_files
+from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name
 from study_app.analysis.export.tables import Delivered, exported_tables, names_of_sealed, wide_table
 from study_app.store.columns import INTERVALS
 from study_app.store.csv_files import Column, header, optional, unsealed_columns
@@ -135,6 +136,26 @@ def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answ
         assert (column.minimum, column.maximum) == (1, 7)
 
 
+def test_the_codebook_counts_answers_and_names_conditions_with_the_same_delay(
+    made: Study, answers: list[Given]
+) -> None:
+    settings = tuple(
+        replace(setting, delay_ms=delay_ms) for setting, delay_ms in zip(SETTINGS, (40.0, 10.0, 10.0), strict=True)
+    )
+    block = replace(made.blocks[0], kind="delays", settings=settings)
+    counts = Counter(
+        (answer.participant, answer.code == "L1", answer.item)
+        for answer in counted(answers)
+        if answer.value is not None
+    ).values()
+    assert min(counts) < 2 < max(counts)
+    assert table_files._presentations(made, block) == {
+        "answers_per_participant_setting_and_item": [min(counts), max(counts)],
+        "sessions": [1],
+        "replicates": [["L2", "L3"]],
+    }
+
+
 @pytest.mark.slow
 def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answer(
     made: Study, answers: list[Given], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -143,7 +164,7 @@ def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answ
     table, cells = wide_table(made)
     labelled = replace(made, blocks=(replace(made.blocks[0], labels=tuple("abcdefg"), cannot_judge="unsure"),))
     cells = {name: replace(cell, block=labelled.blocks[0]) for name, cell in cells.items()}
-    files = table_files(labelled, (*exported_tables(labelled), table), ("sav", "wide"), cells)
+    files = table_files.table_files(labelled, (*exported_tables(labelled), table), ("sav", "wide"), cells)
     book: dict[str, Any] = json.loads(files["codebook.json"])
     (block,) = book["blocks"]
     assert block["levels"] == dict(zip("1234567", "abcdefg", strict=True))
