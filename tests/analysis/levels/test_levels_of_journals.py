@@ -189,7 +189,7 @@ def test_a_sealed_study_exports_its_intervals_without_what_tells_a_level(sealed_
     codebook = json.loads((tmp_path / "codebook.json").read_text("utf-8"))
     assert set(codebook["sealed_columns"]) >= sealed
     assert [one["block"] for one in codebook["levels"]] == BLOCKS
-    designs = ["2ifc", "yesno", "rated", "numbered", "2ifc", "oddity", "2ifc"]
+    designs = ["2ifc", "yesno", "rating", "estimation", "2ifc", "oddity", "2ifc"]
     for one, block, design in zip(codebook["levels"], BLOCKS, designs, strict=True):
         assert (one["title"], one["phase"], one["design"]) == (block.capitalize(), "main", design)
     assert codebook["levels"][0]["item"] == "choice_2ifc"
