@@ -56,8 +56,8 @@ def late(rows: Rows) -> Rows:
     return rows[:50] + [(row, stamp_s + 0.004) for row, stamp_s in rows[50:]]
 
 
-def added(rows: Rows) -> Rows:
-    return [*rows[:9], (['{"event":"note","t_s":0.5}'], rows[9][1]), *rows[9:]]
+def added(place: int) -> Callable[[Rows], Rows]:
+    return lambda rows: [*rows[:place], (['{"event":"note","t_s":0.5}'], rows[place][1]), *rows[place:]]
 
 
 @pytest.mark.parametrize(
@@ -68,11 +68,12 @@ def added(rows: Rows) -> Rows:
         (list, without(90, 110), "20 samples lost in 1 gap; the first after 0.089 s\n", 3),
         (without(12, 13), list, "own.xdf does not contain 1 marker recorded in the journal; the first: {", 3),
         (
-            added,
+            added(9),
             list,
             'own.xdf contains 1 marker not recorded in the journal, starting with {"event":"note","t_s":0.5}: ',
             3,
         ),
+        (added(0), list, "warning: own.xdf: contains 1 marker from outside this study's sessions\n", 0),
         (
             without(0, 8),
             list,

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -36,6 +37,7 @@ from study_app.store.folders import SessionFolder, StudyFolder, rehearsal_folder
 from study_app.store.recorder import Recorder
 from study_app.store.sessions import begin
 from study_app.store.sites import merge
+from study_app.store.tables.study_files import study_folders
 from study_app.user_folder import data_folder
 from tests.platforms import needs_links
 
@@ -83,7 +85,10 @@ def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites
     for participant in ("P007", "west-P007", "south-"):
         with pytest.raises(StoreError, match=r"\(north, south\), but '.*' does not include .* such as north-P007"):
             merged.locate_participant(sites, participant)
-    alone = sites / "sites" / "north"
+    alone, hidden = sites / "sites" / "north", sites.parent / ".hidden"
+    shutil.copytree(sites, hidden)
+    (sites.parent / "another" / "data").mkdir(parents=True)
+    assert list(study_folders(sites.parent)) == [sites.parent / "another", sites]
     assert merged.folders_of(alone) == {"": alone}
     assert merged.locate_participant(alone, "a-P007") == (alone, "a-P007")
     assert (merged.merged_above(alone), merged.merged_above(sites), merged.merged_above(alone.parent)) == (
