@@ -33,7 +33,7 @@ from study_app.store.checksums import file_hash, note_rebuilt, read_checksums, r
 from study_app.store.delivered import broken_limits, delay_error_ms, is_within_limits
 from study_app.store.exclusions import Exclusion
 from study_app.store.folder_lock import remove_abandoned_claims
-from study_app.store.folders import SessionFolder, StudyFolder, rehearsal_folder
+from study_app.store.folders import SessionFolder, StudyFolder, kept_pilot_folder, rehearsal_folder
 from study_app.store.recorder import Recorder
 from study_app.store.sessions import begin
 from study_app.store.sites import merge
@@ -87,6 +87,8 @@ def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites
             merged.locate_participant(sites, participant)
     alone, hidden = sites / "sites" / "north", sites.parent / ".hidden"
     shutil.copytree(sites, hidden)
+    (sites / "sites" / "west").mkdir()
+    assert merge.stray_entries(study) == (sites / "sites" / "west",)
     (sites.parent / "another" / "data").mkdir(parents=True)
     assert list(study_folders(sites.parent)) == [sites.parent / "another", sites]
     assert merged.folders_of(alone) == {"": alone}
@@ -383,6 +385,7 @@ def _protocol_error(path: Path) -> None:
 
 
 def test_names_of_new_folders_are_numbered(tmp_path: Path) -> None:
+    assert kept_pilot_folder(tmp_path, "demo") == tmp_path / "demo-pilot-1"
     for number in (1, 2, 4):
         (tmp_path / f"demo-rehearsal-{number}").mkdir()
     assert rehearsal_folder(tmp_path, "demo") == tmp_path / "demo-rehearsal-3"

@@ -4,7 +4,8 @@ import csv
 import io
 import shutil
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -12,7 +13,7 @@ from study_app.session.simulated.rehearsal import rehearse, resume_rehearsal
 from study_app.store.blinded.blinding import open_events, read_key
 from study_app.store.journals import journal
 from study_app.store.unblinding import unblind
-from study_app.store.verification.reproduction import reproduce_session
+from study_app.store.verification.reproduction import _Compared, reproduce_session
 from study_app.store.verification.verify_study import verify_study
 from tests.journal_lines import raw
 from tests.protocol.trials.level_studies import BLOCK, HEAD
@@ -72,6 +73,13 @@ def test_a_session_that_was_killed_and_resumed_presents_and_is_answered_as_one_t
     resume_rehearsal(session, protocol=protocol)
     assert told() == whole
     assert reproduce_session(session).differences == []
+
+
+def test_a_trial_follows_if_all_its_attempts_do() -> None:
+    compared: Any = SimpleNamespace(trials={})
+    for trial, follows in ((1, True), (2, False), (2, True), (3, True), (3, False)):
+        _Compared._note(compared, cast(Any, SimpleNamespace(id="pairs")), trial, follows)
+    assert compared.trials == {"pairs": {1: True, 2: False, 3: False}}
 
 
 def test_compared_conditions_follow_from_the_key(tmp_path: Path) -> None:
