@@ -9,6 +9,7 @@ import pytest
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.simulated import observers
 from study_app.session.simulated.observers import ProgrammedBall
+from study_app.session.simulated.participant import AdjustingObserver
 
 TANK_M = (0.12, 0.1, 0.08)
 REACH = Reach(
@@ -92,3 +93,10 @@ def test_an_explorer_leaves_a_little_after_the_least_time(
     device: Any = SimpleNamespace(follow=lambda *_: None, workspace_m=TANK_M)
     explorer, view = observers.Explorer(task, device, lambda: 0.5, 100.0), cast(Any, None)
     assert [explorer.act(100.0 + stays_s + late_s, view) for late_s in (-0.01, 0.01)] == [False, True]
+
+
+@pytest.mark.parametrize("delays", [True, False])
+def test_without_noise_an_observer_senses_what_is_presented(delays: bool) -> None:
+    observer: Any = SimpleNamespace(_attended=SimpleNamespace(delays=delays))
+    neutral = AdjustingObserver._neutral.fget(observer)  # type: ignore[attr-defined]
+    assert AdjustingObserver._perceived_magnitude(observer, 0.4, neutral) == 0.4

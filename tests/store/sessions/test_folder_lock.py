@@ -78,6 +78,7 @@ def test_a_session_that_another_program_began_meanwhile_is_not_taken_over(
     opening = take_over_folder(tmp_path)
     assert opening is not None
     assert (take_over_folder(tmp_path), is_open(tmp_path)) == (None, True)
+    assert take_over_folder(tmp_path / "nowhere") is None
     opening.release()
     never_begun = iter((True, False))
     monkeypatch.setattr(folder_lock, "is_never_begun", lambda _path: next(never_begun))
