@@ -193,10 +193,10 @@ def test_missing_answers_have_the_code_of_their_reason() -> None:
     people = pd.Series(["P1", "P2", "P3", "P4", "P5"])
     rows = pd.DataFrame(
         {
-            "participant": ["P2", "P3", "P4", "P4"],
-            "counted": [True, False, True, False],
-            "cannot_judge": pd.array([True, False, False, True], dtype="boolean"),
-            "excluded": [False, True, False, True],
+            "participant": ["P2", "P3", "P4", "P4", "P5"],
+            "counted": [True, False, True, False, True],
+            "cannot_judge": pd.array([True, False, False, True, None], dtype="boolean"),
+            "excluded": [False, True, False, True, False],
         }
     )
     coded = spss._with_codes(pd.Series([4, None, None, None, None], dtype="Float64"), people, rows)

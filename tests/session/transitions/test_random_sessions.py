@@ -4,6 +4,7 @@ import copy
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import FIRST
+from study_app.session.transitions import steps
 from study_app.session.transitions.events import (
     Begin,
     Broke,
@@ -310,3 +312,9 @@ def test_answers_have_the_numbers_of_their_questions_although_some_are_hidden(ha
     assert [(item.number, item.item, item.value) for item in line.items] == [
         (number, item, value) for number, (item, value) in enumerate(given.items(), 1) if number in numbers
     ]
+
+
+def test_answers_to_questions_that_are_hidden_now_are_removed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(steps, "_remove_answer", lambda state, item: (state, (item,)))
+    state: Any = SimpleNamespace(items=("a", "b", "c", "d"), shown=("c", "a"))
+    assert steps._without_hidden(state, ("before",)) == (state, ("before", "b", "d"))  # type: ignore[arg-type, comparison-overlap]
