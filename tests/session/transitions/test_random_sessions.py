@@ -4,7 +4,6 @@ import copy
 from contextlib import suppress
 from dataclasses import replace
 from itertools import product
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,7 +18,6 @@ from study_app.protocol.orders.tracks import design_of
 from study_app.protocol.trials.stimuli import Stimulated
 from study_app.session.pages import EndPage, PausePage, QuestionnairePage, TaskPage, TextPage
 from study_app.session.resume import FIRST
-from study_app.session.transitions import steps
 from study_app.session.transitions.events import (
     Begin,
     Broke,
@@ -314,7 +312,13 @@ def test_answers_have_the_numbers_of_their_questions_although_some_are_hidden(ha
     ]
 
 
-def test_answers_to_questions_that_are_hidden_now_are_removed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(steps, "_remove_answer", lambda state, item: (state, (item,)))
-    state: Any = SimpleNamespace(items=("a", "b", "c", "d"), shown=("c", "a"))
-    assert steps._without_hidden(state, ("before",)) == (state, ("before", "b", "d"))  # type: ignore[arg-type, comparison-overlap]
+def test_only_answers_to_questions_that_are_hidden_now_are_removed() -> None:
+    study = parse(text_of("mixed").encode(), "mixed.toml")
+    key = draw_key(study, stream(1, "key").random)
+    state, _ = advance(initial_state(study, build_schedule(study, "P001", 1), key, "en"), Begin(0.0))
+    given = {"age": 31, "hand": "both", "since": 7, "used": ["mouse"]}
+    answers = {item: Answer(onset_s=0.0, first_s=1.0, last_s=2.0, value=value) for item, value in given.items()}
+    state, commands = advance(replace(state, answers=answers), Chosen(3.0, "hand", "left"))
+    assert [item for item, answer in state.answers.items() if answer.given] == ["age", "hand", "used"]
+    removed = [each.line for each in commands if isinstance(each, Write) and each.line.event == "answer_removed"]
+    assert [line.item for line in removed] == ["since"]
