@@ -106,7 +106,7 @@ def test_a_replay_that_compared_nothing_does_not_say_that_all_is_the_same(monkey
     """What is printed of a replay's findings, and the exit code."""
 
     def replayed(count: int, **told: Any) -> tuple[int, str]:
-        some = {"recordings": count, "seconds": 9 * count, "lasted_s": 10.0 * count, "computed_s": 0.1 * count}
+        some = {"recordings": count, "seconds": count, "lasted_s": 10.0 * count, "computed_s": 0.1 * count}
         none: dict[str, Any] = {"took_s": 1.5, "differences": (), "missing": (), "uncompared": ()}
         found = replay.Replayed(**(some | none | told))
         monkeypatch.setattr(replay, "replay", lambda _: found)

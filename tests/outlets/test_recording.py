@@ -56,8 +56,8 @@ def late(rows: Rows) -> Rows:
     return rows[:50] + [(row, stamp_s + 0.004) for row, stamp_s in rows[50:]]
 
 
-def added(rows: Rows) -> Rows:
-    return [*rows[:9], (['{"event":"note","t_s":0.5}'], rows[9][1]), *rows[9:]]
+def added(place: int) -> Callable[[Rows], Rows]:
+    return lambda rows: [*rows[:place], (['{"event":"note","t_s":0.5}'], rows[place][1]), *rows[place:]]
 
 
 @pytest.mark.parametrize(
@@ -68,11 +68,12 @@ def added(rows: Rows) -> Rows:
         (list, without(90, 110), "20 samples lost in 1 gap; the first after 0.089 s\n", 3),
         (without(12, 13), list, "own.xdf does not contain 1 marker recorded in the journal; the first: {", 3),
         (
-            added,
+            added(9),
             list,
             'own.xdf contains 1 marker not recorded in the journal, starting with {"event":"note","t_s":0.5}: ',
             3,
         ),
+        (added(0), list, "warning: own.xdf: contains 1 marker from outside this study's sessions\n", 0),
         (
             without(0, 8),
             list,
@@ -90,7 +91,9 @@ def test_what_a_recording_lacks_is_found(
     done = CliRunner().invoke(commands, ["verify", str(study), "--xdf", str(file)])
     assert said in done.output
     assert done.exit_code == code
-    assert "clock of 'liquid-study samples': 0 resets; drift +2 ppm over 95 s, with offsets within" in done.output
+    clock = r"clock of 'liquid-study samples': 0 resets; drift \+2 ppm over 95 s, with offsets within (\S+) ms of"
+    (offset_ms,) = re.findall(clock, done.output)
+    assert float(offset_ms) < 1e-6
     if markers is list:
         assert re.search(r"sub-P001/ses-01: (\d+) of \1 recorded, 0 lost; times agree within [\d.e-]+ ms", done.output)
     assert "sub-P002" not in done.output

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -26,10 +27,23 @@ from study_app.session.transitions.state import Phase
 from study_app.session.transitions.table import initial_state
 from study_app.store.blinded.blinding import open_or_draw_key, read_key
 from study_app.store.files.folders import StudyFolder
+from study_app.store.sessions import recovery
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.verification.whole_study import verify_study
 from tests.compiled import needs_servo
 from tests.studies import begun
+
+
+def test_a_session_goes_on_with_its_liquids_as_they_were_sealed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, now, sealed = b'[liquids.oil]\nfile = "oil.toml"\n', {"oil.toml": "now"}, {"oil.toml": "sealed"}
+    monkeypatch.setattr(recovery, "locate_session", lambda _: (StudyFolder(tmp_path), None))
+    for files, used in ((sealed, sealed), ({}, now)):
+        monkeypatch.setattr(recovery, "read_key", lambda _, files=files: SimpleNamespace(files=files))
+        source = recovery.sealed_source(tmp_path, StudySource(study, liquids=now).content)
+        assert StudySource.split(source) == (study, used, {})
+
 
 EARLIER = Path(__file__).parents[1] / "store" / "releases" / "0.1"
 THICK = '[liquids.thick]\ndensity_kg_m3 = 1400\neffects = ["drag"]\n'

@@ -1,6 +1,8 @@
 """What is chosen before a session, and what is refused before any window opens for it."""
 
+from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,10 +12,26 @@ from study_app.app.session import live_session
 from study_app.errors import StoreError
 from study_app.protocol.source.files import source_bytes
 from study_app.session import start
-from study_app.session.start import NewSession, draw_seed, resumed_choices
+from study_app.session.preflight import Measurements, Screen
+from study_app.session.start import NewSession, Ready, draw_seed, resumed_choices
 from study_app.store.sessions.open_session import SessionStore
 from study_app.store.workstation import MachineSettings
 from tests import studies
+
+
+def test_what_is_ready_is_measured_with_its_screen_and_its_outlets(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(start, "Videos", lambda *given: given)
+    rig: Any = SimpleNamespace(servo=SimpleNamespace(now_ns=7))
+    outlets: Any = SimpleNamespace(statuses=lambda: ("lsl",))
+    facts = Measurements(**dict.fromkeys(field.name for field in fields(Measurements)))  # type: ignore[arg-type]
+    measured = Ready(rig, facts, outlets=outlets).facts_with(refresh_hz=59.9, scaling=1.25)
+    assert measured == replace(facts, screen=Screen(refresh_hz=59.9, scaling=1.25), outlets=("lsl",))  # type: ignore[arg-type]
+    chosen: Any = SimpleNamespace(source="demo", footage=Path("waves"))
+    for shows in (True, False):
+        study: Any = SimpleNamespace(conditions={"thin": SimpleNamespace(shows_video=shows)})
+        assert start.unopened_videos(chosen, study, "front", rig) == (
+            (study, Path("waves"), "front", 7) if shows else None
+        )
 
 
 @pytest.fixture

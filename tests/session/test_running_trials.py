@@ -1,6 +1,7 @@
 """A trial that runs: a ball that is hidden and a video, drawn as late as everything else; video frames are counted."""
 
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -10,7 +11,7 @@ from study_app.protocol.trials.stimuli import Stimulated
 from study_app.protocol.trials.tasks import Explore, Follow
 from study_app.session.tasks import TaskView
 from study_app.session.transitions.events import StartTrial
-from study_app.session.trial import SETTLED_S, Recording, RunningTrial
+from study_app.session.trial import _LEAST_SET_S, SETTLED_S, Recording, RunningTrial
 from study_app.video.frames import VideoFrame, VideoStatistics
 from tests.session.fakes import FakeServo
 
@@ -216,3 +217,12 @@ def test_late_and_lost_frames_are_counted_once_each() -> None:
         "video_delay_error_max_ms": 66.0,
         "video_age_mean_ms": None,
     }
+
+
+@pytest.mark.parametrize(("adjusts", "calls"), [(True, [1.5 + _LEAST_SET_S]), (False, ["left"])])
+def test_a_level_is_set_for_a_moment_before_it_can_be_left(adjusts: bool, calls: list[Any]) -> None:
+    told: list[Any] = []
+    tracker = SimpleNamespace(finish=told.append, leave=lambda: told.append("left"))
+    command = SimpleNamespace(adjusts=adjusts, task=SimpleNamespace(judged_from_s=1.5))
+    RunningTrial.leave(cast(Any, SimpleNamespace(command=command, _tracker=tracker)))
+    assert told == calls

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -19,13 +20,14 @@ from study_app.store import exclusions, merged, receipt
 from study_app.store.blinded import blinding
 from study_app.store.exclusions import Exclusion
 from study_app.store.files import atomic, csv_files, output_files
-from study_app.store.files.folders import SessionFolder, StudyFolder, rehearsal_folder
+from study_app.store.files.folders import SessionFolder, StudyFolder, kept_pilot_folder, rehearsal_folder
 from study_app.store.integrity.checksums import file_hash, note_rebuilt, read_checksums, renew_checksums
 from study_app.store.integrity.folder_lock import remove_abandoned_claims
 from study_app.store.recorder import Recorder
 from study_app.store.session_progress.delivered import broken_limits, delay_error_ms, is_within_limits
 from study_app.store.sessions import begin
 from study_app.store.sites import merge
+from study_app.store.tables.study_files import study_folders
 from study_app.store.versions import drafts, study_runs, study_settings, study_versions
 from study_app.user_folder import data_folder
 from tests.platforms import needs_links
@@ -74,7 +76,12 @@ def test_a_merged_study_names_each_participant_and_exclusion_with_the_site(sites
     for participant in ("P007", "west-P007", "south-"):
         with pytest.raises(StoreError, match=r"\(north, south\), but '.*' does not include .* such as north-P007"):
             merged.locate_participant(sites, participant)
-    alone = sites / "sites" / "north"
+    alone, hidden = sites / "sites" / "north", sites.parent / ".hidden"
+    shutil.copytree(sites, hidden)
+    (sites / "sites" / "west").mkdir()
+    assert merge.stray_entries(study) == (sites / "sites" / "west",)
+    (sites.parent / "another" / "data").mkdir(parents=True)
+    assert list(study_folders(sites.parent)) == [sites.parent / "another", sites]
     assert merged.folders_of(alone) == {"": alone}
     assert merged.locate_participant(alone, "a-P007") == (alone, "a-P007")
     assert (merged.merged_above(alone), merged.merged_above(sites), merged.merged_above(alone.parent)) == (
@@ -369,6 +376,7 @@ def _protocol_error(path: Path) -> None:
 
 
 def test_names_of_new_folders_are_numbered(tmp_path: Path) -> None:
+    assert kept_pilot_folder(tmp_path, "demo") == tmp_path / "demo-pilot-1"
     for number in (1, 2, 4):
         (tmp_path / f"demo-rehearsal-{number}").mkdir()
     assert rehearsal_folder(tmp_path, "demo") == tmp_path / "demo-rehearsal-3"

@@ -1,7 +1,9 @@
 """The exported tables, codebook and .sav file of a study in memory, against a few lines of its own answers."""
 
 import hashlib
+import io
 import json
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +15,12 @@ import numpy as np
 import pandas as pd
 import pyreadstat
 import pytest
+from pyarrow import parquet
 
 from study_app.analysis.data.blocks import Item, Setting
 from study_app.analysis.data.study_tables import Study
-from study_app.analysis.export import psychds_dataset, spss
-from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name, table_files
+from study_app.analysis.export import psychds_dataset, spss, table_files
+from study_app.analysis.export.table_files import codebook_bytes, credit_lines, file_name
 from study_app.analysis.export.tables import Delivered, exported_tables, names_of_sealed, wide_table
 from study_app.protocol.source.files import StudySource, _is_of
 from study_app.store.files.columns import INTERVALS
@@ -79,6 +82,16 @@ def counted(answers: list[Given]) -> Iterator[Given]:
 def test_each_answer_has_its_own_condition_delay_and_site(made: Study, answers: list[Given]) -> None:
     tables = {table.name: table.frame for table in exported_tables(made)}
     responses = tables["responses"].astype(object)
+    may_miss = [
+        (table.name, column.name)
+        for table in exported_tables(made)
+        for column in table.columns
+        if column.may_miss and column.name in {"condition", "liquid", "delay_ms", "delay_achieved_ms"}
+    ]
+    assert may_miss == [
+        *(("responses", name) for name in ("condition", "liquid", "delay_ms", "delay_achieved_ms")),
+        ("trials", "delay_achieved_ms"),
+    ]
     assert len(responses) == len(answers)
     for answer, (at, row) in zip(answers, responses.iterrows(), strict=True):
         place = int(answer.code[1])
@@ -134,6 +147,32 @@ def test_the_wide_table_has_the_median_of_each_persons_answers(made: Study, answ
         (column,) = (column for column in table.columns if column.name == name)
         assert column.description == f"It is {item}. About {made.blocks[0].name(cell.setting)}, in Block."
         assert (column.minimum, column.maximum) == (1, 7)
+        assert column.kind == ("integer" if (wide[name].dropna() % 1 == 0).all() else "number")
+    given = made.responses["response"]
+    same = wide_table(replace(made, responses=made.responses.assign(response=given.mask(given.notna(), 4))))[0]
+    assert {column.kind for column in same.columns[3:]} == {"integer"}
+    schema = parquet.read_schema(io.BytesIO(table_files._parquet_bytes(same)))
+    assert {str(schema.field(column.name).type) for column in same.columns[3:]} == {"int8"}
+
+
+def test_the_codebook_counts_answers_and_names_conditions_with_the_same_delay(
+    made: Study, answers: list[Given]
+) -> None:
+    settings = tuple(
+        replace(setting, delay_ms=delay_ms) for setting, delay_ms in zip(SETTINGS, (40.0, 10.0, 10.0), strict=True)
+    )
+    block = replace(made.blocks[0], kind="delays", settings=settings)
+    counts = Counter(
+        (answer.participant, answer.code == "L1", answer.item)
+        for answer in counted(answers)
+        if answer.value is not None
+    ).values()
+    assert min(counts) < 2 < max(counts)
+    assert table_files._presentations(made, block) == {
+        "answers_per_participant_setting_and_item": [min(counts), max(counts)],
+        "sessions": [1],
+        "replicates": [["L2", "L3"]],
+    }
 
 
 @pytest.mark.slow
@@ -144,7 +183,7 @@ def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answ
     table, cells = wide_table(made)
     labelled = replace(made, blocks=(replace(made.blocks[0], labels=tuple("abcdefg"), cannot_judge="unsure"),))
     cells = {name: replace(cell, block=labelled.blocks[0]) for name, cell in cells.items()}
-    files = table_files(labelled, (*exported_tables(labelled), table), ("sav", "wide"), cells)
+    files = table_files.table_files(labelled, (*exported_tables(labelled), table), ("sav", "wide", "parquet"), cells)
     book: dict[str, Any] = json.loads(files["codebook.json"])
     (block,) = book["blocks"]
     assert block["levels"] == dict(zip("1234567", "abcdefg", strict=True))
@@ -156,6 +195,9 @@ def test_the_codebook_and_the_sav_file_name_every_level_setting_and_missing_answ
     assert block["sessions"] == [1]
     head = ("participants", "sites", "sessions", "sessions_left_out", "simulated", "pilot")
     assert [book["study"][name] for name in head] == [4, ["A", "B"], 5, made.left_out, True, False]
+    schema = parquet.read_schema(io.BytesIO(files["study-made_up_description-responses_data.parquet"]))
+    kinds = {"trial": "int64", "counted": "bool", "code": "string", "delay_ms": "double"}
+    assert {name: str(schema.field(name).type) for name in kinds} == kinds
     path = tmp_path / "wide.sav"
     path.write_bytes(files["study-made_up_description-wide_data.sav"])
     frame, meta = pyreadstat.read_sav(path, user_missing=True)
@@ -173,10 +215,10 @@ def test_missing_answers_have_the_code_of_their_reason() -> None:
     people = pd.Series(["P1", "P2", "P3", "P4", "P5"])
     rows = pd.DataFrame(
         {
-            "participant": ["P2", "P3", "P4", "P4"],
-            "counted": [True, False, True, False],
-            "cannot_judge": pd.array([True, False, False, True], dtype="boolean"),
-            "excluded": [False, True, False, True],
+            "participant": ["P2", "P3", "P4", "P4", "P5"],
+            "counted": [True, False, True, False, True],
+            "cannot_judge": pd.array([True, False, False, True, None], dtype="boolean"),
+            "excluded": [False, True, False, True, False],
         }
     )
     coded = spss._with_codes(pd.Series([4, None, None, None, None], dtype="Float64"), people, rows)

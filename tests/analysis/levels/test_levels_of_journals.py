@@ -5,20 +5,25 @@ import json
 import re
 import shutil
 from collections import defaultdict
+from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pandas as pd
+import pyreadstat
 import pytest
 
 from study_app.analysis.data.study_tables import load_study
 from study_app.analysis.export.tables import wide_table
 from study_app.analysis.export_study import export
+from study_app.analysis.levels.evaluate import level_results
+from study_app.analysis.levels.statistic import statistics
 from study_app.analysis.levels.tracks import OF_INTERVALS
 from study_app.analysis.report.write_report import report
 from study_app.protocol.load import load
 from study_app.store.blinded.blinding import complete_protocol, open_events, read_key
 from study_app.store.files.columns import INTERVALS, TRIALS_MISSING
+from study_app.store.files.csv_files import csv_bytes, read_table
 from study_app.store.files.folders import StudyFolder
 from study_app.store.journals import journal
 from study_app.store.receipt import read
@@ -27,6 +32,7 @@ from tests.journal_lines import raw
 
 pytestmark = pytest.mark.slow
 
+NAMED = "study-levels_description-"
 BLOCKS = ["viscosity", "detect", "rate", "number", "equal", "odd", "pairs"]
 
 
@@ -64,7 +70,7 @@ def answered(folder: Path, block: str) -> list[Answered]:
 
 
 def rows(folder: Path, name: str) -> list[dict[str, str]]:
-    with (folder / f"study-levels_description-{name}_data.csv").open(newline="", encoding="utf-8") as file:
+    with (folder / f"{NAMED}{name}_data.csv").open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 
@@ -93,6 +99,52 @@ def test_trials_of_tracks_have_the_condition_whose_number_is_varied(opened_level
     assert {
         level["block"]: (level["vary"], level["level"], level["direction"]) for level in levels if "vary" in level
     } == {name: (stimulus.vary, stimulus.level_kind, stimulus.direction) for name, stimulus in varied.items()}
+
+
+def test_tables_of_levels_hold_measures_and_results_in_every_format(opened_levels: Path, tmp_path: Path) -> None:
+    """Forces and speeds of intervals are drawn, all different."""
+    folder, drawn = shutil.copytree(opened_levels, tmp_path / "study"), dict[tuple[str, str, str], float]()
+    for session in StudyFolder(folder).sessions():
+        path = session.table("levels", "intervals")
+        table = read_table(path.read_bytes(), INTERVALS)
+        for row in table:
+            for name in OF_INTERVALS:
+                row[name] = cell = (len(drawn) + 1) / 8
+                drawn[session.participant, str(row["trial"]), f"{name}_{row['interval']}"] = cell
+        path.write_bytes(csv_bytes(INTERVALS, table))
+    to, study = tmp_path / "out", load_study(folder)
+    export(folder, to, extras=["parquet", "sav"])
+    files = json.loads((to / "codebook.json").read_text("utf-8"))["files"]
+    columns = {column["name"]: column["description"] for column in files[f"{NAMED}tracks_data.csv"]}
+    descriptions = {column.name: column.description for column in INTERVALS if column.name in OF_INTERVALS}
+    for row in rows(to, "tracks"):
+        for name, number in product(OF_INTERVALS, (1, 2, 3)):
+            cell = drawn.get((row["participant"], row["trial"], f"{name}_{number}"))
+            assert row[f"{name}_{number}"] == ("n/a" if cell is None else str(cell))
+            assert columns[f"{name}_{number}"] == f"{descriptions[name]} In interval {number}."
+    about = {"study": "levels", "simulated": True, "pilot": False, "group": None}
+    expected: dict[str, list[Any]] = {"tracks": [], "responses": []}
+    for result, statistic in product(level_results(study), statistics()):
+        if statistic.exported_in(study):
+            expected.setdefault(statistic.table, []).extend(about | row for row in statistic(result).exported())
+    assert expected.keys() == {path.stem.partition("tion-")[2].removesuffix("_data") for path in to.glob("*.sav")} - {
+        "wide"
+    }
+    for table, results in expected.items():
+        path = to / f"{NAMED}{table}_data.parquet"
+        frame, found = pd.read_parquet(path), pyreadstat.read_sav(str(path.with_suffix(".sav")))[0]
+        names = [column["name"] for column in files[f"{path.stem}.csv"]]
+        assert [*frame] == [*found] == names
+        held = [[None if pd.isna(cell) else cell for cell in row] for row in frame.astype(object).to_numpy()]
+        assert [[None if pd.isna(cell) or cell == "" else cell for cell in row] for row in found.to_numpy()] == held
+        written = [[csv_text(cell) for cell in row] for row in held]
+        assert written == [[*row.values()] for row in rows(to, table)]
+        assert not results or held == [[row[name] for name in names] for row in results]
+
+
+def csv_text(cell: Any) -> str:
+    """Return a cell as a CSV file has it."""
+    return "n/a" if cell is None else str(cell).lower() if isinstance(cell, bool) else str(cell)
 
 
 def test_answers_of_tracks_are_not_in_the_wide_table(opened_levels: Path) -> None:
@@ -137,6 +189,10 @@ def test_a_sealed_study_exports_its_intervals_without_what_tells_a_level(sealed_
     codebook = json.loads((tmp_path / "codebook.json").read_text("utf-8"))
     assert set(codebook["sealed_columns"]) >= sealed
     assert [one["block"] for one in codebook["levels"]] == BLOCKS
+    designs = ["2ifc", "yesno", "rating", "estimation", "2ifc", "oddity", "2ifc"]
+    for one, block, design in zip(codebook["levels"], BLOCKS, designs, strict=True):
+        assert (one["title"], one["phase"], one["design"]) == (block.capitalize(), "main", design)
+    assert codebook["levels"][0]["item"] == "choice_2ifc"
     assert "vary" not in codebook["levels"][0]
 
 

@@ -18,7 +18,7 @@ from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_GLITCH, LIMIT
 from study_app.haptics.runtime.clocks.clock import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.session import replay as replay_module
-from study_app.session.replay import Replayed, replay
+from study_app.session.replay import Replayed, differing_columns, replay
 from study_app.session.simulated.rehearsal import rehearse
 from study_app.session.transitions.events import Begin, Continue, EndRequested, PauseRequested, ResumeRequested
 from study_app.store import recordings
@@ -34,6 +34,12 @@ from tests.session.replay.recorded_sessions import STRESSED, begun, held, rewrit
 from tests.store.forging import secret_of
 
 pytestmark = [needs_servo, pytest.mark.slow]
+
+
+def test_a_measure_that_only_one_side_has_differs() -> None:
+    recomputed = {"same": 1.0, "neither": None, "lost": 1.0, "added": None, "other": 2.0, "unknown": 3.0}
+    ended = {"same": 1.0, "neither": None, "lost": None, "added": 1.0, "other": 2.1}
+    assert list(differing_columns(recomputed, ended)) == ["lost", "added", "other"]
 
 
 @pytest.fixture(scope="module")

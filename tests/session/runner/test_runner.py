@@ -8,7 +8,14 @@ import pytest
 from study_app.haptics.model.layout import LIMITER_NAMES
 from study_app.session.device_buttons import ANSWERS, CONTINUE, DeviceButtons
 from study_app.session.pages import PausePage, QuestionnairePage, TaskPage
-from study_app.session.transitions.events import Begin, Broke, PauseRequested, Reconnected, ResumeRequested
+from study_app.session.transitions.events import (
+    Begin,
+    Broke,
+    EndRequested,
+    PauseRequested,
+    Reconnected,
+    ResumeRequested,
+)
 from study_app.session.transitions.state import Phase
 from tests.golden import compare
 from tests.session.fakes import World, step
@@ -110,6 +117,38 @@ def test_a_stall_of_the_program_is_noted_while_no_task_runs(world: World) -> Non
     world.runner.post(PauseRequested(world.clock(), "operator"))
     world.run(3.1)
     assert [line["text"] for line in world.journal.of("note")] == ["the program stalled for 3.1 s"]
+
+
+def test_lines_that_are_not_on_the_disk_stop_the_force_until_they_are(world: World) -> None:
+    world.runner.post(Begin(0.0))
+    while world.state.phase is not Phase.TASK:
+        step(world)
+    world.run(0.1)
+    world.log.clear()
+    world.journal.unflushed = "no flush"
+    world.run(0.1)
+    assert (world.runner.stalled, world.log[0]) == ("no flush", "stop_force")
+    world.run(1.01)
+    assert world.runner.stalled == "no flush"
+    world.journal.unflushed = None
+    world.run(1.01)
+    assert (world.runner.stalled, world.state.phase) == (None, Phase.PAUSED)
+    assert [line["outcome"] for line in world.journal.of("trial_ended")] == ["interrupted"]
+    world.runner.post(EndRequested(world.clock(), "aborted", "fire"))
+    assert (world.runner.finished, world.journal.status) == (True, "aborted")
+
+
+def test_the_end_of_a_session_waits_for_its_recordings() -> None:
+    settled = False
+    world = World(settled=lambda: settled)
+    world.runner.post(Begin(0.0))
+    assert not world.runner.ending
+    while not world.state.over:
+        step(world)
+    assert (world.runner.ending, world.runner.finished, world.journal.status) == (True, False, None)
+    settled = True
+    world.run(0.1)
+    assert (world.runner.ending, world.runner.finished, world.journal.status) == (False, True, "completed")
 
 
 def test_a_button_leaves_a_page_unless_it_was_pressed_before_the_page_was_there(world: World) -> None:

@@ -1,11 +1,15 @@
 """The ball of a preview: it does what the task asks for, within the tank, again and again."""
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import numpy as np
 import pytest
 
 from study_app.protocol.trials.tasks import AnyTask, Explore, Follow, Reach
 from study_app.session.simulated import observers
 from study_app.session.simulated.observers import ProgrammedBall
+from study_app.session.simulated.participant import AdjustingObserver
 
 TANK_M = (0.12, 0.1, 0.08)
 REACH = Reach(
@@ -66,3 +70,33 @@ def test_a_stroke_goes_straight_from_rest_to_rest_at_its_mean_pace() -> None:
     assert steps.max() * len(steps) == pytest.approx(1.875, rel=0.01)
     assert steps[0] * len(steps) < 0.01
     assert len(steps) == observers._rows(0.05 / pace_mps)
+
+
+def test_the_assumed_hand_moves_smoothly_to_each_target_and_stays() -> None:
+    each_s = observers._MOVE_S + REACH.dwell_s + observers._STAY_S
+    times_s, positions_m = observers._reaches(REACH, 2 * each_s)
+    left, right = np.array(REACH.targets_m)
+    for after_s, place_m in (
+        (0.0, 0 * left), (observers._MOVE_S / 2, left / 2), (observers._MOVE_S, left), (each_s, left),
+        (each_s + observers._MOVE_S / 2, (left + right) / 2), (each_s + observers._MOVE_S, right),
+    ):  # fmt: skip
+        assert positions_m[np.searchsorted(times_s, after_s - 1e-9)] == pytest.approx(place_m, abs=3e-4)
+    assert times_s[-1] == pytest.approx(2 * each_s, abs=2 / observers.RATE_HZ)
+
+
+@pytest.mark.parametrize(("least_s", "stays_s"), [(2.0, 3.0), (10.0, 12.0), (19.5, 20.0)])
+def test_an_explorer_leaves_a_little_after_the_least_time(
+    monkeypatch: pytest.MonkeyPatch, least_s: float, stays_s: float
+) -> None:
+    monkeypatch.setattr(observers, "exploration", lambda *_: ())
+    task: Any = SimpleNamespace(least_s=least_s, limit_s=20.0)
+    device: Any = SimpleNamespace(follow=lambda *_: None, workspace_m=TANK_M)
+    explorer, view = observers.Explorer(task, device, lambda: 0.5, 100.0), cast(Any, None)
+    assert [explorer.act(100.0 + stays_s + late_s, view) for late_s in (-0.01, 0.01)] == [False, True]
+
+
+@pytest.mark.parametrize("delays", [True, False])
+def test_without_noise_an_observer_senses_what_is_presented(delays: bool) -> None:
+    observer: Any = SimpleNamespace(_attended=SimpleNamespace(delays=delays))
+    neutral = AdjustingObserver._neutral.fget(observer)  # type: ignore[attr-defined]
+    assert AdjustingObserver._perceived_magnitude(observer, 0.4, neutral) == 0.4

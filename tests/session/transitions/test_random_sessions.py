@@ -309,3 +309,15 @@ def test_answers_have_the_numbers_of_their_questions_although_some_are_hidden(ha
     assert [(item.number, item.item, item.value) for item in line.items] == [
         (number, item, value) for number, (item, value) in enumerate(given.items(), 1) if number in numbers
     ]
+
+
+def test_only_answers_to_questions_that_are_hidden_now_are_removed() -> None:
+    study = parse(text_of("mixed").encode(), "mixed.toml")
+    key = draw_key(study, stream(1, "key").random)
+    state, _ = advance(initial_state(study, build_schedule(study, "P001", 1), key, "en"), Begin(0.0))
+    given = {"age": 31, "hand": "both", "since": 7, "used": ["mouse"]}
+    answers = {item: Answer(onset_s=0.0, first_s=1.0, last_s=2.0, value=value) for item, value in given.items()}
+    state, commands = advance(replace(state, answers=answers), Chosen(3.0, "hand", "left"))
+    assert [item for item, answer in state.answers.items() if answer.given] == ["age", "hand", "used"]
+    removed = [each.line for each in commands if isinstance(each, Write) and each.line.event == "answer_removed"]
+    assert [line.item for line in removed] == ["since"]

@@ -59,8 +59,10 @@ def test_participants_have_entries_in_the_order_of_their_first_sessions(
             assert store.lines[0].entry == number
             assert events(store) == ["session_started", "allocated"]
             assert allocate(StudyFolder(tmp_path / "s"), store.key, participant).entry == number  # type: ignore[union-attr]
+    (StudyFolder(tmp_path / "s").allocated / "notes.json").write_text("{}", encoding="utf-8", newline="\n")
     assert [claim.participant for claim in claims(StudyFolder(tmp_path / "s"))] == ["P009", "P001", "X"]
     assert synced == [StudyFolder(tmp_path / "s").allocated] * 3, "before they count"
+    (StudyFolder(tmp_path / "s").allocated / "notes.json").unlink()
     assert not verify_study(tmp_path / "s").errors
 
 

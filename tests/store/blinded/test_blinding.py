@@ -139,6 +139,11 @@ def test_lines_of_unblinding_that_cannot_be_read_are_numbered_from_1(tmp_path: P
         path.write_bytes(b"\nrubbish\n" + last)
         assert unreadable_reveals(tmp_path) == ((2, False), (3, is_torn)), "a power cut leaves half of the last line"
         assert reveals(tmp_path) == ()
+    opening = {"at": "2026-03-02T09:30:00+01:00", "by": "AK", "reason": "to analyse", "key_hash": "ab"}
+    lines = [opening, *(opening | {name: wrong} for name in opening for wrong in ("", " ", 7))]
+    path.write_bytes(b"".join(json.dumps(line).encode() + b"\n" for line in lines))
+    assert [line["by"] for line in reveals(tmp_path)] == ["AK"]
+    assert unreadable_reveals(tmp_path) == tuple((number, False) for number in range(2, len(lines) + 1))
 
 
 def test_an_unreadable_key_and_one_of_a_later_format_are_errors(tmp_path: Path, protocol: Protocol) -> None:

@@ -121,6 +121,7 @@ def test_a_table_of_a_session_that_goes_on_is_completed_and_a_changed_one_is_lef
     """The first table lacks its last line, as after a crash; in the second somebody changed a cell."""
     with start() as store:
         attend(store)
+    StudyFolder(tmp_path / "study").session("P009", 1).path.mkdir(parents=True)  # of a session that never began
     behind, changed = (store.folder.table("brackish", name) for name in ("responses", "trials"))
     first, *rows = changed.read_bytes().splitlines(keepends=True)
     by_hand = first + b"".join([rows[0].replace(b"complete", b"repaired"), *rows[1:]])

@@ -5,7 +5,7 @@ import json
 import re
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -95,6 +95,30 @@ def test_a_journal_whose_chain_was_removed_is_damaged(start: Start) -> None:
     path.write_bytes(re.sub(rb',\s*"previous":\s*"[0-9a-f]{64}"', b"", path.read_bytes()))
     with pytest.raises(StoreError, match=r"line 1 does not contain the key .*previous"):
         read(path)
+
+
+NAN = float("nan")
+
+
+@pytest.mark.parametrize(
+    ("kind", "valid", "invalid"),
+    [
+        ("_Flag", [True, False], [0, "true", None]),
+        ("_Integer", [0, -3], [True, 1.0, "1", 2 * 10**30]),
+        ("Number", [1, 0.5], [NAN, float("inf"), True, "1"]),
+        ("Time", ["2026-03-02T09:30:00+01:00"], ["2026-03-02T09:30:00", "noon", 7, "0001-01-01T00:00:00+00:00"]),
+        ("Texts", [[], ["a"]], ["a", [1], {"a": 1}, None]),
+        ("_NumberList", [[], [1, 0.5]], [1, ["1"], [NAN]]),
+        ("Numbers", [{}, {"a": 1.5}], [[], {"a": "1"}, {"a": NAN}]),
+        ("_Checks", [[], [{}]], [{}, [1]]),
+        ("_AnyAnswer", ["a", 1, ["a"]], [None, [1], {}, NAN]),
+    ],
+)
+def test_each_kind_of_value_is_told_from_others(kind: str, valid: list[Any], invalid: list[Any]) -> None:
+    holds = get_args(getattr(journal_events, kind))[1].holds
+    assert [[holds(value) for value in values] for values in (valid, invalid)] == [
+        [True] * len(valid), [False] * len(invalid),
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["n", "t_s", "at", "kind", "text"])

@@ -15,7 +15,8 @@ import pytest
 
 from study_app.errors import StoreError
 from study_app.store.files.folders import StudyFolder, locate_session, study_folder
-from study_app.store.integrity.folder_lock import is_open, lock_folder, markers, process_start_s
+from study_app.store.integrity import folder_lock
+from study_app.store.integrity.folder_lock import is_open, lock_folder, markers, process_start_s, take_over_folder
 from study_app.store.sessions.begin import used_ids
 from tests.faults.support.racers import race
 from tests.platforms import needs_fork, needs_links, needs_posix
@@ -71,6 +72,19 @@ def test_the_marker_of_a_program_that_is_gone_is_passed_over(tmp_path: Path, cha
 
 
 @needs_posix
+def test_a_session_that_another_program_began_meanwhile_is_not_taken_over(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    opening = take_over_folder(tmp_path)
+    assert opening is not None
+    assert (take_over_folder(tmp_path), is_open(tmp_path)) == (None, True)
+    assert take_over_folder(tmp_path / "nowhere") is None
+    opening.release()
+    never_begun = iter((True, False))
+    monkeypatch.setattr(folder_lock, "is_never_begun", lambda _path: next(never_begun))
+    assert (take_over_folder(tmp_path), is_open(tmp_path)) == (None, False)
+
+
 def test_a_killed_program_that_nobody_has_waited_for_is_gone(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as program:
         other(tmp_path, pid=program.pid, began=process_start_s(program.pid))

@@ -48,6 +48,14 @@ def test_after_its_end_a_session_takes_nothing(start: Start) -> None:
         left.append(journal_events.Note(kind="note", text="late"))
 
 
+def test_a_flush_that_failed_is_told_by_the_session(start: Start, monkeypatch: pytest.MonkeyPatch) -> None:
+    with start() as store:
+        monkeypatch.setattr(store.journal, "check_flushed", mock.Mock(side_effect=StoreError("not flushed")))
+        with pytest.raises(StoreError, match="not flushed"):
+            store.check_flushed()
+        monkeypatch.undo()
+
+
 def trial_of(number: int, **changes: Any) -> dict[str, Any]:
     told = {"block": "liquids", "phase": "main", "part": 1, "index": number, "of": 9, "code": "L1"}
     return {"trial": number, "attempt": 1, **told, **changes}

@@ -15,6 +15,7 @@ from study_app.session.simulated.rehearsal import rehearse
 from study_app.store import receipt
 from study_app.store.blinded import blinding
 from study_app.store.journals import journal_events
+from study_app.store.verification import verify_session
 from study_app.store.verification.whole_study import verify_study
 from tests.faults.support import short
 from tests.platforms import needs_fork
@@ -22,6 +23,13 @@ from tests.store.conftest import Start
 from tests.store.verification.played_studies import P007, told, warned
 
 pytestmark = pytest.mark.slow
+
+
+def test_the_questions_of_designs_are_compared_unless_a_language_is_the_labs_own() -> None:
+    asked = {"after": {}, f"pairs{receipt.ANSWER}": {}}
+    for languages, compared in ((["nl", "en"], asked), (["en", "fy"], {"after": {}})):
+        protocol = {"study": {"languages": languages}, "questionnaires": asked}
+        assert verify_session._without_own_texts(protocol)["questionnaires"] == compared
 
 
 def test_a_condition_that_is_told_is_found_but_not_repeated(study: Path, tmp_path: Path, start: Start) -> None:

@@ -1,0 +1,151 @@
+"""What the commands for sites, exclusions, withdrawals and unblinding print and write: each value is another one's."""
+
+import csv
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from study_app.cli import commands
+from study_app.store.blinded.blinding import read_key
+from study_app.store.files.folders import StudyFolder
+from study_app.store.files.output_files import Output, write_output
+from study_app.store.integrity.checksums import checked_line
+from study_app.store.receipt import read
+from study_app.store.withdrawals import Withdrawn, proof_of_withdrawal, tombstones
+from tests.cli.test_transcripts import make_labs
+from tests.studies import once
+
+pytestmark = pytest.mark.slow
+
+WHO = ("--by", "AK", "--reason")
+
+
+def run(*words: object, code: int = 0) -> tuple[list[str], list[str]]:
+    """Return the lines that a command prints, and those that it writes to the error stream without its progress."""
+    done = CliRunner().invoke(commands, [str(word) for word in words])
+    assert done.exit_code == code, done.output
+    return done.stdout.splitlines(), [line for line in done.stderr.splitlines() if line.startswith("warning")]
+
+
+@pytest.fixture
+def labs(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Three labs with two participants each, as the results of a workspace; B lacks P002."""
+    folder = tmp_path / "results"
+    shutil.copytree(once(tmp_path_factory, "cli-labs", make_labs), folder)
+    monkeypatch.setenv("LIQUID_STUDY_WORKSPACE", str(tmp_path))
+    run("withdraw", folder / "B", "--participant", "P002", *WHO, "moved away")
+    return folder
+
+
+def rows(path: Path) -> list[list[str]]:
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))[1:]
+
+
+def test_sites_are_merged_and_those_that_were_there_are_kept(labs: Path) -> None:
+    pooled = labs / "pooled"
+    keys = {site: read_key(labs / site).hash[:12] for site in "ABC"}
+    protocol = read(StudyFolder(labs / "A").session("P001", 1).receipt)["protocol_hash"][:12]
+    last = f"study demo, protocol {protocol}: {pooled}"
+    a, b = f"site A: 2 sessions, key {keys['A']}", f"site B: 1 session, key {keys['B']}"
+    assert run("merge", f"A={labs / 'A'}", f"B={labs / 'B'}", "--to", pooled)[0] == [
+        f"merged  {a}",
+        f"merged  {b}",
+        last,
+    ]
+    c = f"merged  site C: 2 sessions, key {keys['C']}"
+    assert run("merge", f"C={labs / 'C'}", "--to", pooled)[0] == [f"kept    {a}", f"kept    {b}", c, last]
+    sites = json.loads((pooled / "sites.json").read_bytes())["sites"]
+    assert [(site["name"], site["sessions"], site["withdrawals"]) for site in sites] == [
+        ("A", 2, 0), ("B", 1, 1), ("C", 2, 0),
+    ]  # fmt: skip
+    for wrong in ("C", "C=", "=labs/C"):
+        assert (
+            "does not have the form NAME=RESULTS" in CliRunner().invoke(commands, ["merge", wrong, "--to", "x"]).output
+        )
+
+
+def test_decisions_about_a_session_are_recorded_at_its_site(labs: Path) -> None:
+    pooled, north = labs / "pooled", labs / "pooled" / "sites" / "A"
+    run("merge", f"A={labs / 'A'}", f"C={labs / 'C'}", "--to", pooled)
+    trial = ("--participant", "A-P002", "--trial", 2)
+    assert run("exclude", pooled, *trial, *WHO, "coughed") == (["participant A-P002, session 1, trial 2"], [])
+    rule = ("--rule", "fast_answers")
+    assert run("exclude", pooled, "--participant", "A-P001", *rule, *WHO, "hasty") == (
+        ["participant A-P001, session 1"], [],
+    )  # fmt: skip
+    assert [[*row[:5], row[6]] for row in rows(north / "exclusions.csv")] == [
+        ["P002", "1", "2", "AK", "coughed", "false"],
+        ["P001", "1", "n/a", "fast_answers", "hasty (decided by AK)", "false"],
+    ]
+    assert not (pooled / "sites" / "C" / "exclusions.csv").exists()
+    assert run("include", pooled, *trial, *WHO, "quietly")[0] == [
+        "included again: participant A-P002, session 1, trial 2"
+    ]
+    assert run("include", pooled, "--participant", "C-P001", "--rule", "below_chance", *WHO, "tired")[0] == [
+        "kept, although the rule below_chance applies: participant C-P001, session 1"
+    ]
+    run("include", pooled, *trial, *rule, *WHO, "both", code=2)
+    codes, warnings = run("unblind", pooled, *WHO, "closed")
+    key = read_key(north)
+    for block, conditions in key.codes.items():
+        assert [line for line in codes if line.startswith(f"{block}  A-")] == [
+            f"{block}  A-{code}  {condition}" for code, condition in conditions.items()
+        ]
+    assert warnings == []
+    opened = ["warning: the key is open, so the report will state that this was decided after unblinding"]
+    assert run("exclude", pooled, *trial, *WHO, "later") == (["participant A-P002, session 1, trial 2"], opened)
+    assert run("include", pooled, *trial, *WHO, "again")[1] == opened
+    reveals = [json.loads(line) for line in (north / "blinding" / "reveals.jsonl").read_bytes().splitlines()]
+    assert [(reveal["by"], reveal["reason"]) for reveal in reveals] == [("AK", "closed")]
+
+
+def test_a_withdrawal_names_what_it_erased_and_what_it_left(
+    labs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, person = labs / "A", ("--participant", "P001")
+    write_output(study, tmp_path / "tables", {"a.csv": b"P001"}, None)
+    lines, warnings = run("withdraw", study, *person, *WHO, "asked")
+    tombstone = tombstones(StudyFolder(study))["P001"]
+    assert (tombstone.by, tombstone.reason, tombstone.participant) == ("AK", "asked", "P001")
+    proof = f"keep this line with the fingerprints:  {checked_line(*proof_of_withdrawal(tombstone))}".rstrip()
+    searched = f"searched   {labs}; if there are copies elsewhere, repeat the command with --also DIR"
+    assert [line for line in lines if line] == [
+        f"erased     the data of participant P001 in {study}",
+        f"deleted    {tmp_path / 'tables' / 'a.csv'}, which was produced from the results",
+        proof, searched,
+    ]  # fmt: skip
+    assert warnings == []
+    again, _ = run("withdraw", study, *person, "--by", "BM", "--reason", "twice")
+    nothing = f"nothing to erase: participant P001 already withdrew at {tombstone.at}"
+    assert [line for line in again if line] == [proof, nothing, searched]
+    outputs = tuple(Output(to=tmp_path / name, at=f"at {name}", files=("a.csv",)) for name in ("gone", "tables"))
+    (tmp_path / "tables" / "a.csv").write_bytes(b"P001")
+    done = Withdrawn(tombstone, (study,), (), outputs, ("notes.txt still names P001",))
+    monkeypatch.setattr("study_app.store.withdrawals.withdraw", lambda *_, **__: done)
+    assert run("withdraw", study, *person, *WHO, "asked")[1] == [
+        f"warning: output created at at gone outside the workspace (it no longer exists): {tmp_path / 'gone'}",
+        "warning: output created at at tables outside the workspace (delete it and create it again): "
+        f"{tmp_path / 'tables'}",
+        "warning: notes.txt still names P001",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("asked", ["", "--wide", "--parquet", "--sav", "--psych-ds"])
+def test_each_option_of_an_export_asks_for_its_own_files(
+    labs: Path, monkeypatch: pytest.MonkeyPatch, asked: str
+) -> None:
+    told: dict[str, Any] = {}
+
+    def exported(folder: Path, to: Path, **given: Any) -> tuple[Path, ...]:
+        told.update(given, folder=folder, to=to)
+        return (to / "codebook.json",)
+
+    monkeypatch.setattr("study_app.analysis.export_study.export", exported)
+    lines, _ = run("export", labs / "A", "--to", labs / "out", *filter(None, [asked]))
+    assert (told["folder"], told["to"], told["extras"]) == (labs / "A", labs / "out", [*filter(None, [asked[2:]])])
+    assert "codebook.json" in "".join(lines)
