@@ -39,7 +39,7 @@ from study_app.gui.display import WITHOUT_OPENGL, choose_screens, place_window
 from study_app.gui.operator import OperatorWindow, ServoHealth
 from study_app.gui.participant.window import ParticipantWindow
 from study_app.gui.theme import LIGHT
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.protocol.load import load, load_scene, parse
 from study_app.protocol.orders import Schedule, Trial, build_schedule
 from study_app.protocol.trials import Explore

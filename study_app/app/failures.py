@@ -22,7 +22,7 @@ from PySide6.QtWidgets import QGraphicsItem, QStyledItemDelegate, QWidget
 from study_app.app.timing import disable_collection
 from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import SessionError
-from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
+from study_app.haptics.runtime.grants import allow_suspension, refuse_suspension
 
 log = logging.getLogger(__name__)
 

@@ -160,7 +160,7 @@ class ThreadPriority:
         try:
             os.setpriority(os.PRIO_PROCESS, thread, NICE)
         except PermissionError:
-            from study_app.haptics.runtime.clocks.linux import make_high_priority  # noqa: PLC0415 - the compiler: a session has it
+            from study_app.haptics.runtime.clocks import make_high_priority  # noqa: PLC0415 - a session has the compiler
 
             try:
                 make_high_priority(thread, NICE)

@@ -176,7 +176,7 @@ def bench(name: str, to: Path | None, device_options: dict[str, str | Path]) -> 
     click.echo(_PREPARING)
     from study_app.devices.bench.procedure import ask_simulated_hand, run_bench
     from study_app.devices.registry import open_device
-    from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
+    from study_app.haptics.runtime.clocks import SystemClock, VirtualClock
 
     folder = to if to is not None else Path(f"bench-{descriptor.name}")
     folder.mkdir(parents=True, exist_ok=True)

@@ -3,11 +3,11 @@
 ``descriptor`` says what a device is, ``driver`` opens, guards and closes one, and ``rig`` opens device and servo
 together; read these first. ``descriptors`` lists the devices of the program.
 
-Reading order: base, doctor, guard, hand; bench, descriptor, simulated; descriptors, spacemouse; registry;
+Reading order: base, doctor, faulty, guard, hand; bench, descriptor, simulated; descriptors, spacemouse; registry;
 doctor_worker, driver, rig; falcon, force_dimension, inverse3; emulators.
 
 Public modules: base, bench.procedure, descriptor, descriptors, doctor, doctor_worker, driver, emulators.falcon,
-emulators.falcon_emulator, falcon.calibration, falcon.device, falcon.mechanics, hand, registry, rig, simulated.
+emulators.falcon_emulator, falcon.calibration, falcon.device, falcon.mechanics, faulty, hand, registry, rig, simulated.
 """
 
 from typing import Final

@@ -24,7 +24,7 @@ from study_app.devices.registry import descriptor_of
 from study_app.errors import DeviceError, DeviceLost, ServoFault
 from study_app.haptics.kernels import fence, full_fence, kernel
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.user_folder import settings_file
 

@@ -18,7 +18,7 @@ from typing import IO, Final, Self
 
 from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import DeviceError
-from study_app.haptics.runtime.clocks.grants import allow_suspension, refuse_suspension
+from study_app.haptics.runtime.grants import allow_suspension, refuse_suspension
 
 _WORD: Final = b"done\n"
 READY: Final = b"ready\n"

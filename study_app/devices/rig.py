@@ -18,7 +18,7 @@ from study_app.protocol.model import Protocol
 
 if TYPE_CHECKING:
     from study_app.devices.base import Device
-    from study_app.haptics.runtime.clocks.clock import Clock
+    from study_app.haptics.runtime.clocks import Clock
     from study_app.haptics.runtime.servo import Servo
 
 

@@ -6,10 +6,9 @@ handle to the pointer, and the liquid's force acts on that handle: it lags behin
 continues after the pointer has stopped, as the liquid moves it. In free space it follows smoothly, 20 ms behind (two
 low-passes of 10 ms, which smooth the pointer's steps).
 The scripted device is moved by a simulated hand: along a given motion or in human-like reaches, with tremor and
-encoders.
+encoders. `PlayedHand` has no handle: it replays positions.
 """
 
-from functools import cache
 from random import Random
 from typing import Any
 
@@ -31,8 +30,9 @@ from study_app.haptics.kernels import (
     record_at,
     release_handle,
 )
-from study_app.haptics.model.device_dynamics import Dynamics
+from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.layout import MEASURED_VELOCITY, records
+from study_app.haptics.model.motion import Floats
 
 _SIMULATED = np.dtype(
     [
@@ -71,7 +71,7 @@ class SimulatedDevice(HandOrders, Device):
         self.state.handle = handle
         self.state.handle.stop_m = workspace_m
         self.context = int(self._memory.ctypes.data)
-        self.read, self.write = _functions()
+        self.read, self.write = device_functions(_read, _write)
         self.hold(0.0, 0.0, 0.0)
 
     @property
@@ -112,12 +112,6 @@ class SimulatedDevice(HandOrders, Device):
             "quantum_m": float(handle.quantum_m),
             "dynamics": self.dynamics.describe(),
         }
-
-
-@cache
-def _functions() -> tuple[Any, Any]:
-    """Compile read and write, once for all simulated devices."""
-    return device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:
@@ -216,3 +210,48 @@ class ScriptedDevice(SimulatedDevice):
     ) -> None:
         super().__init__(new_scripted_handle(quantum_m), workspace_m, force_limit_n)
         self._tremble(random, tremor_m)
+
+
+_PLACE = np.dtype([("position_m", np.float64, (3,))], align=True)
+_PLAYED = np.dtype(
+    [
+        ("places", np.intp),  # address of the first
+        ("count", np.int64),
+        ("next", np.int64),
+    ],
+    align=True,
+)
+_place_at = record_at(_PLACE)
+_played_at = record_at(_PLAYED)
+
+
+class PlayedHand:
+    """A device that replays positions (n, 3) [m], one per reading, and ignores forces: its own cost is least."""
+
+    name = "played"
+    force_limit_n = 8.0
+    dynamics = UNKNOWN
+    failure = None
+
+    def __init__(self, places_m: Floats) -> None:
+        self._places_m = np.ascontiguousarray(places_m, np.float64)
+        self._memory = records(_PLAYED, 1)
+        self._memory[0].places = self._places_m.ctypes.data
+        self._memory[0].count = len(self._places_m)
+        self.context = int(self._memory.ctypes.data)
+        self.read, self.write = device_functions(_read_place, _ignore_force)
+
+
+def _read_place(context: int, _now_ns: int, reading: int) -> int:
+    played = _played_at(context)
+    place = _place_at(played.places + 24 * played.next)
+    played.next = played.next + 1 if played.next + 1 < played.count else 0
+    out = reading_at(reading)
+    for axis in range(3):
+        out.position_m[axis] = place.position_m[axis]
+    out.buttons = 0
+    return READ_NEW
+
+
+def _ignore_force(_context: int, _command: int) -> int:
+    return 0

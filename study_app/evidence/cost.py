@@ -3,18 +3,16 @@
 import statistics
 import time
 from collections.abc import Mapping
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
-from study_app.haptics.kernels import compute_tick, kernel, new_safety
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.effects import NAMED
-from study_app.haptics.model.gate import bounds, describe_gate, resolve
-from study_app.haptics.model.layout import SAMPLE, Record, records
+from study_app.haptics.model.gate import describe_gate, effect_verdicts, resolve
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.scene import Effect, Liquid, Scene
-from study_app.haptics.runtime.pack import pack
+from study_app.haptics.runtime.offline import BatchedTicks
 
 _BATCH: Final = 1_000
 _BATCHES: Final = 200
@@ -68,9 +66,9 @@ class TickTimer:
     """One measured scene: its memory, and the time of every batch so far."""
 
     def __init__(self, scene: Scene, dynamics: Dynamics = UNKNOWN) -> None:
-        self._model, self._sample = pack(scene, dynamics=dynamics), records(SAMPLE, 1)
-        self._safety = new_safety(delay_ticks=dynamics.delay_ticks(scene.rate_hz))
-        self._positions_m = hand_motion()
+        hand_m = hand_motion()
+        self._scene_ticks = BatchedTicks(scene, 1_000_000 * np.arange(len(hand_m)), hand_m, dynamics=dynamics)
+        self._scene_ticks.results = self._scene_ticks.results[:0]  # storing them takes time
         self._ticks = 0
         self.costs_ns: list[float] = []
         self.run(_WARM_UP)
@@ -81,30 +79,18 @@ class TickTimer:
         self.costs_ns.append((time.perf_counter_ns() - began) / _BATCH)
 
     def run(self, ticks: int) -> None:
-        _run_ticks(self._model, self._safety[0], self._sample[0], self._positions_m, self._ticks, ticks)
+        self._scene_ticks.run(self._ticks, self._ticks + ticks)
         self._ticks += ticks
-
-
-@kernel
-def _run_ticks(model: Any, safety: Record, sample: Record, positions_m: Any, start: int, ticks: int) -> None:
-    """Process ``ticks`` samples, one per millisecond."""
-    row = start % len(positions_m)
-    for k in range(start, start + ticks):
-        sample.time_ns = k * 1_000_000
-        sample.fresh = 1
-        for axis in range(3):
-            sample.position_m[axis] = positions_m[row, axis]
-        row = row + 1 if row + 1 < len(positions_m) else 0  # a division would take a third of a tick
-        compute_tick(model, safety, sample)
 
 
 def _pairs(scene: Scene) -> dict[tuple[str, Effect], tuple[Scene, Scene]]:
     """Return, for each effect, a scene with it and one without it."""
     pairs: dict[tuple[str, Effect], tuple[Scene, Scene]] = {}
-    for liquid in scene.liquids:
-        for effect in bounds(scene, liquid):
-            others: tuple[Effect, ...] = NAMED[effect].through[:1]
-            pairs[liquid.id, effect] = _with(scene, liquid, (*others, effect)), _with(scene, liquid, others)
+    liquids = {liquid.id: liquid for liquid in scene.liquids}
+    for verdict in effect_verdicts(scene):
+        effect, liquid = verdict.effect, liquids[verdict.liquid]
+        others: tuple[Effect, ...] = NAMED[effect].through[:1]
+        pairs[liquid.id, effect] = _with(scene, liquid, (*others, effect)), _with(scene, liquid, others)
     return pairs
 
 

@@ -18,9 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from study_app import figure_style as style
-from study_app.haptics.model import motion as paths
 from study_app.haptics.model.effects import Wake
-from study_app.haptics.model.motion import Motion
+from study_app.haptics.model.motion import Motion, programmed_motion
 from study_app.haptics.model.scene import Given, Liquid, Scene
 from study_app.haptics.runtime.offline import Table, simulate
 from study_app.store.files import make_folder, write_files
@@ -73,7 +72,7 @@ def _scene(liquid: Liquid) -> Scene:
 
 def figure_3() -> ThesisFigure:
     """Return Fig. 3: three circles with drag alone."""
-    motion = paths.circle(_RATE_HZ)
+    motion = programmed_motion("circle", rate_hz=_RATE_HZ)
     return ThesisFigure(
         3,
         "Three circles, drag alone",
@@ -86,7 +85,7 @@ def figure_3() -> ThesisFigure:
 
 def figure_4() -> ThesisFigure:
     """Return Fig. 4: three circles with the wake."""
-    motion = paths.circle(_RATE_HZ)
+    motion = programmed_motion("circle", rate_hz=_RATE_HZ)
     return ThesisFigure(
         4,
         "Three circles, drag and wake",
@@ -101,8 +100,8 @@ def figure_4() -> ThesisFigure:
 
 def figure_5() -> ThesisFigure:
     """Return Fig. 5: three circles, then motion against the flow."""
-    motion = paths.reverse(_RATE_HZ)
-    turn_s = _stop_s(paths.circle(_RATE_HZ))
+    motion = programmed_motion("reverse", rate_hz=_RATE_HZ)
+    turn_s = _stop_s(programmed_motion("circle", rate_hz=_RATE_HZ))
     return ThesisFigure(
         5,
         "Three circles, then 2 s against the flow",
@@ -115,7 +114,7 @@ def figure_5() -> ThesisFigure:
 
 def _figure_6() -> ThesisFigure:
     """Return Fig. 6: steps with 90° turns, for two breaking angles."""
-    motion = paths.zigzag(_RATE_HZ)
+    motion = programmed_motion("zigzag", rate_hz=_RATE_HZ)
     return ThesisFigure(
         6,
         "Steps alternating by 90°",
@@ -129,7 +128,7 @@ def _figure_6() -> ThesisFigure:
 
 def _figure_7() -> ThesisFigure:
     """Return Fig. 7: a straight line at three resolutions of the tail."""
-    motion = paths.line(_RATE_HZ, moving_s=12.0)
+    motion = programmed_motion("line", rate_hz=_RATE_HZ, moving_s=12.0)
     labels = ("every tick", "1.5 mm", "3.5 mm")
     return ThesisFigure(
         7,
@@ -142,7 +141,7 @@ def _figure_7() -> ThesisFigure:
 
 def figure_8() -> ThesisFigure:
     """Return Fig. 8: a straight line with five wake responses."""
-    motion = paths.line(_RATE_HZ, moving_s=8.0)
+    motion = programmed_motion("line", rate_hz=_RATE_HZ, moving_s=8.0)
     return ThesisFigure(
         8,
         "A straight line with five wake responses",

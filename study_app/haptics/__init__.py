@@ -5,6 +5,5 @@ the loop; read these first. The package imports nothing, so that reading a scene
 
 Public modules: kernels, model.device_dynamics, model.effects, model.estimators, model.force_rules, model.gate,
 model.laws, model.layout, model.motion, model.overrides, model.ranges, model.scene, model.slope_limits,
-runtime.clocks.clock, runtime.clocks.grants, runtime.clocks.linux, runtime.offline, runtime.pack, runtime.servo,
-runtime.telemetry.
+runtime.clocks, runtime.closed_loop, runtime.grants, runtime.offline, runtime.pack, runtime.servo, runtime.telemetry.
 """

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study_app.devices.registry import descriptor_of
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS, UNKNOWN, Dynamics
 from study_app.haptics.model.slope_limits import refusal_reason
-from study_app.haptics.runtime.clocks.grants import NO_THREAD, Grant
+from study_app.haptics.runtime.grants import NO_THREAD, Grant
 from study_app.number_text import counted
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.checks import blocks_by_stimulus, slope_limit_fault

@@ -10,7 +10,7 @@ import numpy as np
 from study_app.errors import StoreError
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.grants import Grant
 from study_app.haptics.runtime.offline import law_along
 from study_app.haptics.runtime.telemetry import timing
 from study_app.session.ports import ServoPort

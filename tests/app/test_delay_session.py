@@ -9,7 +9,7 @@ from shiboken6 import isValid
 from study_app.app import delay_session as held
 from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import parse
 from study_app.session.trial import SETTLED_S

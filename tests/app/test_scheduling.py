@@ -20,7 +20,7 @@ from study_app.app.timing import (
     freeze_garbage,
     unfreeze_garbage,
 )
-from study_app.haptics.runtime.clocks import linux
+from study_app.haptics.runtime import clocks
 
 MS = 1_000_000
 
@@ -184,7 +184,7 @@ def test_the_windows_thread_goes_before_other_programs_where_that_is_granted(
     else:
         monkeypatch.setattr(os, "setpriority", refuse)
         grant = refuse if granted_by == "nobody" else lambda *given: asked.append(given)
-        monkeypatch.setattr(linux, "make_high_priority", grant)
+        monkeypatch.setattr(clocks, "make_high_priority", grant)
         assert made.raise_priority() == (granted_by != "nobody")
         assert asked == ([] if granted_by == "nobody" else [(threading.get_native_id(), timing.NICE)])
         monkeypatch.undo()

@@ -26,7 +26,7 @@ pytestmark = [needs_servo, pytest.mark.slow]
 
 def bench(device, ask=None, durations=QUICK):
     from study_app.devices.bench.procedure import ask_simulated_hand, run_bench
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.clocks import VirtualClock
 
     said = []
     hand = ask_simulated_hand(device, said.append)
@@ -175,7 +175,7 @@ def test_what_happens_to_the_device_ends_the_bench_without_force(at, happens, er
 def excited(device, limit_n, alive_ns=10**12, **excitation):
     """Return a servo that drives a device for a bench."""
     from study_app.devices.bench.excitation import BenchDriver, Excitation
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.clocks import VirtualClock
     from study_app.haptics.runtime.servo import Servo
 
     driver = BenchDriver(device, limit_n)

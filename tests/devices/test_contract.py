@@ -56,7 +56,7 @@ def subject(made: Callable[..., Subject], request: pytest.FixtureRequest) -> Ite
 
 
 def virtual_servo(device: Any) -> Any:
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.clocks import VirtualClock
     from study_app.haptics.runtime.servo import Servo
 
     return Servo(device, clock=VirtualClock())

@@ -10,7 +10,7 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.simulated import MouseDevice
 from study_app.haptics.model.effects.wake import Wake
 from study_app.haptics.model.scene import Liquid, Scene
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 
 THESIS = {

@@ -114,7 +114,7 @@ def test_mean_forces_are_those_of_the_path_trial_by_trial(rehearsed: Rehearsed) 
 
 def felt(device: Any, scene: Any, lasting_s: float, given_n: list[Any] | None = None) -> Any:
     """Return all samples of a device whose hand explores a scene; ``given_n`` gets what its motors give each tick."""
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.clocks import VirtualClock
     from study_app.haptics.runtime.servo import Servo
 
     servo = Servo(device, clock=VirtualClock())

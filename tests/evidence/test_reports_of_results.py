@@ -41,6 +41,7 @@ def candidate(rng: np.random.Generator) -> Any:
     return namedtuple("Candidate", "name label family rate_hz counted")(name, name[:4], family, rate, bool(rate < 500))
 
 
+COUNTS = sys.modules[soak.Audit.__module__]._COUNTS
 FAULTS = sys.modules[soak.FaultyDevice.__module__].FAULTS
 
 
@@ -49,7 +50,7 @@ def soaked(to: Path) -> tuple[Path, ...]:
     paths: list[Path] = []
     for name, share in (("clean", 0), ("some", 1), ("failed", 9)):
         rng = np.random.default_rng(share)
-        counts, device = (np.zeros(1, kind).view(np.recarray)[0] for kind in (soak.sample_audit._COUNTS, FAULTS))
+        counts, device = (np.zeros(1, kind).view(np.recarray)[0] for kind in (COUNTS, FAULTS))
         for record in (counts, device):
             for field in record.dtype.names if share else ():
                 record[field] = rng.integers(0, share + 1, record.dtype[field].shape)

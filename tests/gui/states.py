@@ -22,7 +22,7 @@ from study_app.gui.preflight.window import computer_checks
 from study_app.gui.startup_window import OpeningWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.grants import Grant
 from study_app.protocol.load import load
 from study_app.store.workstation import DEFAULTS, DisplayOffset, MachineSettings
 from study_app.workers.server import Refused

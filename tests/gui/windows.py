@@ -29,7 +29,7 @@ from study_app.gui.startup_window import OpeningWindow
 from study_app.gui.theme.theme import DARK, LIGHT
 from study_app.gui.theme.themed import apply_theme
 from study_app.gui.widgets.main_view import Place
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.load import load
 from study_app.session.preflight import Measurements, Screen, preflight_checks

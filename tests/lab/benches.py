@@ -4,7 +4,7 @@ from random import Random
 
 from study_app.devices.rig import Rig
 from study_app.devices.simulated import ScriptedDevice
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.lab.ab_comparison import Setting, Workbench
 from study_app.lab.live import Live

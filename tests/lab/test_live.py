@@ -11,7 +11,7 @@ from study_app.devices.rig import Rig
 from study_app.devices.simulated import MouseDevice
 from study_app.errors import ServoFault, StudyError
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_FADE
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.lab.live import Live, open_live
 from study_app.lab.programmed_paths import REACHED, TITLES, lead_to_path, programmed_path

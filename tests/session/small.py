@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from study_app.haptics.model.layout import SAMPLE
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.grants import Grant
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream

@@ -11,8 +11,8 @@ import pytest
 from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StoreError
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
-from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.clocks import VirtualClock
+from study_app.haptics.runtime.grants import Grant
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import Telemetry, Timing
 from study_app.outlets.session_outlets import OutletStatus

@@ -11,7 +11,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
-from functools import cache
 from types import TracebackType
 from typing import Any, Final, Self
 
@@ -39,7 +38,7 @@ from study_app.haptics.kernels import (
     square_distance,
 )
 from study_app.haptics.model.layout import BUTTON_STOP, records
-from study_app.haptics.runtime.clocks.clock import Clock, SystemClock
+from study_app.haptics.runtime.clocks import Clock, SystemClock
 from study_app.haptics.runtime.servo import Servo
 
 RUNNING, OSCILLATES, MOVED, SILENT_DEVICE, SILENT_HOST, STOP_BUTTON = range(6)
@@ -147,7 +146,7 @@ class BenchDriver:
         self.state.context, self.state.read, self.state.write = inner.context, inner.read.address, inner.write.address
         self.state.limit_n = limit_n
         self.context = int(self._memory.ctypes.data)
-        self.read, self.write = _functions()
+        self.read, self.write = device_functions(_read, _write)
 
     @property
     def failure(self) -> str | None:
@@ -172,11 +171,6 @@ class BenchDriver:
         """Send zero force from now on, until the next excitation."""
         self.state.armed = 0
         self.state.ended = RUNNING
-
-
-@cache
-def _functions() -> tuple[Any, Any]:
-    return device_functions(_read, _write)
 
 
 def _read(context: int, now_ns: int, reading: int) -> int:

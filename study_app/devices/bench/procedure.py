@@ -25,7 +25,7 @@ from study_app.devices.bench.measurements import (
     regularity,
 )
 from study_app.errors import DeviceError
-from study_app.haptics.runtime.clocks.clock import Clock
+from study_app.haptics.runtime.clocks import Clock
 
 Ask = Callable[[str, str], Callable[[], str | None]]
 """(the request: "let-go", "scale", "grams", "damping"; its text) -> a function that returns None until the operator has

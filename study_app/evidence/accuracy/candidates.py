@@ -13,16 +13,16 @@ import numpy as np
 
 from study_app.evidence.reference_model import unsteady_n
 from study_app.evidence.reference_solutions import COUNT_M, Truth, with_effects
-from study_app.haptics.kernels import REST_MPS, compute_tick, kernel, new_safety, norm, resistance, response, subtract
+from study_app.haptics.kernels import REST_MPS, kernel, norm, resistance, response
 from study_app.haptics.model.effects import REFERENCE
-from study_app.haptics.model.estimators import GIVEN
 from study_app.haptics.model.gate import resolve
 from study_app.haptics.model.laws import Law
-from study_app.haptics.model.layout import SAMPLE, Record, records
+from study_app.haptics.model.layout import records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Effect, Everywhere, Ewma, Given, Raw, Scene
 from study_app.haptics.model.slope_limits import DampingLimits
-from study_app.haptics.runtime.pack import Model, pack
+from study_app.haptics.runtime.offline import BatchedTicks
+from study_app.haptics.runtime.pack import pack
 
 _TAIL: Final = np.dtype(
     [
@@ -47,7 +47,7 @@ def _new_list(length: int, dtype: type[np.floating[Any]]) -> tuple[Any, Any, Any
 
 
 @kernel
-def list_wake(wake: Record, tail: Record, element: Any, segment: Any) -> None:
+def list_wake(wake: Any, tail: Any, element: Any, segment: Any) -> None:
     """Set ``tail.wake_mps`` to the sum over all elements, newest first, in the precision of the elements."""
     zero = element[0, 0] - element[0, 0]
     tx = ty = tz = dx = dy = dz = summed = speeds = squares = zero
@@ -74,7 +74,7 @@ def list_wake(wake: Record, tail: Record, element: Any, segment: Any) -> None:
 
 @kernel
 def list_follow(
-    wake: Record, tail: Record, element: Any, arc: Any, segment: Any, h: Any, place_m: Any, interval_s: float
+    wake: Any, tail: Any, element: Any, arc: Any, segment: Any, h: Any, place_m: Any, interval_s: float
 ) -> None:
     """Let every element decay, and store the velocity of this tick if the rules require it."""
     keep = math.exp(wake.log_decay_per_s * interval_s)
@@ -136,6 +136,8 @@ class Candidate:
     force_n: Floats = None  # type: ignore[assignment]  # (ticks, 3), filled as ticks are taken
 
     BATCH: ClassVar[int] = 1000
+    HAS_LIQUIDS: ClassVar[bool] = True
+    """Whether the servo's tick computes the force; otherwise, it runs without liquids."""
 
     def begin(self, motion: Motion) -> None:
         """Reset the state and prepare for a motion with known velocities."""
@@ -143,17 +145,15 @@ class Candidate:
         places_m = motion.position_m[rows]
         velocity_mps = np.zeros_like(places_m) if motion.velocity_mps is None else motion.velocity_mps[rows]
         hand_m = (places_m - np.array(self.scene.origin_m)) / self.scene.scale
-        self._motion = (
-            np.rint(motion.t_s[rows] * 1e9).astype(np.int64),
-            np.rint(hand_m / COUNT_M) * COUNT_M if self.counted else hand_m,
-            np.ascontiguousarray(velocity_mps),
-        )
+        self.velocity_mps = np.ascontiguousarray(velocity_mps)
+        self._t_ns = np.rint(motion.t_s[rows] * 1e9).astype(np.int64)
+        seen_m = np.rint(hand_m / COUNT_M) * COUNT_M if self.counted else hand_m
         self.force_n = np.zeros_like(places_m)
-        self._model, self._safety, self._sample = _packed(self._run_scene), new_safety(), records(SAMPLE, 1)
+        self._run = BatchedTicks(self._run_scene, self._t_ns, seen_m, self.velocity_mps, limits=_UNLIMITED)
 
     @property
     def _run_scene(self) -> Scene:
-        return self.scene
+        return self.scene if self.HAS_LIQUIDS else self.scene.model_copy(update={"liquids": ()})
 
     @property
     def ticks(self) -> int:
@@ -165,11 +165,12 @@ class Candidate:
 
     @property
     def memory_bytes(self) -> int:
-        return sum(rows.nbytes for rows in _packed(self._run_scene).arrays)
+        return sum(rows.nbytes for rows in pack(self._run_scene, limits=_UNLIMITED).arrays)
 
     def take(self, start: int, stop: int) -> None:
         """Run the ticks from ``start`` to ``stop`` and write their rows of ``force_n``."""
-        _by_the_tick(self._model, self._safety[0], self._sample[0], self._motion, self.force_n, start, stop)
+        self._run.run(start, stop)
+        self.force_n[start:stop] = self._run.results.force_n[start:stop]
 
     def forces(self, motion: Motion) -> Floats:
         """Return the force at every row of the motion, (n, 3) [N]."""
@@ -191,7 +192,7 @@ class _UnsteadyDrag(Candidate):
         forces = []
         for case in truth.cases:
             self.begin(case.motion)
-            w, interval_s = self._motion[2], np.full(self.ticks, 1 / self.rate_hz)
+            w, interval_s = self.velocity_mps, np.full(self.ticks, 1 / self.rate_hz)
             dw = np.diff(w, axis=0, prepend=w[:1]) * self.rate_hz
             forces.append(unsteady_n(self.scene, w, dw, interval_s, truth.left_out))
         return forces
@@ -203,47 +204,37 @@ class _LinearViscosity(Candidate):
     This is ``HapticViscosity`` of HAPI and H3D; CHAI3D's ``cEffectViscosity`` leaves the factor to the user.
     """
 
-    @property
-    def _run_scene(self) -> Scene:
-        return self.scene.model_copy(update={"liquids": ()})
+    HAS_LIQUIDS: ClassVar[bool] = False
 
     def take(self, start: int, stop: int) -> None:
         damping_nspm = 3 * math.pi * (self.scene.liquids[0].viscosity_pa_s or math.nan) * self.scene.body.diameter_m
-        _by_damping(
-            self._model, self._safety[0], self._sample[0], self._motion, damping_nspm, self.force_n, start, stop
-        )
+        self._run.run(start, stop)
+        self.force_n[start:stop] = -damping_nspm * self._run.results.velocity_mps[start:stop]
 
 
 @dataclass(eq=False)
 class _WakeList(Candidate):
     """The wake stored as a list of elements in float64 or float32."""
 
+    HAS_LIQUIDS: ClassVar[bool] = False
     precision: type[np.floating[Any]] = np.float64
 
     def begin(self, motion: Motion) -> None:
         super().begin(motion)
-        self._liquid = _packed(self.scene).liquids[0]
+        self._liquid = pack(self.scene, limits=_UNLIMITED).liquids[0]
         self._list = self._new_list()
 
-    @property
-    def _run_scene(self) -> Scene:
-        return self.scene.model_copy(update={"liquids": ()})
-
     def _new_list(self) -> tuple[Any, Any, Any, Any]:
-        return _new_list(int(_packed(self.scene).liquids[0].wake.length), self.precision)
+        return _new_list(int(pack(self.scene, limits=_UNLIMITED).liquids[0].wake.length), self.precision)
 
     @property
     def memory_bytes(self) -> int:
         return sum(rows.nbytes for rows in self._new_list())
 
     def take(self, start: int, stop: int) -> None:
-        tail, element, arc, segment = self._list
-        tick = (self._model, self._safety[0], self._sample[0], self._motion)
-        _by_the_list(tick, self._liquid, (tail[0], element, arc, segment), self.force_n, start, stop)
-
-
-def _packed(scene: Scene) -> Model:
-    return pack(scene, limits=_UNLIMITED)
+        self._run.run(start, stop)
+        period_s = 1 / self.scene.rate_hz
+        _by_the_list(self._liquid, self._list, self._t_ns, period_s, self._run.results, self.force_n, start, stop)
 
 
 def with_given_velocity(scene: Scene) -> Scene:
@@ -252,51 +243,22 @@ def with_given_velocity(scene: Scene) -> Scene:
 
 
 @kernel
-def _tick(model: Any, safety: Record, sample: Record, motion: Any, k: int) -> None:
-    t_ns, hand_m, velocity_mps = motion
-    state = model.state[0]
-    sample.time_ns = t_ns[k]
-    sample.fresh = 1
-    for axis in range(3):
-        sample.position_m[axis] = hand_m[k, axis]
-    if model.parameters[0].estimator == GIVEN:
-        for axis in range(3):
-            state.estimate_mps[axis] = velocity_mps[k, axis]
-    compute_tick(model, safety, sample)
-
-
-@kernel
-def _by_the_tick(model: Any, safety: Record, sample: Record, motion: Any, force_n: Any, start: int, stop: int) -> None:
-    for k in range(start, stop):
-        _tick(model, safety, sample, motion, k)
-        for axis in range(3):
-            force_n[k, axis] = sample.force_n[axis]
-
-
-@kernel
-def _by_damping(
-    model: Any, safety: Record, sample: Record, motion: Any, damping: float, force_n: Any, start: int, stop: int
+def _by_the_list(
+    liquid: Any, listed: Any, t_ns: Any, period_s: float, results: Any, force_n: Any, start: int, stop: int
 ) -> None:
+    tails, element, arc, segment = listed
+    tail = tails[0]
+    w = tail.relative_mps
     for k in range(start, stop):
-        _tick(model, safety, sample, motion, k)
-        for axis in range(3):
-            force_n[k, axis] = -damping * sample.velocity_mps[axis]
-
-
-@kernel
-def _by_the_list(tick: Any, liquid: Record, listed: Any, force_n: Any, start: int, stop: int) -> None:
-    model, safety, sample, motion = tick
-    tail, element, arc, segment = listed
-    v, w = sample.velocity_mps, tail.relative_mps
-    for k in range(start, stop):
-        _tick(model, safety, sample, motion, k)
+        v = results[k].velocity_mps
         list_wake(liquid.wake, tail, element, segment)
-        subtract(v, tail.wake_mps, w)
+        for axis in range(3):
+            w[axis] = v[axis] - tail.wake_mps[axis]
         resistance_nspm = resistance(liquid.drag, norm(w))
         for axis in range(3):
             force_n[k, axis] = -resistance_nspm * w[axis]
-        interval_s = (motion[0][k] - motion[0][k - 1]) * 1e-9 if k > 0 else model.parameters[0].period_s
-        list_follow(liquid.wake, tail, element, arc, segment, v, model.state[0].position_m, interval_s)
+        interval_s = (t_ns[k] - t_ns[k - 1]) * 1e-9 if k > 0 else period_s
+        list_follow(liquid.wake, tail, element, arc, segment, v, results[k].position_m, interval_s)
 
 
 SLOWER = (2, 4, 10)

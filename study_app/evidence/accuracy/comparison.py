@@ -29,7 +29,7 @@ from study_app.evidence.reference_solutions import (
 )
 from study_app.evidence.stability import delivered_force
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.estimators import ESTIMATORS as KINDS
+from study_app.haptics.model.estimators import NAMED as ESTIMATORS
 from study_app.haptics.model.motion import Motion
 from study_app.haptics.model.scene import Scene
 
@@ -204,7 +204,7 @@ def _in_plain_c(scene: Scene, batches: int) -> str:
 
 def _acting_errors(scene: Scene, batches: int) -> tuple[ActingError, ...]:
     """Measure every estimator at each delay; ticks of all are timed in alternating batches."""
-    loops = list(itertools.product([kind for kind in KINDS if kind.of_device], delivered_force.DELAYS))
+    loops = list(itertools.product([kind for kind in ESTIMATORS.values() if kind.of_device], delivered_force.DELAYS))
     scenes = [without_buoyancy(scene.model_copy(update={"velocity": kind.model()})) for kind, _ in loops]
     timers = [
         TickTimer(it, Dynamics(delay_s=delay / it.rate_hz, count_m=COUNT_M))

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from study_app.haptics.runtime.clocks.clock import SystemClock
+from study_app.haptics.runtime.clocks import SystemClock
 from study_app.outlets.streams import MARKERS, SAMPLES, ClockMapping, library
 
 _FOUND_WITHIN_S: Final = 30.0

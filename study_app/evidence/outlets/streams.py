@@ -16,9 +16,11 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.devices.simulated import PlayedHand
 from study_app.errors import WorkerError
+from study_app.evidence.cost import hand_motion
 from study_app.evidence.table import TURN_S, Evidence, paced_steps, take_turns
-from study_app.evidence.timing.measurement import FULL, PERIOD_NS, PlayedHand, ServoLoop, granted
+from study_app.evidence.timing.measurement import FULL, PERIOD_NS, ServoLoop, granted
 from study_app.haptics.runtime.servo import Servo
 from study_app.outlets.markers import Marker, SinkThread, marker_of
 from study_app.outlets.session_outlets import open_sink
@@ -120,7 +122,7 @@ def measure_streams(
     seconds: float, *, ending: threading.Event, progress: Callable[[str], object] = lambda _line: None
 ) -> Streamed:
     """Stream a servo at 1 kHz and twenty markers per second to a listener in another process."""
-    servo = Servo(PlayedHand())
+    servo = Servo(PlayedHand(hand_motion()))
     servo.prepare()
     sink = SinkThread(open_sink("lsl", servo.now_ns))
     samples = _MeasuredStream(servo.telemetry, servo.rate_hz, servo.now_ns)

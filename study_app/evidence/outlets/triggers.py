@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from study_app.errors import OutletError, StudyError
 from study_app.evidence.outlets.streams import Listener
 from study_app.evidence.table import Evidence, paced_steps
-from study_app.haptics.runtime.clocks.clock import SystemClock
+from study_app.haptics.runtime.clocks import SystemClock
 from study_app.outlets.markers import CODES, HIGH_S, SinkThread, TriggerSink, marker_of
 from study_app.outlets.session_outlets import open_sink
 

@@ -11,10 +11,10 @@ from typing import Any, Final
 import numpy as np
 
 from study_app.evidence.reference_model import new_wake_list, store_element, sum_elements
-from study_app.haptics.kernels import copy, kernel, square, square_distance
+from study_app.haptics.kernels import copy, distance, kernel, norm
 from study_app.haptics.model.effects import Wake
 from study_app.haptics.model.force_rules import CURRENT
-from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
+from study_app.haptics.model.layout import records
 from study_app.haptics.model.scene import Everywhere, Liquid, Scene
 
 _REFUSALS_IN_A_ROW: Final = 5
@@ -65,7 +65,7 @@ class _Ledger:
         ledger.gap_ns = CURRENT.gap_ticks * ledger.period_ns
 
     def take(self, samples: Any) -> float | None:
-        """Record ``samples`` (recarray of ``SAMPLE``, all of this scene, none missing), and compare at the last one.
+        """Record ``samples`` (`Samples`, all of this scene, none missing), and compare at the last one.
 
         Returns
         -------
@@ -73,15 +73,17 @@ class _Ledger:
             if there is nothing to compare
         """
         records_here = self._ledger[0], self._wake[0], self._elements
-        last = _last_accepted(samples)
-        if last < 0:
-            record_samples(*records_here, samples, 0, len(samples))
+        rejected = samples.limited_by("glitch")
+        accepted = np.flatnonzero((samples.fresh != 0) & ~rejected)
+        if accepted.size == 0:
+            record_samples(*records_here, samples, rejected, 0, len(samples))
             return None
-        record_samples(*records_here, samples, 0, last)
+        last = int(accepted[-1])
+        record_samples(*records_here, samples, rejected, 0, last)
         defined, size_mps = np.zeros(3), 0.0
         if self._ledger[0].tracking and not _begins_anew(self._ledger[0], samples[last]):
             size_mps = sum_elements(self._wake[0], self._elements, defined)
-        record_samples(*records_here, samples, last, len(samples))
+        record_samples(*records_here, samples, rejected, last, len(samples))
         error_mps = float(np.linalg.norm(samples.wake_mps[last] - defined))
         if size_mps == 0.0:
             return None if error_mps == 0.0 else math.inf
@@ -94,28 +96,20 @@ class _Ledger:
 
 
 @kernel
-def _last_accepted(samples: Any) -> int:
-    for i in range(samples.shape[0] - 1, -1, -1):
-        if samples[i].fresh == 1 and samples[i].limiters & LIMITER_GLITCH == 0:
-            return i
-    return -1
-
-
-@kernel
 def _begins_anew(ledger: Any, sample: Any) -> bool:
     """Return whether the body was reset in a gap: it has moved, and yet its velocity is exactly 0."""
-    moved = square_distance(sample.position_m, ledger.accepted_m) > 0.0
-    return bool(sample.time_ns - ledger.accepted_ns > ledger.gap_ns and moved and square(sample.velocity_mps) == 0.0)
+    moved = distance(sample.position_m, ledger.accepted_m) > 0.0
+    return bool(sample.time_ns - ledger.accepted_ns > ledger.gap_ns and moved and norm(sample.velocity_mps) == 0.0)
 
 
 @kernel
-def record_samples(ledger: Any, wake: Any, elements: Any, samples: Any, first: int, end: int) -> None:
-    """Record samples ``first`` to ``end`` in the list according to the definition."""
+def record_samples(ledger: Any, wake: Any, elements: Any, samples: Any, rejected: Any, first: int, end: int) -> None:
+    """Record samples ``first`` to ``end`` in the list according to the definition, but ``rejected`` (n,) ones."""
     for i in range(first, end):
         sample = samples[i]
         if sample.fresh == 0:
             continue
-        if sample.limiters & LIMITER_GLITCH:
+        if rejected[i]:
             ledger.rejected += 1
             if ledger.rejected == _REFUSALS_IN_A_ROW:
                 ledger.tracking = 0
@@ -137,12 +131,11 @@ def record_samples(ledger: Any, wake: Any, elements: Any, samples: Any, first: i
         store_element(wake, elements, ledger.h_mps, ledger.position_m, interval_ns)
 
 
-def prepare() -> None:
-    """Compile the recording functions, or load them from the cache."""
+def prepare(samples: Any) -> None:
+    """Compile the recording functions for ``samples``, or load them from the cache."""
     wake, elements = new_wake_list(Wake(length=1, scaling=1), 1000.0)
-    _last_accepted(records(SAMPLE, 0))
     sum_elements(wake[0], elements, np.zeros(3))
-    record_samples(records(_LEDGER, 1)[0], wake[0], elements, records(SAMPLE, 0), 0, 0)
+    record_samples(records(_LEDGER, 1)[0], wake[0], elements, samples, samples.fresh != 0, 0, 0)
 
 
 @dataclass(slots=True, kw_only=True)
@@ -166,7 +159,7 @@ class Drift:
             self._scenes[serial] = scene
 
     def take(self, samples: Any) -> None:
-        """Follow the next ``samples`` (recarray of ``SAMPLE``).
+        """Follow the next ``samples`` (`Samples`).
 
         A scene with missing samples is not followed further.
         """

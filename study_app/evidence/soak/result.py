@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Final, NamedTuple
 
-from study_app.evidence.soak.faulty_device import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
+from study_app.devices.faulty import BUTTON, GLITCH, JUMP, KINDS, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE
 from study_app.evidence.soak.ledger import Drift
 from study_app.evidence.soak.sample_audit import TOLERANCE_N
 from study_app.evidence.table import Evidence

@@ -5,25 +5,12 @@ the slew limit, unless a force stop, a fault or the passivity controller let go 
 a deadline every period, but for those passed over; every tick in telemetry, or counted as dropped.
 """
 
-import math
 from typing import Any, Final
 
 import numpy as np
 
-from study_app.evidence.soak.faulty_device import GLITCH_M
-from study_app.haptics.kernels import DELIVERY_STEPS_PER_N, FAULT_NS, kernel
-from study_app.haptics.model.layout import (
-    BUTTON_STOP,
-    LIMITER_ENERGY,
-    LIMITER_GLITCH,
-    LIMITER_NAMES,
-    LIMITER_STOP,
-    SAMPLE,
-    STATUS_DEVICE_LOST,
-    STATUS_OK,
-    STATUS_STALE_FAULT,
-    records,
-)
+from study_app.devices.faulty import GLITCH_M
+from study_app.haptics.model.layout import LIMITER_NAMES, records
 
 TOLERANCE_N: Final = 1e-9
 
@@ -32,11 +19,6 @@ _COUNTS = np.dtype(
         ("limit_n", np.float64),  # of the force
         ("slew_n", np.float64),  # limit of its change per tick
         ("period_ns", np.int64),
-        # where it is
-        ("follows", np.int64),  # 1: the next sample comes a period after the last one, of the same run
-        ("next_tick", np.int64),
-        ("next_deadline_ns", np.int64),
-        ("last_n", np.float64, (3,)),
         # counted
         ("samples", np.int64),
         ("missing", np.int64),  # ticks without a sample
@@ -82,124 +64,91 @@ class Audit:
         self.counts.limit_n, self.counts.slew_n = limit_n, slew_n
         self.counts.period_ns, self.counts.first_tick = period_ns, -1
         self._displaced_m = (reach_m + GLITCH_M) / 2
+        self._was_ok = False
+        self._next_tick = self._next_deadline_ns = 0
+        self._last_n = np.zeros(3)
 
     def take(self, samples: Any) -> None:
-        """Check the next ``samples`` (recarray of ``SAMPLE``)."""
-        check_samples(self.counts, samples, self._displaced_m)
+        """Check the next ``samples`` (`Samples`), each against the one before it."""
+        if len(samples) == 0:
+            return
+        counts = self.counts
+        missing = samples.tick - _after(self._next_tick, samples.tick + 1)
+        follows = (missing == 0) & _after(self._was_ok, samples.is_ok)
+        counts.samples += len(samples)
+        counts.missing += missing.sum()
+        counts.limiters += [np.count_nonzero(samples.limited_by(name)) for name in LIMITER_NAMES]
+        broken = (
+            self._check_readings(samples) | self._check_forces(samples, follows) | self._check_times(samples, follows)
+        )
+        if counts.first_tick < 0 and broken.any():
+            counts.first_tick = samples.tick[np.argmax(broken)]
+        self._was_ok, self._next_tick = bool(samples.is_ok[-1]), int(samples.tick[-1]) + 1
+
+    def _check_readings(self, samples: Any) -> Any:
+        """Count readings; return the samples (n,) with an invalid position that was accepted."""
+        new, lost, rejected = samples.fresh != 0, samples.is_lost, samples.limited_by("glitch")
+        is_place = np.isfinite(samples.position_m).all(axis=1)
+        farthest_m = np.abs(samples.position_m).max(axis=1)
+        accepted = new & ~is_place & ~rejected
+        for name, happened in (
+            ("stale", samples.is_stale),
+            ("lost", ~new & lost),
+            ("silent", ~new & ~lost),
+            ("lost_at_write", new & lost),
+            ("refused", new & rejected),
+            ("not_finite", new & ~is_place),
+            ("accepted", accepted),
+            ("displaced", new & is_place & (farthest_m > self._displaced_m)),
+            ("buttons", new & samples.has_stop_button),
+        ):
+            self.counts[name] += np.count_nonzero(happened)
+        return accepted
+
+    def _check_forces(self, samples: Any, follows: Any) -> Any:
+        """Measure forces and their changes; return the samples (n,) whose force breaks a guarantee."""
+        counts, force_n = self.counts, samples.device_force_n
+        size_n = np.linalg.norm(force_n, axis=1)
+        change_n = np.linalg.norm(force_n - _after(self._last_n, force_n), axis=1)
+        is_force, stopped_limit_n = np.isfinite(size_n), samples.stopped_limit_n
+        compared = follows & is_force
+        released = compared & (np.isfinite(stopped_limit_n) | ~samples.is_ok)
+        repaying = compared & ~released & samples.limited_by("energy")
+        promised = compared & ~released & ~repaying
+        for name, values_n, measured in (
+            ("most_n", size_n, is_force),
+            ("release_step_n", change_n, released),
+            ("energy_step_n", change_n, repaying),
+            ("steepest_n", change_n, promised),
+        ):
+            counts[name] = np.fmax.reduce(values_n[measured], initial=counts[name])
+        violations = {
+            "no_number": ~is_force,
+            "excess": is_force & (size_n > counts.limit_n + TOLERANCE_N),
+            "unstopped": is_force & (size_n > stopped_limit_n),
+            "steps": promised & (change_n > counts.slew_n + TOLERANCE_N),
+        }
+        for name, violated in violations.items():
+            counts[name] += np.count_nonzero(violated)
+        self._last_n = force_n[-1].copy()
+        return np.logical_or.reduce(list(violations.values()))
+
+    def _check_times(self, samples: Any, follows: Any) -> Any:
+        """Compare each deadline with the one predicted from the previous tick; return the samples (n,) that deviate."""
+        counts, period_ns = self.counts, self.counts.period_ns
+        deadline_ns = samples.time_ns - samples.lateness_ns
+        late_ns = samples.time_ns + samples.busy_ns - (deadline_ns + period_ns)
+        skipped = np.maximum(late_ns, 0) // period_ns
+        following_ns = deadline_ns + period_ns * (1 + skipped)
+        drift_ns = np.where(follows, np.abs(deadline_ns - _after(self._next_deadline_ns, following_ns)), 0)
+        counts.latest_s = max(counts.latest_s, samples.lateness_ns.max() * 1e-9)
+        counts.drift_ns = max(counts.drift_ns, drift_ns.max())
+        counts.long_ticks += np.count_nonzero(samples.busy_ns >= period_ns)
+        counts.overruns += skipped.sum()
+        self._next_deadline_ns = int(following_ns[-1])
+        return drift_ns > 0
 
 
-def prepare() -> None:
-    """Compile the checks, or load them from the cache."""
-    check_samples(records(_COUNTS, 1)[0], records(SAMPLE, 0), 1.0)
-
-
-@kernel
-def check_samples(counts: Any, samples: Any, displaced_m: float) -> None:
-    """Check and count each of ``samples``."""
-    for i in range(samples.shape[0]):
-        sample = samples[i]
-        counts.samples += 1
-        if sample.tick != counts.next_tick:
-            counts.missing += sample.tick - counts.next_tick
-            counts.follows = 0
-        counts.next_tick = sample.tick + 1
-        _look_at_reading(counts, sample, displaced_m)
-        _look_at_force(counts, sample)
-        _look_at_time(counts, sample)
-        for bit in range(len(LIMITER_NAMES)):
-            counts.limiters[bit] += (sample.limiters >> bit) & 1
-        counts.follows = 1 if sample.status == STATUS_OK else 0
-        for axis in range(3):
-            counts.last_n[axis] = sample.device_force_n[axis]
-
-
-@kernel
-def _look_at_reading(counts: Any, sample: Any, displaced_m: float) -> None:
-    if sample.status == STATUS_STALE_FAULT:
-        counts.stale += 1
-    if sample.fresh == 0:
-        if sample.status == STATUS_DEVICE_LOST:
-            counts.lost += 1
-        else:
-            counts.silent += 1
-        return
-    if sample.status == STATUS_DEVICE_LOST:
-        counts.lost_at_write += 1
-    farthest_m, a_place = 0.0, True
-    for axis in range(3):
-        a_place = a_place and math.isfinite(sample.position_m[axis])
-        farthest_m = max(farthest_m, abs(sample.position_m[axis]))
-    refused = sample.limiters & LIMITER_GLITCH != 0
-    if refused:
-        counts.refused += 1
-    if not a_place:
-        counts.not_finite += 1
-        if not refused:
-            counts.accepted += 1
-            _break_promise(counts, sample)
-    elif farthest_m > displaced_m:
-        counts.displaced += 1
-    if sample.buttons & BUTTON_STOP:
-        counts.buttons += 1
-
-
-@kernel
-def _look_at_force(counts: Any, sample: Any) -> None:
-    square, change = 0.0, 0.0
-    for axis in range(3):
-        f, before = sample.device_force_n[axis], counts.last_n[axis]
-        square += f * f
-        change += (f - before) * (f - before)
-    size_n, change_n = math.sqrt(square), math.sqrt(change)
-    if not math.isfinite(size_n):
-        counts.no_number += 1
-        _break_promise(counts, sample)
-        return
-    counts.most_n = max(counts.most_n, size_n)
-    if size_n > counts.limit_n + TOLERANCE_N:
-        counts.excess += 1
-        _break_promise(counts, sample)
-    hung = sample.busy_ns >= FAULT_NS and sample.status == STATUS_OK
-    stopped = hung or sample.limiters & LIMITER_STOP != 0 or sample.status == STATUS_STALE_FAULT
-    kept_n = (
-        1.0 / DELIVERY_STEPS_PER_N if hung else 0.0
-    )  # a sample keeps a command that rounds to the zero sent after it
-    if stopped and size_n > kept_n:
-        counts.unstopped += 1
-        _break_promise(counts, sample)
-    if counts.follows == 0:
-        return
-    if stopped or sample.status != STATUS_OK:
-        counts.release_step_n = max(counts.release_step_n, change_n)
-        return
-    if sample.limiters & LIMITER_ENERGY != 0:
-        counts.energy_step_n = max(counts.energy_step_n, change_n)
-        return
-    counts.steepest_n = max(counts.steepest_n, change_n)
-    if change_n > counts.slew_n + TOLERANCE_N:
-        counts.steps += 1
-        _break_promise(counts, sample)
-
-
-@kernel
-def _look_at_time(counts: Any, sample: Any) -> None:
-    """Compare a deadline with the one predicted from the previous deadline and the end of that tick."""
-    deadline_ns = sample.time_ns - sample.lateness_ns
-    counts.latest_s = max(counts.latest_s, sample.lateness_ns * 1e-9)
-    if counts.follows != 0 and deadline_ns != counts.next_deadline_ns:
-        counts.drift_ns = max(counts.drift_ns, abs(deadline_ns - counts.next_deadline_ns))
-        _break_promise(counts, sample)
-    counts.next_deadline_ns = deadline_ns + counts.period_ns
-    late_ns = sample.time_ns + sample.busy_ns - counts.next_deadline_ns
-    if sample.busy_ns >= counts.period_ns:
-        counts.long_ticks += 1
-    if late_ns > 0:
-        missed = late_ns // counts.period_ns
-        counts.overruns += missed
-        counts.next_deadline_ns += missed * counts.period_ns
-
-
-@kernel
-def _break_promise(counts: Any, sample: Any) -> None:
-    if counts.first_tick < 0:
-        counts.first_tick = sample.tick
+def _after(last: Any, values: Any) -> Any:
+    """Return ``last`` and all ``values`` (n, …) but the last one: of each sample, the value of the one before."""
+    return np.concatenate([[last], values[:-1]])

@@ -22,32 +22,21 @@ from typing import Final, Literal, NamedTuple, Self, TypeAlias
 import numpy as np
 import psutil
 
+from study_app.devices.faulty import BUTTON, GLITCH, JUMP, LOST, LOST_AT_WRITE, NON_FINITE, SILENCE, FaultyDevice
 from study_app.devices.simulated import TREMOR_M, ScriptedDevice
 from study_app.errors import DeviceLost, ServoFault, StudyError
-from study_app.evidence.soak import ledger, sample_audit
-from study_app.evidence.soak.faulty_device import (
-    BUTTON,
-    GLITCH,
-    JUMP,
-    LOST,
-    LOST_AT_WRITE,
-    NON_FINITE,
-    SILENCE,
-    FaultyDevice,
-)
+from study_app.evidence.soak import ledger
 from study_app.evidence.soak.ledger import Drift, wake_of
 from study_app.evidence.soak.result import PERCEPTIBLE_N, Rests, SoakResult
 from study_app.evidence.soak.sample_audit import Audit
 from study_app.haptics.model.gate import resolve
-from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats
 from study_app.haptics.model.ranges import Vector
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import slew_limit_n
-from study_app.haptics.runtime.clocks.clock import SystemClock, VirtualClock
+from study_app.haptics.runtime.clocks import SystemClock, VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
-from study_app.haptics.runtime.telemetry import HISTORY
 
 _REACH_M: Final = 0.04  # range of the hand to every side of the centre
 _ROW_S: Final = 4e-3
@@ -204,11 +193,10 @@ class Soak:
         return int(self.servo.telemetry.written[0])
 
     def __enter__(self) -> Self:
-        sample_audit.prepare()
-        ledger.prepare()
+        ledger.prepare(self.reader.read())
         self.servo.prepare()
         for _ in range(2):
-            records(SAMPLE, HISTORY).status = 1  # the most memory that a check needs, which does not count as growth
+            self.servo.telemetry.ring.copy()  # the most memory that a check needs, which does not count as growth
         self._began_s = time.perf_counter()
         self._ticked_s = time.perf_counter()
         if not self.virtual:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import copy
 import math
 from typing import Any, Final
 
 import numpy as np
 
-from study_app.evidence.stability.closed_loop import ARMS, LOOP, TRACE, begin, follow, new_arm, play, run
 from study_app.evidence.stability.stability_cases import (
     DEVICE,
     FILTERS,
@@ -20,15 +18,14 @@ from study_app.evidence.stability.stability_cases import (
     Case,
     scene_of,
 )
-from study_app.haptics.kernels import kernel, new_handle, new_safety, new_schedule
+from study_app.haptics.kernels import kernel
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.force_rules import CURRENT, ForceRules
-from study_app.haptics.model.layout import SAMPLE, records
 from study_app.haptics.model.motion import Floats, Motion
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import DampingLimits
+from study_app.haptics.runtime.closed_loop import ARMS, ClosedLoop, empty_trace
 from study_app.haptics.runtime.offline import simulate
-from study_app.haptics.runtime.pack import Model, pack
 
 MOVING_S: Final = 1.2
 _LASTS_S: Final = 1.8
@@ -40,8 +37,8 @@ DIRECTION: Final = np.array([0.8, 0.0, 0.6])
 """Of straight motions."""
 
 
-class Bench:
-    """The records of one closed loop, with the safety layer (``safe``) or without.
+class Bench(ClosedLoop):
+    """The closed loop of a case, with the safety layer (``safe``) or without.
 
     ``limits`` replace those of the table, ``scene`` and ``dynamics`` those of the case.
     """
@@ -56,9 +53,30 @@ class Bench:
         dynamics: Dynamics | None = None,
         rules: ForceRules = CURRENT,
     ) -> None:
-        self.safety = new_safety(FORCE_LIMIT_N, case.believed_delay)
-        self.safety[0].fade, self.safety[0].fade_s = 1.0, 0.0
-        self.loop = loop = records(LOOP, 1)[0]
+        grip = GRIPS[case.hand]
+        super().__init__(
+            scene or scene_of(case),
+            dynamics or _dynamics_of(case),
+            delay_ticks=case.believed_delay,
+            handle={
+                "mass_kg": case.mass_kg,
+                "viscous_nspm": case.viscous_nspm,
+                "coulomb_n": case.coulomb_n,
+                "motor_limit_n": FORCE_LIMIT_N,
+                "motor_step_n": FORCE_LIMIT_N / 2048,
+                "delay": case.delay,
+                "hand_kg": grip.mass_kg,
+                "stiffness_npm": grip.stiffness_npm,
+                "damping_nspm": grip.damping_nspm,
+                "quantum_m": case.quantum_um * 1e-6,
+            },
+            arm=ARMS.get(case.hand, ARMS["middle"]) if case.plant == SECOND else None,
+            jitter=case.jitter,
+            missed=case.missed,
+            limits=limits,
+            rules=rules,
+        )
+        loop = self.loop
         loop.safe = safe
         loop.motion = MOTIONS.index(case.motion)
         loop.speed_mps = case.speed_mps
@@ -76,65 +94,6 @@ class Bench:
             loop.velocity.lag = case.velocity_lag
             loop.velocity.noise_mps = case.velocity_noise_mmps * 1e-3
             loop.velocity.count_mps = case.velocity_count_mmps * 1e-3
-        device: dict[str, Any] = {
-            "viscous_nspm": case.viscous_nspm,
-            "coulomb_n": case.coulomb_n,
-            "motor_limit_n": FORCE_LIMIT_N,
-            "motor_step_n": FORCE_LIMIT_N / 2048,
-            "delay": case.delay,
-        }
-        if case.plant == SECOND:
-            loop.arm = new_arm(ARMS[case.hand], handle_kg=case.mass_kg, **device)
-        grip = GRIPS[case.hand]
-        self.handle = new_handle(
-            mass_kg=case.mass_kg,
-            hand_kg=grip.mass_kg,
-            stiffness_npm=grip.stiffness_npm,
-            damping_nspm=grip.damping_nspm,
-            quantum_m=case.quantum_um * 1e-6,
-            **device,
-        )
-        self.model: Model = pack(
-            scene or scene_of(case), limits=limits, dynamics=dynamics or _dynamics_of(case), rules=rules
-        )
-        self.pace = new_schedule(1.0 / case.rate_hz, jitter_s=case.jitter / case.rate_hz, missed=case.missed)
-        self.sample = records(SAMPLE, 1)
-
-    @property
-    def _records(self) -> tuple[Model, Any, Any, Any, Any, Any]:
-        return self.model, self.safety[0], self.sample[0], self.handle, self.pace, self.loop
-
-    def copy(self) -> Bench:
-        """Return an independent copy of this bench in the same state."""
-        other = copy.copy(self)
-        rows = type(self.model.rows)(*(array.copy() for array in self.model.rows))
-        other.model = Model._make([*(array.copy() for array in self.model[:-1]), rows])
-        for name in ("safety", "sample", "handle", "pace", "loop"):
-            setattr(other, name, getattr(self, name).copy())
-        return other
-
-    def begin(self) -> None:
-        """Move hand and handle to the start of the motion, with its initial speed."""
-        begin(self.loop, self.handle)
-
-    def run(self, trace: Any, first: int, until_s: float) -> int:
-        """Run ticks until ``until_s`` [s], writing rows of ``trace`` from ``first``; return the next row."""
-        self.loop.until_s = until_s
-        return int(run(*self._records, trace, first))
-
-    def follow(self, path_m: Floats, *, rigid: bool = False) -> Any:
-        """Return the trace of a hand that follows ``path_m`` (ticks, 3) [m], one row per tick.
-
-        With ``rigid`` the handle follows the path regardless of the force.
-        """
-        self.loop.rigid = rigid
-        trace = records(TRACE, len(path_m))
-        follow(*self._records, trace, path_m)
-        return trace
-
-    def play(self, trace: Any, places_m: Floats) -> None:
-        """Run the tick along a given motion (rows, 3) [m] at the times of ``trace``; see `closed_loop.play`."""
-        play(*self._records, trace, places_m)
 
 
 def lasts_s(case: Case) -> float:
@@ -144,7 +103,7 @@ def lasts_s(case: Case) -> float:
 
 def new_trace(case: Case, seconds: float | None = None) -> Any:
     """Return an empty trace with room for a case, or for so many seconds of it."""
-    return records(TRACE, math.ceil(((seconds or lasts_s(case)) + 0.1) * case.rate_hz))
+    return empty_trace(math.ceil(((seconds or lasts_s(case)) + 0.1) * case.rate_hz))
 
 
 def _dynamics_of(case: Case) -> Dynamics:

@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from random import Random
 from typing import Any, Final, NamedTuple
 
-from study_app.evidence.stability.closed_loop import BURST_PERIOD_S
 from study_app.evidence.stability.stability_cases import (
     CIRCLES,
     DAMPER,
@@ -32,6 +31,7 @@ from study_app.evidence.stability.stability_cases import (
     of_physical2,
     scenes,
 )
+from study_app.haptics.runtime.closed_loop import BURST_PERIOD_S
 
 _SCALES: Final = (1.0, 3.0, 10.0, 20.0, 40.0)
 _RATES_HZ: Final = (250.0, 500.0, 1000.0, 2000.0)

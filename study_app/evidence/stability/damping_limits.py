@@ -9,14 +9,13 @@ from typing import Final
 import numpy as np
 
 from study_app.evidence.stability.bench import Bench
-from study_app.evidence.stability.closed_loop import TRACE
 from study_app.evidence.stability.stability_cases import STROKE, THROWN, Case
 from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
 from study_app.haptics.model.effects import Drag
 from study_app.haptics.model.estimators import NAMED
-from study_app.haptics.model.layout import records
-from study_app.haptics.model.scene import Body, Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
-from study_app.haptics.model.slope_limits import INERTIA_SHARE, DampingLimits, Entry
+from study_app.haptics.model.scene import Ewma, Kalman, Knee, Liquid, Raw, Scene, Velocity
+from study_app.haptics.model.slope_limits import DampingLimits, Entry
+from study_app.haptics.runtime.closed_loop import empty_trace
 
 PERIODS_S: Final = (0.5e-3, 1e-3, 2e-3, 4e-3)
 DELAYS: Final = (0, 1, 2, 3, 4)
@@ -31,6 +30,8 @@ _UNALTERED_SHARE: Final = 0.75
 """Of the boundary that a limit takes there at most, if the filter is another."""
 _UNALTERED_INERTIA_SHARE: Final = 0.85
 """Of this limit, for added mass and history: those of honey are felt as they are, too."""
+_INERTIA_SHARE: Final = 0.3
+"""Of a drag limit, for added mass and history elsewhere."""
 _SHARE: Final = 0.5
 """Of the boundary that a limit takes elsewhere: a quadratic law has twice the slope of its secant."""
 _FAST_SHARE: Final = 0.4
@@ -111,7 +112,7 @@ def measure_limits(
 def _entry(velocity: Velocity, period_s: float, delay: int) -> Entry:
     unaltered = velocity.kind in {"ewma", "kalman"} and period_s == NOMINAL_S and delay <= 1
     drag = _limit_nspm(velocity, period_s, delay, unaltered=unaltered)
-    inertia = (_UNALTERED_INERTIA_SHARE if unaltered else INERTIA_SHARE) * drag
+    inertia = (_UNALTERED_INERTIA_SHARE if unaltered else _INERTIA_SHARE) * drag
     limits = DampingLimits(_rounded_down(drag), _rounded_down(inertia))
     return Entry(velocity.kind, velocity.alpha if isinstance(velocity, Ewma) else None, period_s, delay, limits)
 
@@ -169,11 +170,10 @@ def _comes_to_rest(
         mass_kg=mass_kg,
         viscous_nspm=friction_nspm,
     )
-    body = Body()
     stokes = Liquid(
         id="damper",
         density_kg_m3=1.0,
-        viscosity_pa_s=damping_nspm / (3.0 * math.pi * body.diameter_m),
+        viscosity_pa_s=damping_nspm / (3.0 * math.pi * Scene().body.diameter_m),
         drag=Drag(law="schiller-naumann"),
     )
     scene = Scene(scale=1.0, rate_hz=1.0 / period_s, liquids=(stokes,), velocity=velocity, knee=Knee(law="none"))
@@ -183,7 +183,7 @@ def _comes_to_rest(
     bench.loop.moving_s, bench.handle.motor_step_n = math.inf, 0.0
     bench.handle.quantum_m = _COUNT_M if counts else 0.0
     bench.begin()
-    trace = records(TRACE, round(_LASTS_S / period_s))
+    trace = empty_trace(round(_LASTS_S / period_s))
     bench.run(trace, 0, math.inf)
     speeds_mps = np.linalg.norm(trace.velocity_mps[-len(trace) // 10 :], axis=1)
     return bool(not bench.loop.broken and speeds_mps.max() < (_SWING_MPS if counts else _TIRED * _THROWN_MPS))

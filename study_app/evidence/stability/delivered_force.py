@@ -1,6 +1,6 @@
 """The force that acts on the hand, after the device's delay, against the law on the handle's true motion.
 
-An arm that holds a handle through its tissue (`closed_loop.Arm`) follows a sine and random motion at 1 kHz, each with
+An arm that holds a handle through its tissue (`closed_loop.ARMS`) follows a sine and random motion at 1 kHz, each with
 the power of ±20 mm, and repeated reaches; the force moves arm and handle, so the handle itself moves less. The law is
 the same scene on the handle's true motion, with exact velocities. Buoyancy, which needs no velocity, is left out.
 

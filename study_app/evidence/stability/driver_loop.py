@@ -21,7 +21,6 @@ from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.devices.simulated import ScriptedDevice
 from study_app.evidence.stability.bench import FORCE_LIMIT_N, Bench, given_out_j, lasts_s, lowest_balance
-from study_app.evidence.stability.closed_loop import TRACE, place, write_row
 from study_app.evidence.stability.stability_cases import GRIPS, LETS_GO, Case, scene_of
 from study_app.evidence.stability.verdict import (
     ALLOWANCE_J,
@@ -37,23 +36,9 @@ from study_app.evidence.stability.verdict import (
     windows,
     worst_of,
 )
-from study_app.haptics.kernels import (
-    CONTROL,
-    ClockCalls,
-    DeviceCalls,
-    Driver,
-    Output,
-    Records,
-    copy,
-    kernel,
-    new_safety,
-    run,
-)
+from study_app.haptics.kernels import Driver
 from study_app.haptics.model.device_dynamics import Dynamics
-from study_app.haptics.model.layout import new_command, new_reading, records
-from study_app.haptics.runtime.clocks.clock import VirtualClock
-from study_app.haptics.runtime.pack import pack
-from study_app.haptics.runtime.telemetry import Telemetry
+from study_app.haptics.runtime.closed_loop import trace_driver
 
 _DELAY: Final = 1
 """Ticks that a Falcon's force is late."""
@@ -179,70 +164,18 @@ def _trace(case: Case, device: Driver, hand: Any, dynamics: Dynamics) -> Any:
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = grip.mass_kg, grip.stiffness_npm, grip.damping_nspm
     handle.stop_m = _STOP_M
     hand.follow(*_motion(case))
-    clock, control = VirtualClock(), records(CONTROL, 1)
-    control[0].period_ns = control[0].deadline_ns = round(1e9 / case.rate_hz)
-    control[0].run, control[0].serial[:] = 1, 1
-    models = tuple(pack(scene_of(case), dynamics=dynamics) for _ in range(2))
-    safety = new_safety(device.force_limit_n, dynamics.delay_ticks(case.rate_hz))
-    telemetry = Telemetry(history=16)
-    arguments = (
-        control,
-        models,
-        safety,
-        Records(new_reading(), new_command()),
-        Output(telemetry.ring, telemetry.written),
-        DeviceCalls(context=device.context, read=device.read.address, write=device.write.address),
-        ClockCalls(context=clock.context, now=clock.now.address, sleep=clock.sleep.address),
-    )
-    run(*arguments, round(_RESTS_S * case.rate_hz))
-    rows = round(lasts_s(case) * case.rate_hz)
+    lead_in, rows = round(_RESTS_S * case.rate_hz), round(lasts_s(case) * case.rate_hz)
     released = round(case.release_s * case.rate_hz) if case.hand == LETS_GO else rows
-    trace = records(TRACE, rows)
-    done = _follow(*arguments, handle, trace, released)
-    return trace[:done]
-
-
-@kernel
-def _follow(
-    control: Any,
-    models: Any,
-    safety: Any,
-    exchanged: Any,
-    output: Any,
-    device: Any,
-    clock: Any,
-    handle: Any,
-    trace: Any,
-    released: int,
-) -> int:
-    """Run one servo tick per row of ``trace`` and release before row ``released``; return the number of ticks."""
-    one: Any = np.int64(1)  # a literal would compile the loop a second time
-    for k in range(trace.shape[0]):
-        if k == released:
-            handle.held = 0
-        if run(control, models, safety, exchanged, output, device, clock, one) < 1:
-            return k
-        sample = output.ring[(output.written[0] - 1) % output.ring.shape[0]]
-        write_row(models[0], safety[0], sample, handle, trace[k])
-        trace[k].t_s = k * 1e-9 * control[0].period_ns
-        copy(safety[0].passivity.lift_n, trace[k].lift_n)
-        trace[k].delay = _DELAY
-    return int(trace.shape[0])
+    trace = trace_driver(device, handle, scene_of(case), dynamics, lead_in=lead_in, released=released, rows=rows)
+    trace.delay = _DELAY
+    return trace
 
 
 def _motion(case: Case) -> tuple[Any, Any]:
     """Return times (n,) [s] and positions (n, 3) [m] of the hand: to the start, a rest there, and the case's motion."""
-    loop = Bench(case).loop
     t_s = np.arange(0.0, _RESTS_S + lasts_s(case), _ROW_S)
-    places_m = np.zeros((len(t_s), 3))
-    _places(loop, np.maximum(t_s - _RESTS_S, 0.0), places_m)
+    places_m = Bench(case).places_m(np.maximum(t_s - _RESTS_S, 0.0))
     return t_s, places_m * np.minimum(t_s / _READY_S, 1.0)[:, np.newaxis]
-
-
-@kernel
-def _places(loop: Any, t_s: Any, out_m: Any) -> None:
-    for k in range(t_s.shape[0]):
-        place(loop, t_s[k], out_m[k])
 
 
 def _given_out(case: Case, trace: Any) -> float:

@@ -9,17 +9,9 @@ from typing import Any, Final
 
 from study_app.errors import StudyError
 from study_app.haptics.model.effects import DAMPING_NSPM, Drag
-from study_app.haptics.model.estimators import ESTIMATORS as KINDS
 from study_app.haptics.model.estimators import MOST_LAG_TICKS
-from study_app.haptics.model.scene import (
-    MOST_DELAY_MS,
-    MOST_JITTER_MS,
-    MOST_LOSS,
-    ForceLink,
-    Liquid,
-    Scene,
-    too_long_delay,
-)
+from study_app.haptics.model.estimators import NAMED as ESTIMATORS
+from study_app.haptics.model.scene import ForceLink, Liquid, Scene
 from study_app.protocol.load import load
 from study_app.protocol.source import shipped, shipped_file
 
@@ -94,9 +86,9 @@ _RANGES: Final[Mapping[str, tuple[float, float]]] = {
     "burst_ms": (0.0, 40.0),
     "believed_kg": (0.0, 5.0),
     "other_kg": (0.0, 5.0),
-    "force_delay_ms": (0.0, float(MOST_DELAY_MS)),
-    "force_jitter_ms": (0.0, float(MOST_JITTER_MS)),
-    "force_loss": (0.0, MOST_LOSS),
+    "force_delay_ms": (0.0, float(ForceLink.MOST_DELAY_MS)),
+    "force_jitter_ms": (0.0, float(ForceLink.MOST_JITTER_MS)),
+    "force_loss": (0.0, ForceLink.MOST_LOSS),
     "velocity_lag": (0.0, MOST_LAG_TICKS),
     "velocity_noise_mmps": (0.0, 1000.0),
     "velocity_count_mmps": (0.0, 1000.0),
@@ -107,7 +99,7 @@ _RANGES: Final[Mapping[str, tuple[float, float]]] = {
 }
 """What a case may be made of; the sweep's own choices lie within."""
 
-_ESTIMATORS: Final[Mapping[str, Any]] = {it.name: it.model() for it in KINDS if it.of_device}
+_ESTIMATORS: Final[Mapping[str, Any]] = {name: it.model() for name, it in ESTIMATORS.items() if it.of_device}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -225,8 +217,8 @@ def parse_case(line: str) -> Case:
     ):
         if getattr(case, name) not in permitted:
             raise StudyError(f"{name}={getattr(case, name)} is not permitted: choose {', '.join(permitted)}")
-    if not _link_of(case).fits(case.rate_hz):
-        raise StudyError(too_long_delay(case.rate_hz))
+    if reason := _link_of(case).refusal_reason(case.rate_hz):
+        raise StudyError(reason)
     return case
 
 

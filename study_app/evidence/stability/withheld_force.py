@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from study_app.evidence.stability.bench import DIRECTION, Bench
-from study_app.evidence.stability.closed_loop import MIDDLE
 from study_app.evidence.stability.stability_cases import Case, liquids
 from study_app.evidence.table import Evidence, run
+from study_app.haptics.runtime.closed_loop import ARMS
 
 
 class _Stroke(NamedTuple):
@@ -181,7 +181,8 @@ def _played(case: Case, path_m: NDArray[np.float64], mode: str) -> Any:
     handle = bench.handle
     handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = _HAND_KG, _HAND_NPM, _HAND_NSPM
     if mode == SHAKEN:
-        handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = 0.0, MIDDLE.tissue_npm, MIDDLE.tissue_nspm
+        arm = ARMS["middle"]
+        handle.hand_kg, handle.stiffness_npm, handle.damping_nspm = 0.0, arm.tissue_npm, arm.tissue_nspm
     return bench.follow(path_m, rigid=mode == _IMPOSED)
 
 

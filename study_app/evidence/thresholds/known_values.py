@@ -30,7 +30,7 @@ from study_app.analysis.levels.thresholds import thresholds
 from study_app.analysis.levels.tracks import tracks
 from study_app.analysis.statistics import student_interval
 from study_app.evidence.table import Evidence, Table, run
-from study_app.haptics.model.overrides import override_value
+from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.slope_limits import steady_force
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Follow, Protocol
@@ -455,7 +455,7 @@ def known_value(name: str, protocol: Protocol) -> Known:
         if protocol.design_of(block).reply == "number" and stimulus.vary not in DELAYS and isinstance(task, Follow):
             scene = protocol.scene_for(protocol.condition_of(stimulus))
             fastest_mps = task.fastest_stroke(protocol.device.workspace_m).speed_mps
-            of_levels = [override_value(scene, stimulus.vary, level) for level in _levels(protocol, block)]
+            of_levels = [override_all(scene, {stimulus.vary: level}) for level in _levels(protocol, block)]
             return KnownExponent(name, protocol, block, tuple(_resistance(it, fastest_mps) for it in of_levels))
     for block in blocks:
         standards = protocol.standards_of(block)

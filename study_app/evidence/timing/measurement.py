@@ -8,22 +8,21 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
-from typing import Any, Final, Literal, NamedTuple, Protocol, TypeAlias
+from functools import partial
+from typing import Final, Literal, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from study_app.devices.simulated import PlayedHand
 from study_app.evidence.computer import LoadName, Windows, machine, under_load
 from study_app.evidence.cost import hand_motion
 from study_app.evidence.table import TURN_S, check_seconds, take_turns
-from study_app.haptics.kernels import READ, READ_NEW, SLEEP, WRITE, Driver, c_function, call_at, kernel, record_at
-from study_app.haptics.model.device_dynamics import UNKNOWN
+from study_app.haptics.kernels import Driver
 from study_app.haptics.model.effects import Drag, Vortex, Wake
-from study_app.haptics.model.layout import READING, records
 from study_app.haptics.model.scene import Cylinder, Liquid, Scene
-from study_app.haptics.runtime.clocks.clock import Clock, SystemClock, VirtualClock, raise_priority
-from study_app.haptics.runtime.clocks.grants import Grant, Level
+from study_app.haptics.runtime.clocks import SystemClock, VirtualClock, raise_priority, sleep_repeatedly
+from study_app.haptics.runtime.grants import Grant, Level
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
 
@@ -43,57 +42,6 @@ FULL: Final = Scene(
 )
 """Every effect that can act at once, on a hand that comes out of the liquid's surface and goes back."""
 
-_PLACE = np.dtype([("position_m", np.float64, (3,))], align=True)
-_PLAYED = np.dtype(
-    [
-        ("places", np.intp),  # address of the first
-        ("count", np.int64),
-        ("next", np.int64),
-    ],
-    align=True,
-)
-_place_at = record_at(_PLACE)
-_played_at = record_at(_PLAYED)
-_reading_at = record_at(READING)
-
-
-class PlayedHand:
-    """A device that replays a motion and ignores forces, so that only the tick is timed."""
-
-    name = "played"
-    force_limit_n = 8.0
-    dynamics = UNKNOWN
-    failure = None
-
-    def __init__(self) -> None:
-        self._places_m = np.ascontiguousarray(hand_motion(), np.float64)
-        self._memory = records(_PLAYED, 1)
-        self._memory[0].places = self._places_m.ctypes.data
-        self._memory[0].count = len(self._places_m)
-        self.context = int(self._memory.ctypes.data)
-        self.read, self.write = _functions()
-
-
-@cache
-def _functions() -> tuple[Any, Any]:
-    return c_function(READ, _read), c_function(WRITE, _write)
-
-
-def _read(context: int, _now_ns: int, reading: int) -> int:
-    played = _played_at(context)
-    place = _place_at(played.places + 24 * played.next)
-    played.next = played.next + 1 if played.next + 1 < played.count else 0
-    out = _reading_at(reading)
-    for axis in range(3):
-        out.position_m[axis] = place.position_m[axis]
-    out.buttons = 0
-    return READ_NEW
-
-
-def _write(_context: int, _command: int) -> int:
-    return 0
-
-
 Kind: TypeAlias = Literal["servo", "bare", "thread", "qt"]
 _Whole: TypeAlias = NDArray[np.int64]
 
@@ -105,8 +53,6 @@ NAMES: Final[dict[Kind, str]] = {
     "thread": "Python thread",
     "qt": "Qt timer",
 }
-
-_sleep = call_at(SLEEP)
 
 
 class Ticks(NamedTuple):
@@ -138,7 +84,7 @@ class ServoLoop:
     def __init__(self, grant: Grant, *, real_time: bool, spin_us: float | None, device: Driver | None = None) -> None:
         self.grant = grant
         self.clock = SystemClock(spin_us)
-        driver = PlayedHand() if device is None else device
+        driver = PlayedHand(hand_motion()) if device is None else device
         self.servo = Servo(driver, clock=self.clock, elements=elements_needed(FULL), real_time=real_time)
         self.servo.prepare()
 
@@ -167,47 +113,31 @@ class _BareLoop:
 
     kind: Kind = "bare"
 
-    def __init__(self, grant: Grant, *, real_time: bool, clock: Clock) -> None:
+    def __init__(self, grant: Grant, *, real_time: bool, clock: SystemClock) -> None:
         self.grant = grant
         self._real_time = real_time
         self._clock = clock
-        _sleep_on(self._clock.sleep.address, self._clock.context, 0, np.zeros(0, np.int64), np.zeros(1, np.int64))
+        sleep_repeatedly(clock, PERIOD_NS, 0)  # compiles it
 
     def run(self, ticks: int) -> Ticks:
-        lateness_ns, overruns = np.zeros(ticks + LEAD_IN, np.int64), np.zeros(1, np.int64)
+        lateness_ns = np.zeros(0, np.int64)
 
         def take() -> None:
+            nonlocal lateness_ns
             raise_priority(real_time=self._real_time)
-            clock = self._clock
-            _sleep_on(clock.sleep.address, clock.context, clock.now_ns(), lateness_ns, overruns)
+            lateness_ns = sleep_repeatedly(self._clock, PERIOD_NS, ticks + LEAD_IN)[LEAD_IN:]
 
         _in_a_thread(take)
-        return Ticks(lateness_ns[LEAD_IN:], np.zeros(0, np.int64), int(overruns[0]))
+        skipped = np.maximum(lateness_ns // PERIOD_NS, 1) - 1
+        return Ticks(lateness_ns, np.zeros(0, np.int64), int(skipped.sum()))
 
 
-@kernel
-def _sleep_on(sleep: int, context: int, start_ns: int, lateness_ns: Any, overruns: Any) -> None:
-    """Sleep from deadline to deadline and do nothing else."""
-    deadline_ns = start_ns + PERIOD_NS
-    for i in range(lateness_ns.shape[0]):
-        began_ns = _sleep(sleep, context, deadline_ns)
-        lateness_ns[i] = began_ns - deadline_ns
-        passed = max(lateness_ns[i] // PERIOD_NS, 1)
-        if i >= LEAD_IN:
-            overruns[0] += passed - 1
-        deadline_ns += passed * PERIOD_NS
-
-
-class _SameTick:
-    """The servo's tick called from Python: the same compiled loop, one tick at a time."""
-
-    def __init__(self) -> None:
-        self.servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
-        self.servo.load(FULL)
-        self.servo.advance(1)
-
-    def __call__(self) -> None:
-        self.servo.advance(1)
+def _same_tick() -> Callable[[], object]:
+    """Return the servo's tick to be called from Python: the same compiled loop, one tick at a time."""
+    servo = Servo(PlayedHand(hand_motion()), clock=VirtualClock(), elements=elements_needed(FULL))
+    servo.load(FULL)
+    servo.advance(1)
+    return partial(servo.advance, 1)
 
 
 class _ThreadLoop:
@@ -218,7 +148,7 @@ class _ThreadLoop:
     def __init__(self, grant: Grant, *, real_time: bool) -> None:
         self.grant = grant
         self._real_time = real_time
-        self.tick = _SameTick()
+        self.tick = _same_tick()
 
     def run(self, ticks: int) -> Ticks:
         times: list[tuple[int, int]] = []
@@ -251,7 +181,7 @@ class _QtLoop:
     def __init__(self, grant: Grant, timer: _Timer) -> None:
         self.grant = grant
         self._timer = timer
-        self.tick = _SameTick()
+        self.tick = _same_tick()
 
     def run(self, ticks: int) -> Ticks:
         times: list[tuple[int, int]] = []

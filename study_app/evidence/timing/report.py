@@ -17,7 +17,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 from study_app import figure_style as style
 from study_app.evidence.table import Evidence, Table, duration, plot_files
 from study_app.evidence.timing.measurement import LATE_NS, NAMES, PERCENTILES, Kind, LoopTiming, Timed
-from study_app.haptics.runtime.clocks.grants import Level
+from study_app.haptics.runtime.grants import Level
 
 _FOOT_PT: Final = 62.0
 _LETTERS: Final = 132

@@ -9,7 +9,6 @@ from study_app.haptics.kernels.c_functions import (
     READ_LOST,
     READ_NEW,
     READ_NOTHING_NEW,
-    SLEEP,
     WRITE,
     WRITE_SATURATED,
     Driver,
@@ -25,85 +24,46 @@ from study_app.haptics.kernels.c_functions import (
 from study_app.haptics.kernels.compiled import CACHE, entry_of, evidence_kernel, following_compilation, kernel
 from study_app.haptics.kernels.effects.drag import resistance
 from study_app.haptics.kernels.effects.wake import REST_MPS, response
-from study_app.haptics.kernels.estimators import take_force
-from study_app.haptics.kernels.loop import CONTROL, ClockCalls, DeviceCalls, Output, Records, follow_delay, run
-from study_app.haptics.kernels.passivity import DELIVERY_STEPS_PER_N, SURE_MPS, log_acted, log_command, update_observer
-from study_app.haptics.kernels.plant import (
-    HANDLE,
-    measure,
-    move,
-    new_handle,
-    new_schedule,
-    next_tick,
-    push,
-    random,
-    release_handle,
-)
-from study_app.haptics.kernels.safety import START_FADE_S, begin_scene, delay_force, new_safety
-from study_app.haptics.kernels.sample_validation import FAULT_NS, accept_sample, can_have_moved, watchdog
-from study_app.haptics.kernels.tick import compute_tick, step_model, write_sample
-from study_app.haptics.kernels.vector import (
-    clear,
-    copy,
-    distance,
-    dot,
-    is_finite,
-    norm,
-    square,
-    square_distance,
-    subtract,
-)
+from study_app.haptics.kernels.passivity import SURE_MPS
+from study_app.haptics.kernels.plant import HANDLE, measure, move, new_handle, push, random, release_handle
+from study_app.haptics.kernels.safety import START_FADE_S, begin_scene, new_safety
+from study_app.haptics.kernels.sample_validation import can_have_moved
+from study_app.haptics.kernels.vector import clear, copy, distance, dot, is_finite, norm, square, square_distance
 
 __all__ = [
     "CACHE",
-    "CONTROL",
-    "DELIVERY_STEPS_PER_N",
-    "FAULT_NS",
     "HANDLE",
     "READ",
     "READ_LOST",
     "READ_NEW",
     "READ_NOTHING_NEW",
     "REST_MPS",
-    "SLEEP",
     "START_FADE_S",
     "SURE_MPS",
     "WRITE",
     "WRITE_SATURATED",
-    "ClockCalls",
-    "DeviceCalls",
     "Driver",
-    "Output",
-    "Records",
-    "accept_sample",
     "begin_scene",
     "c_function",
     "call_at",
     "can_have_moved",
     "clear",
     "command_at",
-    "compute_tick",
     "copy",
-    "delay_force",
     "device_functions",
     "distance",
     "dot",
     "entry_of",
     "evidence_kernel",
     "fence",
-    "follow_delay",
     "following_compilation",
     "full_fence",
     "is_finite",
     "kernel",
-    "log_acted",
-    "log_command",
     "measure",
     "move",
     "new_handle",
     "new_safety",
-    "new_schedule",
-    "next_tick",
     "norm",
     "push",
     "random",
@@ -112,13 +72,6 @@ __all__ = [
     "release_handle",
     "resistance",
     "response",
-    "run",
     "square",
     "square_distance",
-    "step_model",
-    "subtract",
-    "take_force",
-    "update_observer",
-    "watchdog",
-    "write_sample",
 ]

@@ -18,6 +18,7 @@ in C offers its functions as objects with an ``address``.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import Any, Protocol
 
 import numba
@@ -154,6 +155,7 @@ copy_record: Any = intrinsic(_copy_record)
 reading_at, command_at = record_at(READING), record_at(COMMAND)
 
 
+@cache
 def device_functions(read: Callable[..., int], write: Callable[..., int]) -> tuple[Any, Any]:
-    """Compile the functions of a device (``READ``, ``WRITE``); call this once for all devices of a kind."""
+    """Compile the functions of a device (``READ``, ``WRITE``), once for all devices of a kind."""
     return c_function(READ, read), c_function(WRITE, write)

@@ -7,7 +7,7 @@ Frozen, validated values in SI units and the scene frame (x right, y up, z towar
 
 import math
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Annotated, Any, Final, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, Self, TypeAlias
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 from pydantic.json_schema import SkipJsonSchema
@@ -145,9 +145,6 @@ else:
     )
 
 
-MOST_DELAY_MS: Final = 200
-MOST_JITTER_MS: Final = 50
-MOST_LOSS: Final = 0.5
 STORED_FORCES: Final = 1024
 """Number of stored forces: delay and jitter together are shorter [ticks]."""
 __all__ = [
@@ -201,6 +198,10 @@ class ForceLink(Frozen):
         Of jitter and loss, below 2³².
     """
 
+    MOST_DELAY_MS: ClassVar[int] = 200
+    MOST_JITTER_MS: ClassVar[int] = 50
+    MOST_LOSS: ClassVar[float] = 0.5
+
     delay_s: Annotated[
         float, within(0, MOST_DELAY_MS / 1000, "with a longer delay, a liquid pushes instead of resisting")
     ] = 0.0
@@ -222,16 +223,12 @@ class ForceLink(Frozen):
         """
         return self.delay_s + math.sqrt(math.pi / 2 * self.ticks(rate_hz)[1]) / rate_hz
 
-    def fits(self, rate_hz: float) -> bool:
-        """Return whether enough forces are stored for the delay."""
-        return sum(self.ticks(rate_hz)) < STORED_FORCES
-
-
-def too_long_delay(rate_hz: float) -> str:
-    """Return the error message of a link that does not fit."""
-    return (
-        f"the sum of the force's delay and jitter must be below {1000 * STORED_FORCES / rate_hz:g} ms at {rate_hz:g} Hz"
-    )
+    def refusal_reason(self, rate_hz: float) -> str | None:
+        """Return the reason why too few forces are stored for the delay, in a sentence, or None."""
+        if sum(self.ticks(rate_hz)) < STORED_FORCES:
+            return None
+        most_ms = 1000 * STORED_FORCES / rate_hz
+        return f"the sum of the force's delay and jitter must be below {most_ms:g} ms at {rate_hz:g} Hz"
 
 
 PROMPT_LINK: Final = ForceLink()
@@ -350,8 +347,8 @@ class Scene(Frozen):
 
     @model_validator(mode="after")
     def _link_reaches_back(self) -> Self:
-        if not self.link.fits(self.rate_hz):
-            raise ValueError(too_long_delay(self.rate_hz))
+        if reason := self.link.refusal_reason(self.rate_hz):
+            raise ValueError(reason)
         return self
 
     def motion_in(self, liquid: Liquid) -> MotionBox:

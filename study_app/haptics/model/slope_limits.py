@@ -22,8 +22,6 @@ from study_app.haptics.model.scene import Ewma, Given, Kalman, Scene, Velocity, 
 
 _SLOWEST_HZ: Final = 500.0
 """Lowest rate for participants [Hz]: with slower servos they would feel the limits rather than the liquids."""
-INERTIA_SHARE: Final = 0.3
-"""Share of the drag limit for added mass and history if they need not be exact."""
 MEASURED_KG: Final = 0.1
 """Mass of the free handle in the measurement of the table."""
 LIGHTER: Final = 2.0

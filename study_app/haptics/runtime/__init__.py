@@ -1,4 +1,4 @@
 """The servo and what surrounds it: packing, telemetry, threads, offline runs.
 
-Reading order: clocks, pack, telemetry; offline, thread; servo.
+Reading order: grants, pack, telemetry; clocks; closed_loop, offline, thread; servo.
 """

@@ -26,14 +26,14 @@ from study_app.haptics.kernels.safety import begin_scene, guard, new_safety
 from study_app.haptics.kernels.sample_validation import clamp, place
 from study_app.haptics.kernels.tick import compute_tick, step_model, write_sample
 from study_app.haptics.kernels.vector import copy, distance, square
-from study_app.haptics.model.device_dynamics import MOST_DELAY, Dynamics
+from study_app.haptics.model.device_dynamics import MOST_DELAY, UNKNOWN, Dynamics
 from study_app.haptics.model.effects import local_wake, wake
 from study_app.haptics.model.estimators import DEVICE, GIVEN
 from study_app.haptics.model.layout import LIMITER_SATURATED, LIMITER_STOP, SAMPLE, STATUS_DEVICE_LOST, Record, records
 from study_app.haptics.model.motion import Floats, Motion, read_motion
 from study_app.haptics.model.scene import Given, Scene
-from study_app.haptics.model.slope_limits import handle_limits
-from study_app.haptics.runtime.pack import pack
+from study_app.haptics.model.slope_limits import DampingLimits, handle_limits
+from study_app.haptics.runtime.pack import Model, pack
 
 Table: TypeAlias = "np.recarray[Any, Any]"
 
@@ -180,6 +180,62 @@ def _run(model: Any, safety: Record, samples: Any, t_s: Any, before_s: float) ->
         step_model(model, interval_s, safety.delay_ticks)
         write_sample(state, sample)
         guard(model, safety, sample, interval_s)
+
+
+_RESULT = np.dtype([(name, np.float64, (3,)) for name in ("velocity_mps", "position_m", "force_n")], align=True)
+"""Velocity and place of the body in the scene, and the force of the effects."""
+
+
+class BatchedTicks:
+    """The servo's ticks on given readings, including sample validation and safety layer, in batches to be timed.
+
+    Readings are times ``t_ns`` (n,) and places ``hand_m`` (n, 3); the first one follows the last one after a period.
+    ``velocity_mps`` (n, 3) are velocities in the scene, for a scene in which they are given; ``limits`` replace those
+    of the table. Ticks fill the rows of ``results``, (n,) of `_RESULT`, unless there are none.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        t_ns: NDArray[np.int64],
+        hand_m: Floats,
+        velocity_mps: Floats | None = None,
+        *,
+        limits: DampingLimits | None = None,
+        dynamics: Dynamics = UNKNOWN,
+    ) -> None:
+        self._model: Model = pack(scene, limits=limits, dynamics=dynamics)
+        self._safety = new_safety(delay_ticks=dynamics.delay_ticks(scene.rate_hz))
+        self._sample = records(SAMPLE, 1)
+        self._readings = t_ns, hand_m, np.zeros_like(hand_m) if velocity_mps is None else velocity_mps
+        self.results = records(_RESULT, len(t_ns))
+
+    def run(self, start: int, stop: int) -> None:
+        """Run the ticks from ``start`` to ``stop``."""
+        _run_batch(self._model, self._safety[0], self._sample[0], self._readings, self.results, start, stop)
+
+
+@kernel
+def _run_batch(model: Any, safety: Record, sample: Record, readings: Any, results: Any, start: int, stop: int) -> None:
+    t_ns, hand_m, velocity_mps = readings
+    parameters, state = model.parameters[0], model.state[0]
+    lap_ns = t_ns[-1] - t_ns[0] + round(1e9 * parameters.period_s)
+    row, shift_ns = start % len(t_ns), start // len(t_ns) * lap_ns
+    for _ in range(start, stop):
+        sample.time_ns = t_ns[row] + shift_ns
+        sample.fresh = 1
+        copy(hand_m[row], sample.position_m)
+        if parameters.estimator == GIVEN:
+            copy(velocity_mps[row], state.estimate_mps)
+        compute_tick(model, safety, sample)
+        if results.shape[0] > 0:
+            copy(sample.velocity_mps, results[row].velocity_mps)
+            copy(state.position_m, results[row].position_m)
+            copy(sample.force_n, results[row].force_n)
+        row += 1
+        if row == len(t_ns):  # a division would take a third of a tick
+            row = 0
+            shift_ns += lap_ns
 
 
 def _table(t_s: Any, samples: Any) -> Table:

@@ -12,7 +12,7 @@ from study_app.haptics.model.force_rules import FORCE_RULES
 from study_app.haptics.model.layout import STATUS_DEVICE_LOST, STATUS_NON_FINITE, STATUS_OK, STATUS_STALE_FAULT
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import Clock, SystemClock
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.grants import Grant
 from study_app.haptics.runtime.pack import elements_needed, is_built_alike, takes_device_velocity
 from study_app.haptics.runtime.telemetry import Telemetry
 from study_app.haptics.runtime.thread import LoopThread

@@ -14,9 +14,58 @@ import numpy as np
 
 from study_app.haptics.kernels.c_functions import fence
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.model.layout import LIMITER_GLITCH, SAMPLE, records
+from study_app.haptics.kernels.passivity import DELIVERY_STEPS_PER_N
+from study_app.haptics.kernels.sample_validation import FAULT_NS
+from study_app.haptics.model.layout import (
+    BUTTON_STOP,
+    LIMITER_GLITCH,
+    LIMITER_NAMES,
+    SAMPLE,
+    STATUS_DEVICE_LOST,
+    STATUS_OK,
+    STATUS_STALE_FAULT,
+    records,
+)
 
 HISTORY = 32_768  # samples kept: 32 s at 1 kHz, 10 MB
+
+
+class Samples(np.recarray[Any, Any]):
+    """Samples of the servo, (n,) of ``SAMPLE``, with their bits and codes as columns (n,)."""
+
+    def limited_by(self, name: str) -> Any:
+        """Return in which samples the limiter of this name acted."""
+        return self.limiters >> LIMITER_NAMES.index(name) & 1 != 0
+
+    @property
+    def is_ok(self) -> Any:
+        return self.status == STATUS_OK
+
+    @property
+    def is_stale(self) -> Any:
+        return self.status == STATUS_STALE_FAULT
+
+    @property
+    def is_lost(self) -> Any:
+        return self.status == STATUS_DEVICE_LOST
+
+    @property
+    def has_stop_button(self) -> Any:
+        return self.buttons & BUTTON_STOP != 0
+
+    @property
+    def is_hung(self) -> Any:
+        """Whether the tick took so long that zero force was sent after its own force."""
+        return (self.busy_ns >= FAULT_NS) & self.is_ok
+
+    @property
+    def stopped_limit_n(self) -> Any:
+        """The greatest force [N] that a stopped servo may state, infinite while it is not stopped.
+
+        A hung sample keeps a command that rounds to the zero sent after it.
+        """
+        stopped_n = np.where(self.is_hung, 1.0 / DELIVERY_STEPS_PER_N, 0.0)
+        return np.where(self.is_hung | self.limited_by("stop") | self.is_stale, stopped_n, math.inf)
 
 
 class Telemetry:
@@ -66,9 +115,9 @@ class Reader:
         self.dropped = 0
 
     def read(self) -> Any:
-        """Return copies of all samples since the last read, oldest first (recarray of ``SAMPLE``, maybe empty)."""
+        """Return copies of all samples since the last read, oldest first (`Samples`, maybe empty)."""
         waiting = min(int(self._written[0]) - self._next, self._ring.size)
-        out = records(SAMPLE, waiting)
+        out = records(SAMPLE, waiting).view(Samples)
         first, following = _copy(self._ring, self._written, self._next, out)
         kept = following - first
         self.dropped += first - self._next

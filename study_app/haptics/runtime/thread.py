@@ -33,7 +33,7 @@ from study_app.haptics.model.device_dynamics import MOST_DELAY
 from study_app.haptics.model.layout import STATUS_OK, new_command, new_reading, records
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.runtime.clocks.clock import Clock, raise_priority
-from study_app.haptics.runtime.clocks.grants import NO_THREAD, Blocks, Grant, allow_suspension, refuse_suspension
+from study_app.haptics.runtime.grants import NO_THREAD, Blocks, Grant, allow_suspension, refuse_suspension
 from study_app.haptics.runtime.pack import pack, pack_into
 from study_app.haptics.runtime.telemetry import Telemetry
 

@@ -17,7 +17,7 @@ from typing import Final
 from study_app.haptics.model.device_dynamics import ASSUMED_TICKS
 from study_app.haptics.model.estimators import NAMED
 from study_app.haptics.model.overrides import override_value
-from study_app.haptics.model.scene import MOST_DELAY_MS, Scene, Velocity
+from study_app.haptics.model.scene import ForceLink, Scene, Velocity
 from study_app.haptics.model.slope_limits import slope_limit, steady_force
 from study_app.number_text import counted
 from study_app.protocol.blocks import Block
@@ -344,6 +344,8 @@ def returned_j(damping: float, stroke: Stroke, delay_s: float) -> float:
 def longest_delay_ms(damping: float, stroke: Stroke) -> float:
     """Return the longest delay at which a damper [N·s/m] returns no more energy than the limit [whole ms]."""
     beyond = (
-        delay_ms for delay_ms in range(MOST_DELAY_MS + 1) if returned_j(damping, stroke, delay_ms / 1000) > LIMIT_J
+        delay_ms
+        for delay_ms in range(ForceLink.MOST_DELAY_MS + 1)
+        if returned_j(damping, stroke, delay_ms / 1000) > LIMIT_J
     )
-    return next(beyond, MOST_DELAY_MS + 1) - 1
+    return next(beyond, ForceLink.MOST_DELAY_MS + 1) - 1

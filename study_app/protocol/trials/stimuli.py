@@ -13,7 +13,6 @@ from typing import Annotated, ClassVar, Final, Literal, Self, TypeAlias, TypeVar
 from pydantic import Field, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from study_app.haptics.model import scene
 from study_app.haptics.model.ranges import later, within
 from study_app.haptics.model.scene import ForceLink
 from study_app.protocol.quantities import quantity, quantity_words
@@ -31,9 +30,9 @@ FORCE_DELAY: Final = "force_delay_ms"
 DELAYS: Final = (DELAY, FORCE_DELAY)
 MOST_DELAY_MS: Final = 1000
 OF_LINK: Final = {
-    FORCE_DELAY: scene.MOST_DELAY_MS,
-    "force_jitter_ms": scene.MOST_JITTER_MS,
-    "force_loss": scene.MOST_LOSS,
+    FORCE_DELAY: ForceLink.MOST_DELAY_MS,
+    "force_jitter_ms": ForceLink.MOST_JITTER_MS,
+    "force_loss": ForceLink.MOST_LOSS,
 }
 OF_CONDITION: Final = {DELAY: MOST_DELAY_MS, **OF_LINK}
 """The varied numbers that belong to the condition, not to its liquid, and the most that each may be."""
@@ -61,13 +60,13 @@ class Condition(Table):
         description="shown: the ball is always drawn; hidden: it is drawn only during the task's lead-in.",
     )
     force_delay_ms: Annotated[
-        float, within(0, scene.MOST_DELAY_MS, "with a longer delay, the force pushes the hand")
+        float, within(0, ForceLink.MOST_DELAY_MS, "with a longer delay, the force pushes the hand")
     ] = later(default=0, description="Force delay [ms]; the picture is not delayed.")
-    force_jitter_ms: Annotated[float, within(0, scene.MOST_JITTER_MS, "jitter in networks is smaller")] = later(
+    force_jitter_ms: Annotated[float, within(0, ForceLink.MOST_JITTER_MS, "jitter in networks is smaller")] = later(
         default=0, description="Maximum additional force delay, drawn at random at every tick [ms]."
     )
     force_loss: Annotated[
-        float, within(0, scene.MOST_LOSS, "with higher losses, most forces would repeat the previous one")
+        float, within(0, ForceLink.MOST_LOSS, "with higher losses, most forces would repeat the previous one")
     ] = later(default=0, description="Proportion of ticks at which the force is lost and the previous force is held.")
     view: str = later(
         default="tank",

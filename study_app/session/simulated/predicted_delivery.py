@@ -14,7 +14,7 @@ from study_app.devices.hand import hand_of
 from study_app.devices.rig import Rig, study_settings
 from study_app.devices.simulated import ScriptedDevice
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.blocks import Block
 from study_app.protocol.model import Protocol

@@ -30,7 +30,7 @@ from study_app.devices.registry import all_devices, descriptor_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.ending_signals import ENDING_SIGNALS
 from study_app.errors import SessionError, StoreError
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.protocol.blocks import Block
 from study_app.protocol.load import parse, source_bytes
 from study_app.protocol.model import Protocol

@@ -184,7 +184,7 @@ class Real(World):
 @pytest.fixture
 def real() -> Iterator[Real]:
     from study_app.devices.simulated import ScriptedDevice
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.clocks import VirtualClock
     from study_app.haptics.runtime.servo import Servo
 
     device = ScriptedDevice()

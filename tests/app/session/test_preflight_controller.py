@@ -19,7 +19,7 @@ from study_app.errors import DeviceLost, DisplayError
 from study_app.evidence.appraisal import Costs, DeliveryQuestion, Errors, Question
 from study_app.gui.theme.theme import LIGHT
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
-from study_app.haptics.runtime.clocks.grants import NO_THREAD
+from study_app.haptics.runtime.grants import NO_THREAD
 from study_app.haptics.runtime.telemetry import Timing
 from study_app.outlets.session_outlets import OutletStatus
 from study_app.protocol.load import load

@@ -12,7 +12,7 @@ if numba.config.DISABLE_JIT:
 from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.haptics.kernels.c_functions import READ_NEW
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.devices.falcon.support.scripted_bridge import Ticks, reply
 

@@ -14,7 +14,7 @@ from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.devices.emulators.falcon_emulator import Emulator
 from study_app.devices.falcon.device import PULL_OUT
 from study_app.devices.falcon.failures import FAILURES
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.devices.falcon.support.firmware_stream import stream
 

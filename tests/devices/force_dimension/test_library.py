@@ -31,7 +31,7 @@ def opened(standin: StandIn, name: str = "force-dimension", **limits: Any) -> An
 
 def ticking(device: Any) -> Any:
     """Return a servo in mid-stroke through honey; a reading of the stand-in is a millisecond."""
-    from study_app.haptics.runtime.clocks.clock import VirtualClock
+    from study_app.haptics.runtime.clocks import VirtualClock
     from study_app.haptics.runtime.servo import Servo
     from study_app.protocol.load import load
 
@@ -122,7 +122,7 @@ class TestTicks:
         standin.rotate([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # 90 degrees about the maker's z: up
         standin.loaded.standin_press(0b101)
         with opened(standin) as device:
-            from study_app.haptics.runtime.clocks.clock import VirtualClock
+            from study_app.haptics.runtime.clocks import VirtualClock
             from study_app.haptics.runtime.servo import Servo
 
             servo = Servo(device, clock=VirtualClock())

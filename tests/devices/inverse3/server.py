@@ -20,7 +20,7 @@ from study_app.devices.emulators.inverse3_service import Service
 from study_app.devices.emulators.inverse3_stream import INBOX, OUTBOX, SERVICE, let_pass, take_frames
 from study_app.haptics.kernels.c_functions import NOW, call_at
 from study_app.haptics.kernels.compiled import kernel
-from study_app.haptics.runtime.clocks.clock import SystemClock, raise_priority
+from study_app.haptics.runtime.clocks import SystemClock, raise_priority
 
 _CALL = call_at(types.intp(types.intp, types.intp, types.uintp, types.int32))
 _NOW = call_at(NOW)

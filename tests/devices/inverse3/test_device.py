@@ -15,7 +15,7 @@ from study_app.devices.registry import open_device
 from study_app.errors import DeviceError, DeviceNotFound, ServoFault
 from study_app.haptics.kernels.c_functions import READ_LOST, READ_NEW, READ_NOTHING_NEW
 from study_app.haptics.model.layout import LIMITER_GLITCH, MEASURED_VELOCITY, STATUS_OK
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load
 from tests.compiled import needs_servo

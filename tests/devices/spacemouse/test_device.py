@@ -20,7 +20,7 @@ from study_app.devices.spacemouse.hid import (
 )
 from study_app.errors import DeviceError, DeviceNotFound
 from study_app.haptics.model.layout import BUTTON_STOP
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.devices.spacemouse.fake_hid import HELD_S, MODEL, FakeHid, interface
 

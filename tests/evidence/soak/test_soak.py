@@ -15,7 +15,9 @@ if numba.config.DISABLE_JIT:
     pytest.skip("the servo exists compiled only", allow_module_level=True)
 
 from study_app.cli import main
-from study_app.evidence.soak.soak import Soak, soak_servo
+from study_app.evidence.soak.soak import Audit, Soak, soak_servo
+from study_app.haptics.model.layout import LIMITER_GLITCH, LIMITER_STOP, SAMPLE, records
+from study_app.haptics.runtime.telemetry import Samples
 from study_app.protocol.load import load_scenes
 
 pytestmark = pytest.mark.slow
@@ -60,6 +62,33 @@ def test_the_same_seed_finds_the_same(scenes, found):
             del table[name]
     assert again == first
     assert soak_servo(scenes, 0.001, virtual=True, seed=2).table() != soak_servo(scenes, 0.001, virtual=True).table()
+
+
+@pytest.mark.parametrize(
+    ("changes", "violated"),
+    [
+        ({"device_force_n": (0.0, 0.0, 1.4)}, set()),
+        ({"device_force_n": (0.0, 0.0, 1.6)}, {"steps"}),
+        ({"device_force_n": (6.0, 0.0, 6.0)}, {"excess", "steps"}),
+        ({"device_force_n": (0.0, np.nan, 0.0)}, {"no_number"}),
+        ({"device_force_n": (0.1, 0.0, 0.0), "limiters": LIMITER_STOP}, {"unstopped"}),
+        ({"device_force_n": (0.1, 0.0, 0.0), "busy_ns": 50_000_000}, {"unstopped", "drift_ns"}),
+        ({"position_m": (np.nan, 0.0, 0.0)}, {"accepted"}),
+        ({"position_m": (np.nan, 0.0, 0.0), "limiters": LIMITER_GLITCH}, set()),
+        ({"time_ns": 3_400_000}, {"drift_ns"}),
+    ],
+)
+def test_a_sample_that_breaks_a_guarantee_is_counted(changes, violated):
+    samples = records(SAMPLE, 6).view(Samples)
+    samples.tick, samples.time_ns, samples.fresh = np.arange(6), 1_000_000 * np.arange(6), 1
+    for field, value in changes.items():
+        samples[field][3] = value
+    audit = Audit(limit_n=8.0, slew_n=1.5, period_ns=1_000_000, reach_m=0.05)
+    for part in np.split(samples, [2, 3]):
+        audit.take(part)
+    names = ("accepted", "excess", "no_number", "steps", "unstopped", "drift_ns", "missing")
+    assert {name for name in names if audit.counts[name]} == violated
+    assert audit.counts.first_tick == (3 if violated else -1)
 
 
 def test_liquids_without_a_wake_are_soaked_too():

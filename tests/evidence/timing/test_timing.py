@@ -12,17 +12,11 @@ if numba.config.DISABLE_JIT:
 
 
 from study_app.cli import main
+from study_app.devices.simulated import PlayedHand
 from study_app.evidence.computer import busy_cores
-from study_app.evidence.timing.measurement import (
-    FULL,
-    LEAD_IN,
-    PERIOD_NS,
-    PlayedHand,
-    granted,
-    measure_timing,
-    ticks_at,
-)
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.evidence.cost import hand_motion
+from study_app.evidence.timing.measurement import FULL, LEAD_IN, PERIOD_NS, granted, measure_timing, ticks_at
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.pack import elements_needed
 from study_app.haptics.runtime.servo import Servo
 
@@ -43,7 +37,7 @@ def test_a_tick_that_comes_late_is_late_by_all_of_it_and_passes_deadlines_over()
 
 def test_no_python_is_called_in_a_tick():
     """Ten times the ticks make not one call more of a Python function, nor of one of its C functions."""
-    servo = Servo(PlayedHand(), clock=VirtualClock(), elements=elements_needed(FULL))
+    servo = Servo(PlayedHand(hand_motion()), clock=VirtualClock(), elements=elements_needed(FULL))
     servo.load(FULL)
     servo.advance(1)
 

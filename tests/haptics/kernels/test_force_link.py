@@ -190,8 +190,8 @@ def test_a_link_survives_a_change_of_numbers_and_is_no_number_of_the_scene():
 
 
 def test_delay_and_jitter_beyond_the_kept_forces_are_refused():
-    assert ForceLink(delay_s=0.2, jitter_s=0.05).fits(4000)
-    assert not ForceLink(delay_s=0.2, jitter_s=0.05).fits(5000)
+    assert ForceLink(delay_s=0.2, jitter_s=0.05).refusal_reason(4000) is None
+    assert ForceLink(delay_s=0.2, jitter_s=0.05).refusal_reason(5000)
     with pytest.raises(ValidationError, match=r"below 204\.8 ms"):
         Scene.model_validate(damper(delay_s=0.2, jitter_s=0.05).model_copy(update={"rate_hz": 5000.0}).model_dump())
     with pytest.raises(StudyError, match="specify a capacity when you pack it"):

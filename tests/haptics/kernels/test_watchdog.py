@@ -15,7 +15,7 @@ from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import ServoFault
 from study_app.haptics.kernels.safety import begin_scene, new_safety
 from study_app.haptics.model.layout import LIMITER_STALE, LIMITER_STOP, STATUS_OK
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.offline import take_sample
 from study_app.haptics.runtime.pack import pack
 from study_app.haptics.runtime.servo import Servo

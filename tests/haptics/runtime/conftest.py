@@ -2,7 +2,7 @@
 
 import pytest
 
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.recording_device import Probe
 

@@ -19,7 +19,7 @@ from study_app.haptics.model.motion import programmed_motion
 from study_app.haptics.model.overrides import override_all
 from study_app.haptics.model.scene import Scene
 from study_app.haptics.model.slope_limits import SLEW_N
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.load import load_scene
 

@@ -16,7 +16,7 @@ from study_app.haptics.model.layout import (
     MEASURED_VELOCITY,
 )
 from study_app.haptics.model.scene import Knee
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.recording_device import Probe
 from tests.haptics.running import recomputed

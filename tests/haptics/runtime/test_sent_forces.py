@@ -11,7 +11,7 @@ from study_app.errors import DeviceError
 from study_app.haptics.kernels.loop import FASTER_SAMPLES, SLOWER_SAMPLES
 from study_app.haptics.model.device_dynamics import UNKNOWN, Dynamics
 from study_app.haptics.model.layout import LIMITER_SATURATED, STATUS_DEVICE_LOST
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.haptics.recording_device import Probe
 from tests.haptics.running import recomputed

@@ -10,7 +10,7 @@ from study_app.devices.simulated import ScriptedDevice
 from study_app.errors import StudyError
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.haptics.model.scene import Scene
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.haptics.runtime.telemetry import HISTORY, timing
 from tests.compiled import needs_servo

@@ -15,7 +15,7 @@ from study_app.haptics.model.layout import (
     STATUS_OK,
     STATUS_STALE_FAULT,
 )
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.compiled import needs_servo
 from tests.haptics.running import felt, is_zero

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from study_app.errors import StudyError
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from tests.compiled import needs_servo
 from tests.haptics.recording_device import PROBE, Probe

@@ -12,7 +12,7 @@ import pytest
 if sys.platform == "win32":
     pytest.skip("signals of POSIX", allow_module_level=True)
 
-from study_app.haptics.runtime.clocks.grants import SUSPENDING, allow_suspension, refuse_suspension
+from study_app.haptics.runtime.grants import SUSPENDING, allow_suspension, refuse_suspension
 from tests.haptics.recording_device import PROBE
 
 NUMBERS = [getattr(signal, name) for name in SUSPENDING]

@@ -10,7 +10,7 @@ from pyarrow import parquet
 
 from study_app.devices.rig import Rig
 from study_app.devices.simulated import ScriptedDevice
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule

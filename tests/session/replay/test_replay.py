@@ -15,7 +15,7 @@ from study_app.haptics.model import gate
 from study_app.haptics.model.device_dynamics import Dynamics
 from study_app.haptics.model.force_rules import FORCE_RULES, VERSIONS
 from study_app.haptics.model.layout import LIMITER_ENERGY, LIMITER_GLITCH, LIMITER_SLEW, LIMITER_SLOPE
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.session import replay as replay_module
 from study_app.session.replay import Replayed, differing_columns, replay

@@ -10,7 +10,7 @@ import numpy as np
 from study_app.devices.hand import HandOrders, hand_of
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.haptics.model.layout import BUTTON_STOP
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, stream
 from study_app.session.device_buttons import ANSWERS, CONTINUE

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from study_app.devices.rig import open_rig, study_settings
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import stream
 from tests.compiled import needs_servo

@@ -9,7 +9,7 @@ import pytest
 from study_app.devices.rig import Rig, open_rig, study_settings
 from study_app.haptics.model.layout import LIMITER_FADE
 from study_app.haptics.model.slope_limits import SLEW_N
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.protocol.orders.schedule import stream
 from study_app.session.device_buttons import ANSWERS
 from study_app.session.transitions.events import Stepped

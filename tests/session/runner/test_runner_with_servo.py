@@ -10,7 +10,7 @@ import pytest
 
 from study_app.devices.rig import open_rig, study_settings
 from study_app.devices.simulated import ScriptedDevice
-from study_app.haptics.runtime.clocks.clock import VirtualClock
+from study_app.haptics.runtime.clocks import VirtualClock
 from study_app.haptics.runtime.servo import Servo
 from study_app.protocol.model import Protocol
 from study_app.protocol.orders.schedule import build_schedule, draw_key, stream

@@ -10,11 +10,13 @@ from functools import cache
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from study_app.errors import StudyError
-from study_app.haptics.kernels.c_functions import NOW, SLEEP, c_function, record_at
+from study_app.haptics.kernels.c_functions import NOW, SLEEP, c_function, call_at, record_at
+from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import records
-from study_app.haptics.runtime.clocks.grants import Blocks, Grant
+from study_app.haptics.runtime.grants import Blocks, Grant
 
 if sys.platform == "win32":
     from study_app.haptics.runtime.clocks import windows as platform
@@ -26,6 +28,7 @@ else:
 _MOST_SPIN_US = 1000.0
 VIRTUAL = np.dtype([("now_ns", np.int64)], align=True)
 _virtual_at = record_at(VIRTUAL)
+_sleep = call_at(SLEEP)
 
 
 class Clock(Protocol):
@@ -132,6 +135,24 @@ def raise_priority(blocks: Blocks = (), *, real_time: bool = True) -> Grant:
     if not (blocks and real_time):
         return grant
     return grant.with_memory(locked=platform.lock_memory(blocks), advice=platform.MEMORY)
+
+
+def sleep_repeatedly(clock: Clock, period_ns: int, ticks: int) -> NDArray[np.int64]:
+    """Sleep from deadline to deadline in a compiled loop that does nothing else; return the lateness of each [ns].
+
+    Deadlines are a period apart; those that have passed are skipped.
+    """
+    lateness_ns = np.zeros(ticks, np.int64)
+    _sleep_on(clock.sleep.address, clock.context, clock.now_ns(), period_ns, lateness_ns)
+    return lateness_ns
+
+
+@kernel
+def _sleep_on(sleep: int, context: int, start_ns: int, period_ns: int, lateness_ns: Any) -> None:
+    deadline_ns = start_ns + period_ns
+    for i in range(lateness_ns.shape[0]):
+        lateness_ns[i] = _sleep(sleep, context, deadline_ns) - deadline_ns
+        deadline_ns += max(lateness_ns[i] // period_ns, 1) * period_ns
 
 
 if sys.platform != "win32":

@@ -18,7 +18,7 @@ from numba import types
 from study_app.haptics.kernels.c_functions import external, record_at, stack_memory
 from study_app.haptics.kernels.compiled import kernel
 from study_app.haptics.model.layout import records
-from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, Grant
+from study_app.haptics.runtime.grants import NOT_ASKED, REFUSED, Blocks, Grant
 
 _SERVICE: Final = "org.freedesktop.RealtimeKit1"
 _OBJECT: Final = "/org/freedesktop/RealtimeKit1"

@@ -8,7 +8,7 @@ from numba import types
 
 from study_app.haptics.kernels.c_functions import external, record_at
 from study_app.haptics.model.layout import records
-from study_app.haptics.runtime.clocks.grants import NOT_ASKED, REFUSED, Blocks, Grant
+from study_app.haptics.runtime.grants import NOT_ASKED, REFUSED, Blocks, Grant
 
 SPIN_US = 0.0  # by default the timer is trusted
 

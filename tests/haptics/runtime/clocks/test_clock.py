@@ -21,7 +21,7 @@ from study_app.haptics.runtime.clocks import clock, macos
 from study_app.haptics.runtime.clocks import linux as clock_linux
 from study_app.haptics.runtime.clocks import windows as clock_windows
 from study_app.haptics.runtime.clocks.clock import SystemClock, raise_priority
-from study_app.haptics.runtime.clocks.grants import Grant
+from study_app.haptics.runtime.grants import Grant
 
 if sys.platform != "win32":
     import resource

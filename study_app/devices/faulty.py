@@ -6,7 +6,6 @@ telemetry has of it, and so is every force that was written: the last witness be
 """
 
 import math
-from functools import cache
 from typing import Any, Final
 
 import numpy as np
@@ -17,16 +16,18 @@ from study_app.haptics.kernels import (
     READ_NOTHING_NEW,
     WRITE,
     Driver,
-    c_function,
     call_at,
+    command_at,
     copy,
+    device_functions,
     kernel,
     norm,
     random,
+    reading_at,
     record_at,
 )
-from study_app.haptics.model.layout import BUTTON_STOP, COMMAND, READING, records
-from study_app.haptics.runtime.clocks.clock import VIRTUAL, Clock
+from study_app.haptics.model.layout import BUTTON_STOP, records
+from study_app.haptics.runtime.clocks import VIRTUAL, Clock
 
 NON_FINITE, GLITCH, SILENCE, JUMP, BUTTON, LOST, LOST_AT_WRITE = range(7)
 KINDS: Final = ("non_finite", "glitch", "silence", "clock_jump", "stop_button", "lost", "lost_at_write")
@@ -69,8 +70,6 @@ FAULTS = np.dtype(
 )
 
 _faults_at = record_at(FAULTS)
-_reading_at = record_at(READING)
-_command_at = record_at(COMMAND)
 _virtual_at = record_at(VIRTUAL)
 _inner_read, _inner_write = call_at(READ), call_at(WRITE)
 
@@ -95,7 +94,7 @@ class FaultyDevice:
         self.state.random = 0x9E3779B97F4A7C15 ^ (seed + 1)
         self.state.kind = _NONE
         self.context = int(self._memory.ctypes.data)
-        self.read, self.write = _functions()
+        self.read, self.write = device_functions(_read, _write)
 
     @property
     def failure(self) -> str | None:
@@ -116,11 +115,6 @@ class FaultyDevice:
             state.share[JUMP] = 0.0
         state.gap = gap
         state.kind = _NONE
-
-
-@cache
-def _functions() -> tuple[Any, Any]:
-    return c_function(READ, _read), c_function(WRITE, _write)
 
 
 @kernel
@@ -184,7 +178,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
     if kind == SILENCE:
         return READ_NOTHING_NEW
     answer: int = _inner_read(faults.read, faults.device, now_ns, reading)
-    out = _reading_at(reading)
+    out = reading_at(reading)
     axis = faults.choice % 3
     if kind == NON_FINITE:
         out.position_m[axis] = _no_number(faults.choice)
@@ -202,7 +196,7 @@ def _read(context: int, now_ns: int, reading: int) -> int:
 
 
 def _write(context: int, command: int) -> int:
-    faults, force_n = _faults_at(context), _command_at(command).force_n
+    faults, force_n = _faults_at(context), command_at(command).force_n
     faults.writes += 1
     size_n = norm(force_n)
     if math.isfinite(size_n):
