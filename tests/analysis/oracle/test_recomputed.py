@@ -14,7 +14,7 @@ import pytest
 from study_app.analysis import contrasts
 from study_app.analysis.data import motion, study_tables
 from study_app.analysis.findings import delays, finding
-from study_app.analysis.statistics import rank_tests, trend
+from study_app.analysis.statistics import rank_tests, trend_tests
 from study_app.psychophysics import detection
 from tests.analysis.oracle import studies
 from tests.analysis.oracle.recomputed import read_csv
@@ -181,7 +181,7 @@ def p_of_pairs_one_sided(patched: pytest.MonkeyPatch) -> None:
 
 
 def p_of_trends_two_sided(patched: pytest.MonkeyPatch) -> None:
-    patched.setattr(trend, "signed_p", lambda ranks, v, _side: rank_tests.signed_p(ranks, v))
+    patched.setattr(trend_tests, "signed_p", lambda ranks, v, _side: rank_tests.signed_p(ranks, v))
 
 
 def p_of_hypotheses_one_sided(patched: pytest.MonkeyPatch) -> None:

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from study_app.analysis.planning import simulated_studies
-from study_app.analysis.statistics import equivalence, mean_tests, outcome, rank_tests, recognition, thresholds, trend
+from study_app.analysis.statistics import (
+    equivalence,
+    mean_tests,
+    outcome,
+    rank_tests,
+    recognition_tests,
+    thresholds,
+    trend_tests,
+)
 from study_app.errors import AnalysisError
 from tests.analysis.outputs import GOLDEN
 from tests.golden import compare, each_once
@@ -86,12 +94,12 @@ def named_(number: int, count: int) -> dict[str, Any]:
 def of_settings() -> Iterator[str]:
     yield from results(rank_tests.friedman, SAMPLES)
     yield from results(rank_tests.friedman, {"long": answers(60, 5, 1, 0.2)}, draws=500, seed=2)
-    yield from results(trend.trend, SAMPLES)
-    yield from results(trend.trend, SAMPLES, "decreasing")
-    yield from results(trend.trend, {"long": answers(210, 3, 2, 0.1)}, seed=None)
+    yield from results(trend_tests.trend, SAMPLES)
+    yield from results(trend_tests.trend, SAMPLES, "decreasing")
+    yield from results(trend_tests.trend, {"long": answers(210, 3, 2, 0.1)}, seed=None)
     wide = {name: (one, LEVELS[: one.shape[1]]) for name, one in SAMPLES.items() if one.shape[1] <= 4}
-    yield from results(trend.step_down, wide)
-    yield from results(trend.step_down, wide, "decreasing", alpha=0.2)
+    yield from results(trend_tests.step_down, wide)
+    yield from results(trend_tests.step_down, wide, "decreasing", alpha=0.2)
     stacked = {name: np.stack([one, one[::-1], 8 - one]) for name, one in SAMPLES.items() if name != "half"}
     yield from results(rank_tests.global_permutation, stacked, draws=300)
 
@@ -104,10 +112,10 @@ def of_pairs() -> Iterator[str]:
     yield from results(outcome.holm, {str(ps): (ps,) for ps in PS})
     yield from results(outcome.false_discovery, {str(ps): (ps,) for ps in (*PS, (1.2,))})
     tables = {"2": [[5, 1], [2, 7]], "0": [[0, 0], [0, 0]], "3": [[3, 0, 1], [0, 4, 0], [2, 0, 5]]}
-    yield from results(recognition.kappa, tables)
-    yield from results(recognition.named_labels, named_(1, 3))
-    names = {name: (recognition.named_labels(one), (0, 1, None)) for name, one in named_(2, 3).items()}
-    yield from results(recognition.recognition, names, labels=4)
+    yield from results(recognition_tests.kappa, tables)
+    yield from results(recognition_tests.named_labels, named_(1, 3))
+    names = {name: (recognition_tests.named_labels(one), (0, 1, None)) for name, one in named_(2, 3).items()}
+    yield from results(recognition_tests.recognition, names, labels=4)
     yield from results(outcome.student_interval, {name: np.asarray(one, float) for name, one in DIFFERENCES.items()})
     yield from results(thresholds.group_mean, {
         "one": ([1.0], [0.1]), "two": ([1.0, 2.0], [0.1, 0.2]), "alike": ([1.0, 1.01, 0.99], [0.5, 0.4, 0.6]),

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, page_trend_test, spearmanr, wilcoxon
 
-from study_app.analysis.statistics import trend as trend_module
+from study_app.analysis.statistics import trend_tests
 from study_app.analysis.statistics.rank_tests import paired
 from study_app.analysis.statistics.trend_tests import step_down, trend
 from study_app.errors import AnalysisError
@@ -25,7 +25,7 @@ def test_the_exact_p_is_that_of_all_rearrangements(rows: list[list[int]]) -> Non
     if result.p_page is None:
         assert result.note.startswith("no variation")
         return
-    ranks = trend_module.doubled_ranks(np.array(rows, dtype=float))
+    ranks = trend_tests.doubled_ranks(np.array(rows, dtype=float))
     sums = [sum(place * rank for place, rank in enumerate(row, start=1)) for row in ranks]
     each = [[sum(p * r for p, r in enumerate(order, start=1)) for order in permutations(row)] for row in ranks]
     every = np.array([sum(chosen) for chosen in product(*each)])
@@ -70,7 +70,7 @@ def test_ties_lower_the_effect_and_its_name_says_so() -> None:
 
 def test_many_people_are_approximated_as_scipy_does() -> None:
     rng = np.random.default_rng(2)
-    values = np.argsort(rng.random((trend_module.EXACT_UP_TO + 1, 5)), axis=1).astype(float)
+    values = np.argsort(rng.random((trend_tests.EXACT_UP_TO + 1, 5)), axis=1).astype(float)
     result = trend(values)
     expected = page_trend_test(values, method="asymptotic")
     assert result.p_page == pytest.approx(expected.pvalue)
