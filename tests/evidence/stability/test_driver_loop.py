@@ -4,6 +4,7 @@ import dataclasses
 
 import pytest
 
+from study_app.evidence.stability import driver_loop
 from study_app.evidence.stability.stability_cases import Case
 from study_app.evidence.stability.stability_report import verdicts_on
 from tests.haptics.scenes import COMPILED
@@ -20,3 +21,20 @@ def test_driver_gives_out_no_more_than_the_scripted_device(phase):
     (verdict,) = verdicts_on(case)
     assert not verdict.reasons, verdict
     assert verdict.balance_j >= verdict.permitted_j
+
+
+@pytest.mark.parametrize(("late_ticks", "reasons"), [(0, ()), (1, ("energy",))])
+def test_a_release_in_honey_differs_by_chance_and_one_with_an_unreported_delay_does_not(
+    late_ticks, reasons, monkeypatch
+):
+    """The released grip swings: 10 to 19 mJ with either device, depending on the tick of the release."""
+    renew = driver_loop._Falcon.renew
+
+    def renew_late(falcon):
+        renew(falcon)
+        falcon.hand.state.handle.delay += late_ticks
+
+    monkeypatch.setattr(driver_loop._Falcon, "renew", renew_late)
+    in_honey = dataclasses.replace(RELEASE, liquid="physical_honey", scale=3.0, speed_mps=0.75398, release_s=0.6625)
+    verdict = driver_loop.judge_driven(in_honey)
+    assert verdict.reasons == reasons, verdict
