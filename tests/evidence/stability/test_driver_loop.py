@@ -1,10 +1,11 @@
 """Cases through the Falcon's driver: what drives the grip, and what is measured there."""
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from study_app.evidence.stability import driver_loop
+from study_app.devices.emulators.falcon import EmulatedFalcon
 from study_app.evidence.stability.stability_cases import Case
 from study_app.evidence.stability.stability_report import verdicts_on
 from tests.haptics.scenes import COMPILED
@@ -28,13 +29,14 @@ def test_a_release_in_honey_differs_by_chance_and_one_with_an_unreported_delay_d
     late_ticks, reasons, monkeypatch
 ):
     """The released grip swings: 10 to 19 mJ with either device, depending on the tick of the release."""
-    renew = driver_loop._Falcon.renew
+    opened = EmulatedFalcon.open
 
-    def renew_late(falcon):
-        renew(falcon)
+    def open_late(falcon):
+        opened(falcon)
         falcon.hand.state.handle.delay += late_ticks
 
-    monkeypatch.setattr(driver_loop._Falcon, "renew", renew_late)
+    monkeypatch.setattr(EmulatedFalcon, "open", open_late)
     in_honey = dataclasses.replace(RELEASE, liquid="physical_honey", scale=3.0, speed_mps=0.75398, release_s=0.6625)
-    verdict = driver_loop.judge_driven(in_honey)
+    with ThreadPoolExecutor(1) as executor:  # each thread opens its own Falcon
+        (verdict,) = executor.submit(verdicts_on, in_honey).result()
     assert verdict.reasons == reasons, verdict
