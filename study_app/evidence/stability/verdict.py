@@ -8,7 +8,9 @@
 - *oscillation*: the handle, at rest or let go, goes on swinging above 12 Hz at more than 40 mm/s and does not tire over
   0.4 s, or does so above 40 Hz while it is being moved;
 - *sustained force*: above 40 Hz the force exceeds that of the same motion played without feedback by more than 0.05 N
-  RMS in each of four successive intervals of 0.1 s, and by at least 0.8 times as much in the last as in the first;
+  RMS in each of four successive intervals of 0.1 s, and by at least 0.8 times as much in the last as in the first; and
+  it stays above 0.05 N RMS, without decaying by the same factor, once the encoder becomes exact, which distinguishes an
+  oscillation from amplified noise;
 - *noise*: it does so over an interval of 0.4 s or more, excluding the strongest 0.1 s of each, and is not sustained.
 
 A case with any reason but noise is **unstable**; one with noise alone is **noisy**: its force buzzes for a moment, but
@@ -158,6 +160,9 @@ def judge(case: Case, *, safe: bool, limits: DampingLimits | None = None) -> Ver
         permitted_j = min(permitted_j, -MISJUDGED_ALLOWANCE_J)
     swing_mps = swing(trace, case)
     restlessness = _restlessness(case, trace, before, limits, late_share=_LATE_SHARE if linked else 0.0)
+    if restlessness.sustained:
+        lasts = any(_outlasts_noise(case, trace, *each) for each in zip(windows(case), before, strict=True))
+        restlessness = restlessness._replace(sustained=lasts)
     reasons = reasons_of(
         limit=safe and np.linalg.norm(trace.sent_n, axis=1).max() > FORCE_LIMIT_N * (1.0 + 1e-9),
         energy=balance_j < permitted_j,
@@ -228,6 +233,18 @@ def _restlessness(
         controls_n = [answer.sent_n[:ends] for answer in played]
         compared.append(compare_fast(trace.sent_n[:ends], controls_n, case.rate_hz, begins, late_share=late_share))
     return worst_of(compared)
+
+
+def _outlasts_noise(case: Case, trace: Any, window_s: tuple[float, float], begun: tuple[int, Bench]) -> bool:
+    """Return whether the force keeps its fast part when the encoder becomes exact halfway through a window."""
+    again, bench = trace.copy(), begun[1].copy()
+    middle = bench.run(again, begun[0], 0.5 * sum(window_s))
+    bench.handle.quantum_m = bench.loop.noise_m = bench.loop.outliers = 0.0
+    ends = bench.run(again, middle, window_s[1])
+    interval = round(_ONCE_S * case.rate_hz)
+    rows = range(middle + interval, ends + 1, interval)
+    parts_n = [fast_part(again.sent_n, case.rate_hz, _FAST_HZ, *each) for each in itertools.pairwise(rows)]
+    return not parts_n or (min(parts_n) > _RESTLESS_N and parts_n[-1] >= _TIRED * parts_n[0])
 
 
 def calm_motion(trace: Any) -> Any:

@@ -48,7 +48,8 @@ than the ``acting_share`` of the rules: such a force is not that of the liquid, 
 A handle that was let go may also oscillate without a debt, since buoyancy or the liquid's reserve supplies the energy.
 From six successive reversals on, each sooner than a hand can reverse, the gain falls until the oscillation ends, at
 most to a twentieth (`_count_reversals`); it recovers as after a debt that is not forgiven. A delayed force lets a light
-hand ring, which a study of delays must be able to present: with a force link, reversals do not count.
+hand ring, which a study of delays must be able to present: with a force link, only faster reversals count
+(``late_swing_mps`` of the rules).
 
 The energy that the velocity estimator stores and may therefore return is `filter_storage`.
 
@@ -300,8 +301,7 @@ def _watch_motion(parameters: layout.Record, passivity: layout.Record, interval_
     passivity.fast_s = (passivity.fast_s + lasted_s) / (1.0 + interval_s / _PUSHED_S)
     passivity.quiet_s = 0.0 if square_m2ps2 > _QUIET_MPS * _QUIET_MPS else passivity.quiet_s + interval_s
     passivity.gap_s = 0.0 if is_gap(parameters, interval_s) else passivity.gap_s + interval_s
-    if parameters.link.acts == 0:
-        _count_reversals(parameters, passivity, min(_SWING_WEIGHT * weight, 1.0), interval_s)
+    _count_reversals(parameters, passivity, min(_SWING_WEIGHT * weight, 1.0), interval_s)
 
 
 @part
@@ -312,6 +312,7 @@ def _count_reversals(parameters: layout.Record, passivity: layout.Record, weight
     speed: smaller ones are ripples of a stroke.
     """
     swing_mps, peak_mps = passivity.swing_mps, passivity.peak_mps
+    least_mps = parameters.rules.swing_mps if parameters.link.acts == 0 else parameters.rules.late_swing_mps
     for axis in range(3):
         fast_mps = passivity.velocity_mps[axis] - passivity.slow_mps[axis]
         swing_mps[axis] += weight * (fast_mps - swing_mps[axis])
@@ -321,7 +322,7 @@ def _count_reversals(parameters: layout.Record, passivity: layout.Record, weight
     is_late = passivity.reversed_s > (parameters.rules.shaken_reversal_s if is_shaken else _REVERSAL_S)
     if is_late:
         passivity.reversals = 0
-    if square_m2ps2 <= parameters.rules.swing_mps * parameters.rules.swing_mps:
+    if square_m2ps2 <= least_mps * least_mps:
         if square_m2ps2 < _NOTHING_M2PS2:
             clear(swing_mps)
         return

@@ -69,6 +69,7 @@ NOISY_SAMPLES = "quantum_um=60 noise_um=30 viscous_nspm=0.5"
 FALLBACK = (
     f"estimator=kalman hand=light motion=stroke speed_mps=0.1 coulomb_n=0.3 missed=0.02 plant=arm {NOISY_SAMPLES}"
 )
+LET_GO = "scale=40 hand=lets-go viscous_nspm=0 missed=0.02"
 CHOPPED = "rate_hz=2000 hand=thrown viscous_nspm=0 quantum_um=20"
 
 
@@ -82,11 +83,42 @@ CHOPPED = "rate_hz=2000 hand=thrown viscous_nspm=0 quantum_um=20"
         f"liquid=damper scale=1 delay=2 motion=circles mass_kg=0.25 missed=0.02 force_delay_ms=50 {CHOPPED}",
         f"liquid=physical_honey scale=10 delay=3 estimator=kalman speed_mps=1 mass_kg=0.03 noise_um=30 force_loss=0.5"
         f" force_delay_ms=20 force_jitter_ms=50 {CHOPPED}",
+        f"liquid=physical_glycerin mass_kg=0.05 motion=sine speed_mps=0.6 quantum_um=20 jitter=0.2 force_delay_ms=1"
+        f" force_jitter_ms=20 force_loss=0.5 rate_hz=2000 release_s=0.7 {LET_GO}",
+        f"liquid=light_oil mass_kg=0.03 motion=circles speed_mps=0.6 quantum_um=60 force_delay_ms=20 plant=arm"
+        f" release_s=0.8 {LET_GO}",
     ],
-    ids=["estimator changes with the delay", "the same in a free handle", "late force of a damper", "jitter and loss"],
+    ids=[
+        "estimator changes with the delay",
+        "the same in a free handle",
+        "late force of a damper",
+        "jitter and loss",
+        "uneven force on a released handle",
+        "late force on a released handle",
+    ],
 )
 def test_cases_of_earlier_sweeps_are_stable(line):
     assert judge(parse_case(line), safe=True).grade == STABLE
+
+
+STIRRED = "plant=arm motion=circles speed_mps=1 way_mm=60"
+
+
+@compiled
+@pytest.mark.parametrize(
+    ("line", "safe", "reasons"),
+    [
+        (f"liquid=water estimator=kalman hand=firm viscous_nspm=0 coulomb_n=0.3 {STIRRED}", True, ("noise",)),
+        (
+            f"liquid=water estimator=kalman hand=firm viscous_nspm=0 coulomb_n=0.3 {STIRRED}",
+            False,
+            ("sustained force",),
+        ),
+    ],
+    ids=["amplified noise", "oscillation"],
+)
+def test_only_an_oscillation_lasts_when_the_encoder_becomes_exact(line, safe, reasons):
+    assert judge(parse_case(line), safe=safe).reasons == reasons
 
 
 @compiled
